@@ -1,4 +1,6 @@
-"""Batch simulation of plants with different parameters: simulate_batch, equivalent C code and vectorised NumPy."""
+"""Batch simulation of plants with different parameters: simulate_batch, equivalent C code and
+vectorised NumPy.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,15 @@ from typing import Any
 import numpy as np
 from batch_numpy import rk4
 from filling import Array, hanging, runs
-from measure import PRINT_PEAK_MEMORY, Section, Target, Times, format_time, print_section, time_variants
+from measure import (
+    PRINT_PEAK_MEMORY,
+    Section,
+    Target,
+    Times,
+    format_time,
+    print_section,
+    time_variants,
+)
 from ode8 import compilers
 
 import airmuscle as am
@@ -24,9 +34,13 @@ from airmuscle.engine import Double, Precision, Single
 from airmuscle.engine.processes import available_cores
 from airmuscle.engine.run.batch.variations import default_states, variations_of
 
-STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0
+STEP = 1e-3
+PLANTS = 10_000
+DURATION = 5.0
 SHORT = 0.1
-"""Simulated time [s] of the NumPy variant; its time is scaled to DURATION, because all its steps cost the same."""
+"""Simulated time [s] of the NumPy variant; its time is scaled to DURATION, because all its steps
+cost the same.
+"""
 SOURCE = pathlib.Path(__file__).with_name("batch.c")
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-fopenmp-simd")
 WIDEST = "-mprefer-vector-width=512"
@@ -38,23 +52,28 @@ SINGLE_PLANTS = 20
 GROWTH = (1, 100, 1000, 10_000, 100_000)
 HEADER = ("variant", "plants", "cores", "median", "minimum", "million plant steps per second")
 TEXT = (
-    "The plant with three states. Its 44 parameters are random for every plant, within 5 % (chosen). RK4 at 1e-3 s "
-    "over 5 s; the final states are kept. The C code computes the same equations in blocks of 8, 16 or 32 lanes, with "
-    "everything that depends only on parameters precomputed; the time of `simulate_batch` includes the validation of "
-    f"all parameters. NumPy uses one core; {SHORT:g} s are simulated and scaled to 5 s. The C code has no branches; "
-    "the library skips closed valves and the extrapolation beyond the validity range if no plant of a SIMD register "
-    "needs them, as is the case here. All plants start at the same state. A batch without initial state first "
-    "computes the equilibrium of each plant at ambient pressure, which is timed separately."
+    "The plant with three states. Its 44 parameters are random for every plant, within 5 %"
+    " (chosen). RK4 at 1e-3 s over 5 s; the final states are kept. The C code computes the same"
+    " equations in blocks of 8, 16 or 32 lanes, with everything that depends only on parameters"
+    " precomputed; the time of `simulate_batch` includes the validation of all parameters. NumPy"
+    f" uses one core; {SHORT:g} s are simulated and scaled to 5 s. The C code has no branches; the"
+    " library skips closed valves and the extrapolation beyond the validity range if no plant of a"
+    " SIMD register needs them, as is the case here. All plants start at the same state. A batch"
+    " without initial state first computes the equilibrium of each plant at ambient pressure,"
+    " which is timed separately."
 )
 REASON = (
-    "both are limited by the same multiplications, roots and divisions; the library skips closed valves and an "
-    "extrapolation that no plant of a SIMD register needs, but also validates all parameters"
+    "both are limited by the same multiplications, roots and divisions; the library skips closed"
+    " valves and an extrapolation that no plant of a SIMD register needs, but also validates all"
+    " parameters"
 )
 BUSY_REASON = "the cores of the machine are shared with other machines"
 
 
 def random_parameters(plant: am.Plant, count: int) -> dict[str, Array]:
-    """Random values of every parameter within SPREAD of its value and within its bounds, by path."""
+    """Random values of every parameter within SPREAD of its value and within its bounds, by
+    path.
+    """
     rng = np.random.default_rng(5)
     parameters = {}
     for leaf in tree.leaves(plant):
@@ -65,14 +84,31 @@ def random_parameters(plant: am.Plant, count: int) -> dict[str, Array]:
 
 def c_parameters(plant: Any, count: int) -> Array:
     """The parameters (46, N) of the C code, in its order."""
-    muscle, circuit, load, ambient = plant.muscles[0], plant.circuits[0], plant.mechanism, plant.ambient
-    law, (k, c) = muscle.contractile, _stretch(muscle.geometry)
-    scale = am.physics.REFERENCE_DENSITY * np.sqrt(am.physics.REFERENCE_TEMPERATURE / ambient.temperature)
-    validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
+    muscle = plant.muscles[0]
+    circuit = plant.circuits[0]
+    load = plant.mechanism
+    ambient = plant.ambient
+    law = muscle.contractile
+    k, c = _stretch(muscle.geometry)
+    scale = am.physics.REFERENCE_DENSITY * np.sqrt(
+        am.physics.REFERENCE_TEMPERATURE / ambient.temperature
+    )
+    validity_range = (
+        (law.min_contraction, law.max_contraction),
+        (
+            law.min_pressure,
+            law.max_pressure,
+        ),
+    )
     valves = [
         x
         for v in (circuit.fill, circuit.discharge)
-        for x in (scale * v.conductance, v.critical_ratio, 1 / (1 - v.critical_ratio), v.laminar_slope())
+        for x in (
+            scale * v.conductance,
+            v.critical_ratio,
+            1 / (1 - v.critical_ratio),
+            v.laminar_slope(),
+        )
     ]
     rows = [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c]
     rows += [
@@ -82,7 +118,13 @@ def c_parameters(plant: Any, count: int) -> Array:
         *valves,
     ]
     rows += [x for low, high in validity_range for x in (low, 2 / (high - low))]
-    rows += [law.min_force, law.max_force, muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope]
+    rows += [
+        law.min_force,
+        law.max_force,
+        muscle.spring.stiffness,
+        muscle.damper.damping,
+        muscle.damper.damping_slope,
+    ]
     return np.array([np.broadcast_to(row, count) for row in (*rows, *law.coefficients)])
 
 
@@ -92,7 +134,9 @@ def _stretch(braid: Any) -> tuple[Array, Array]:
 
 
 def compile_libraries(folder: pathlib.Path) -> dict[str, tuple[ctypes.CDLL, int]]:
-    """The C code compiled by each compiler, for several numbers of lanes, with default and maximum vector width."""
+    """The C code compiled by each compiler, for several numbers of lanes, with default and maximum
+    vector width.
+    """
     libraries = {}
     for compiler in compilers():
         for wide in ((), (WIDEST,)):
@@ -101,7 +145,17 @@ def compile_libraries(folder: pathlib.Path) -> dict[str, tuple[ctypes.CDLL, int]
                 target = folder / f"batch{len(libraries)}.so"
                 code = target.with_suffix(".o")
                 subprocess.run(
-                    [compiler, *FLAGS, *wide, f"-DLANES={lanes}", "-fPIC", "-c", str(SOURCE), "-o", str(code)],
+                    [
+                        compiler,
+                        *FLAGS,
+                        *wide,
+                        f"-DLANES={lanes}",
+                        "-fPIC",
+                        "-c",
+                        str(SOURCE),
+                        "-o",
+                        str(code),
+                    ],
                     check=True,
                 )
                 subprocess.run([compiler, "-shared", str(code), "-o", str(target)], check=True)
@@ -112,11 +166,15 @@ def compile_libraries(folder: pathlib.Path) -> dict[str, tuple[ctypes.CDLL, int]
 def make_c_batch(
     library: ctypes.CDLL, lanes: int, parameters: Array, start: Array, seconds: float
 ) -> Callable[[int], Array]:
-    """A function of the number of threads that runs the batch in C and returns the final states (3, N)."""
-    count, size = parameters.shape[1], -(-parameters.shape[1] // lanes) * lanes
+    """A function of the number of threads that runs the batch in C and returns the final states (3,
+    N).
+    """
+    count = parameters.shape[1]
+    size = -(-parameters.shape[1] // lanes) * lanes
     padded = np.ascontiguousarray(np.pad(parameters, ((0, 0), (0, size - count)), mode="edge"))
     instants = np.ascontiguousarray(np.repeat(np.array(SWITCHED)[:, None], size, axis=1))
-    pointer, long = ctypes.c_void_p, ctypes.c_long
+    pointer = ctypes.c_void_p
+    long = ctypes.c_long
     library.batch.argtypes = [pointer, pointer, pointer, long, long, long, long, ctypes.c_double]
 
     def call(cores: int) -> Array:
@@ -127,7 +185,10 @@ def make_c_batch(
             addresses = (padded.ctypes.data, instants.ctypes.data, state.ctypes.data)
             library.batch(*addresses, size, first, last, round(seconds / STEP), STEP)
 
-        threads = [threading.Thread(target=part, args=(int(a), int(b))) for a, b in itertools.pairwise(blocks)]
+        threads = [
+            threading.Thread(target=part, args=(int(a), int(b)))
+            for a, b in itertools.pairwise(blocks)
+        ]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -154,10 +215,16 @@ def run_library(
     """The final states (3, N) of the batch with `simulate_batch`."""
     named = dict(zip((s.name for s in plant.states), start.tolist(), strict=True))
     solution = am.simulate_batch(
-        plant, parameters, COMMAND, duration=seconds, initial_states=named, integrator=am.RungeKutta4(STEP), keep=(),
+        plant,
+        parameters,
+        COMMAND,
+        duration=seconds,
+        initial_states=named,
+        integrator=am.RungeKutta4(STEP),
+        keep=(),
         cores=cores,
         precision=precision,
-    )  # fmt: skip
+    )
     return np.array([solution.final[s.name] for s in plant.states])
 
 
@@ -166,10 +233,14 @@ def check_final_states(final_states: dict[str, Array], reference: str, nominal: 
     for name, states in final_states.items():
         error = float((np.abs(states - final_states[reference]) / nominal[:, None]).max())
         limit = 1e-3 if "single" in name else 1e-9
-        assert error < limit, f"the final states of {name} and {reference} differ by {error:.1e} nominal values"
+        assert error < limit, (
+            f"the final states of {name} and {reference} differ by {error:.1e} nominal values"
+        )
 
 
-def make_variants(folder: pathlib.Path, count: int, seconds: float) -> dict[str, tuple[int, Callable[[], Array]]]:
+def make_variants(
+    folder: pathlib.Path, count: int, seconds: float
+) -> dict[str, tuple[int, Callable[[], Array]]]:
     """The number of cores and the call of every variant."""
     plant, start = hanging(), runs()[3].vector
     parameters = random_parameters(plant, count)
@@ -178,7 +249,10 @@ def make_variants(folder: pathlib.Path, count: int, seconds: float) -> dict[str,
     libraries = compile_libraries(folder)
     for cores in sorted({1, min(2, available_cores())}):
         suffix = f", {cores} cores" if cores > 1 else ""
-        timed[f"simulate_batch{suffix}"] = (cores, lambda n=cores: run_library(plant, parameters, start, seconds, n))
+        timed[f"simulate_batch{suffix}"] = (
+            cores,
+            lambda n=cores: run_library(plant, parameters, start, seconds, n),
+        )
         for name, (library, lanes) in libraries.items():
             if cores == 1 or lanes == 32:
                 run = make_c_batch(library, lanes, table, start, seconds)
@@ -194,15 +268,28 @@ def measure_growth() -> list[tuple[str, ...]]:
     """Rows of the table: time over the number of plants, on one and on two cores."""
     plant, start, rows = hanging(), runs()[3].vector, []
     for count in GROWTH:
-        parameters, seconds = random_parameters(plant, count), DURATION if count < 100_000 else DURATION / 5
+        parameters = random_parameters(plant, count)
+        seconds = DURATION if count < 100_000 else DURATION / 5
         for cores in sorted({1, min(2, available_cores())}):
-            batch = {"batch": lambda p=parameters, t=seconds, n=cores: run_library(plant, p, start, t, n)}
-            rows.append(_row("simulate_batch, scaling", count, cores, time_variants(batch, 2)["batch"], seconds))
+            batch = {
+                "batch": lambda p=parameters, t=seconds, n=cores: run_library(plant, p, start, t, n)
+            }
+            rows.append(
+                _row(
+                    "simulate_batch, scaling",
+                    count,
+                    cores,
+                    time_variants(batch, 2)["batch"],
+                    seconds,
+                )
+            )
     return rows
 
 
 def measure_equilibria(count: int, rounds: int) -> tuple[list[tuple[str, ...]], Target]:
-    """Equilibria of the plants at ambient pressure: vectorised, as in `simulate_batch`, and one by one."""
+    """Equilibria of the plants at ambient pressure: vectorised, as in `simulate_batch`, and one by
+    one.
+    """
     plant = hanging()
     different = variations_of(plant, random_parameters(plant, count), None)
     few = range(min(SINGLE_PLANTS, count))
@@ -211,16 +298,33 @@ def measure_equilibria(count: int, rounds: int) -> tuple[list[tuple[str, ...]], 
         return default_states(different, lambda done: None)[0]
 
     def one_by_one() -> Array:
-        return np.array([list(am.find_equilibrium(different.one(i), pressure=0.0).values()) for i in few])
+        return np.array(
+            [list(am.find_equilibrium(different.one(i), pressure=0.0).values()) for i in few]
+        )
 
     check_final_states(
-        {"one by one": one_by_one().T, "vectorised": vectorised()[: len(few)].T}, "vectorised", runs()[3].nominal
+        {"one by one": one_by_one().T, "vectorised": vectorised()[: len(few)].T},
+        "vectorised",
+        runs()[3].nominal,
     )
     times = time_variants({"vectorised": vectorised, "one by one": one_by_one}, rounds)
-    each, size = times["vectorised"].median / count, f"{len(few)}"
+    each = times["vectorised"].median / count
+    size = f"{len(few)}"
     rows = [
-        ("equilibria, vectorised", f"{count}", "1", *map(format_time, _median_and_minimum(times["vectorised"])), ""),
-        ("equilibria, one by one", size, "1", *map(format_time, _median_and_minimum(times["one by one"])), ""),
+        (
+            "equilibria, vectorised",
+            f"{count}",
+            "1",
+            *map(format_time, _median_and_minimum(times["vectorised"])),
+            "",
+        ),
+        (
+            "equilibria, one by one",
+            size,
+            "1",
+            *map(format_time, _median_and_minimum(times["one by one"])),
+            "",
+        ),
     ]
     return rows, Target("equilibrium of a plant, vectorised, per plant", each * 1e6, 50.0, "us")
 
@@ -229,7 +333,9 @@ def _median_and_minimum(times: Times) -> tuple[float, float]:
     return times.median, times.minimum
 
 
-def _row(name: str, count: int, cores: int, times: Times, seconds: float, factor: float = 1.0) -> tuple[str, ...]:
+def _row(
+    name: str, count: int, cores: int, times: Times, seconds: float, factor: float = 1.0
+) -> tuple[str, ...]:
     speed = count * seconds * factor / STEP / (times.median * factor) / 1e6
     shortened = f" ({seconds:g} s simulated)" if seconds != DURATION else ""
     durations = map(format_time, _median_and_minimum(times))
@@ -237,14 +343,21 @@ def _row(name: str, count: int, cores: int, times: Times, seconds: float, factor
 
 
 def measure_memory() -> str:
-    """Peak memory of a process that simulates 100 000 plants, minus that of a process that simulates 16."""
+    """Peak memory of a process that simulates 100 000 plants, minus that of a process that
+    simulates 16.
+    """
     code = (
-        "import sys; from batch import *; plant = hanging(); n = int(sys.argv[1]); "
-        f"run_library(plant, random_parameters(plant, n), runs()[3].vector, 0.01, 1){PRINT_PEAK_MEMORY}"
+        "import sys; from batch import *; plant = hanging(); n = int(sys.argv[1]);"
+        " run_library(plant, random_parameters(plant, n), runs()[3].vector, 0.01,"
+        f" 1){PRINT_PEAK_MEMORY}"
     )
     here = pathlib.Path(__file__).parent
     taken = [
-        float(subprocess.run([sys.executable, "-c", code, str(n)], cwd=here, check=True, capture_output=True).stdout)
+        float(
+            subprocess.run(
+                [sys.executable, "-c", code, str(n)], cwd=here, check=True, capture_output=True
+            ).stdout
+        )
         for n in (16, 100_000)
     ]
     return f"{taken[1] - taken[0]:.0f} MB"
@@ -264,7 +377,9 @@ def section(rounds: int = 5, count: int = PLANTS, seconds: float = DURATION) -> 
         slow = {"NumPy": lambda: run_numpy(table, start, short)}
         slow |= {"short": lambda: run_library(plant, parameters, start, short, 1)}
         by_numpy = time_variants(slow, max(2, rounds // 2))
-    check_final_states({"NumPy": slow["NumPy"](), "lanes": slow["short"]()}, "lanes", runs()[3].nominal)
+    check_final_states(
+        {"NumPy": slow["NumPy"](), "lanes": slow["short"]()}, "lanes", runs()[3].nominal
+    )
     rows = [_row(name, count, timed[name][0], t, seconds) for name, t in times.items()]
     rows.append(_row("vectorised NumPy", count, 1, by_numpy["NumPy"], short))
     equilibrium_rows, equilibrium_target = measure_equilibria(count, rounds)
@@ -273,30 +388,65 @@ def section(rounds: int = 5, count: int = PLANTS, seconds: float = DURATION) -> 
     targets = (*_bars(times, scaled), equilibrium_target)
     if (count, seconds) == (PLANTS, DURATION):
         rows += measure_growth()
-        rows.append(("memory for 100 000 plants, minus that for 16", "100000", "1", measure_memory(), "", ""))
+        rows.append(
+            (
+                "memory for 100 000 plants, minus that for 16",
+                "100000",
+                "1",
+                measure_memory(),
+                "",
+                "",
+            )
+        )
     return Section("Batch of 10 000 plants", TEXT, HEADER, tuple(rows), targets)
 
 
 def _bars(times: dict[str, Times], numpy: Times) -> tuple[Target, ...]:
-    ours, targets = times["simulate_batch"], []
+    ours = times["simulate_batch"]
+    targets = []
     in_c32 = [n for n in times if n.startswith("C,") and n.endswith("32 lanes")]
     for wide, width in ((False, "default vector width"), (True, "maximum vector width")):
         named = [name for name in in_c32 if (WIDEST in name) == wide and "gcc" in name]
         if named:
             ratio = times[named[0]].ratio_to(ours)
             targets.append(
-                Target(f"C, gcc, 32 lanes, {width} / simulate_batch", ratio, 1.1, "x", at_least=True, reason=REASON)
+                Target(
+                    f"C, gcc, 32 lanes, {width} / simulate_batch",
+                    ratio,
+                    1.1,
+                    "x",
+                    at_least=True,
+                    reason=REASON,
+                )
             )
     both = times.get("simulate_batch, 2 cores", ours)
     ratio = numpy.median / both.median
     targets.append(
-        Target("vectorised NumPy / simulate_batch, all cores", ratio, 25.0, "x", at_least=True, reason=REASON)
+        Target(
+            "vectorised NumPy / simulate_batch, all cores",
+            ratio,
+            25.0,
+            "x",
+            at_least=True,
+            reason=REASON,
+        )
     )
     if "simulate_batch, 2 cores" in times:
         ratio = ours.ratio_to(times["simulate_batch, 2 cores"])
-        targets.append(Target("simulate_batch, 1 core / 2 cores", ratio, 1.9, "x", at_least=True, reason=BUSY_REASON))
+        targets.append(
+            Target(
+                "simulate_batch, 1 core / 2 cores",
+                ratio,
+                1.9,
+                "x",
+                at_least=True,
+                reason=BUSY_REASON,
+            )
+        )
     ratio = ours.ratio_to(times["simulate_batch, single precision"])
-    targets.append(Target("simulate_batch, double / single precision", ratio, 1.7, "x", at_least=True))
+    targets.append(
+        Target("simulate_batch, double / single precision", ratio, 1.7, "x", at_least=True)
+    )
     return tuple(targets)
 
 

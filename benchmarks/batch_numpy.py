@@ -1,4 +1,6 @@
-"""Vectorised NumPy code of the equations of batch.c; each row of an array is one quantity of all plants."""
+"""Vectorised NumPy code of the equations of batch.c; each row of an array is one quantity of all
+plants.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +8,12 @@ import numpy as np
 from filling import Array
 
 
-def rk4(p: Array, start: Array, switched: tuple[float, float, float, float], step: float, count: int) -> Array:
-    """The states (3, N) after `count` steps; parameters `p` (46, N) as in batch.c, the same switching times for all."""
+def rk4(
+    p: Array, start: Array, switched: tuple[float, float, float, float], step: float, count: int
+) -> Array:
+    """The states (3, N) after `count` steps; parameters `p` (46, N) as in batch.c, the same
+    switching times for all.
+    """
     state = start
     for i in range(count):
         now = (i + 0.5) * step
@@ -30,17 +36,21 @@ def rates(p: Array, state: Array, fill: Array | float, discharge: Array | float)
     s = 1.0 - contraction
     pressure = air * rt / (volume_factor * s * (1.0 - cc * s * s))
     gauge = pressure - ambient
-    x, q = (contraction - low_x) * scale_x - 1.0, (gauge - low_q) * scale_q - 1.0
+    x = (contraction - low_x) * scale_x - 1.0
+    q = (gauge - low_q) * scale_q - 1.0
     force = np.clip(surface(p[25:], x, q), min_force, max_force)
     tension = np.maximum(force - stiffness * position - (damping + growth * gauge) * speed, 0.0)
-    air_rate = fill * flow(p[9:12], supply, pressure) - discharge * flow(p[13:16], pressure, ambient)
+    air_rate = fill * flow(p[9:12], supply, pressure) - discharge * flow(
+        p[13:16], pressure, ambient
+    )
     return np.array([air_rate, speed, tension * inverse_mass - gravity])
 
 
 def flow(valve: Array, up: Array, down: Array) -> Array:
     """Mass flow between two pressures: the ISO 6358 ellipse with a laminar chord."""
     critical, subsonic, laminar = valve
-    high, low = np.maximum(up, down), np.minimum(up, down)
+    high = np.maximum(up, down)
+    low = np.minimum(up, down)
     beyond = np.maximum(low - critical * high, 0.0) * subsonic
     q = np.minimum(np.sqrt(np.maximum(high * high - beyond * beyond, 1.0)), laminar * (high - low))
     return np.where(up >= down, q, -q)
@@ -48,14 +58,17 @@ def flow(valve: Array, up: Array, down: Array) -> Array:
 
 def surface(a: Array, x: Array, q: Array) -> Array:
     """The polynomial of degree five, extrapolated by its tangent beyond the validity range."""
-    xi, qi = np.clip(x, -1.0, 1.0), np.clip(q, -1.0, 1.0)
+    xi = np.clip(x, -1.0, 1.0)
+    qi = np.clip(q, -1.0, 1.0)
     r0 = a[0] + xi * (a[1] + xi * (a[2] + xi * (a[3] + xi * (a[4] + xi * a[5]))))
     r1 = a[6] + xi * (a[7] + xi * (a[8] + xi * (a[9] + xi * a[10])))
     r2 = a[11] + xi * (a[12] + xi * (a[13] + xi * a[14]))
-    r3, r4 = a[15] + xi * (a[16] + xi * a[17]), a[18] + xi * a[19]
+    r3 = a[15] + xi * (a[16] + xi * a[17])
+    r4 = a[18] + xi * a[19]
     d0 = a[1] + xi * (2 * a[2] + xi * (3 * a[3] + xi * (4 * a[4] + xi * 5 * a[5])))
     d1 = a[7] + xi * (2 * a[8] + xi * (3 * a[9] + xi * 4 * a[10]))
-    d2, d3 = a[12] + xi * (2 * a[13] + xi * 3 * a[14]), a[16] + xi * 2 * a[17]
+    d2 = a[12] + xi * (2 * a[13] + xi * 3 * a[14])
+    d3 = a[16] + xi * 2 * a[17]
     value = r0 + qi * (r1 + qi * (r2 + qi * (r3 + qi * (r4 + qi * a[20]))))
     by_x = d0 + qi * (d1 + qi * (d2 + qi * (d3 + qi * a[19])))
     by_q = r1 + qi * (2 * r2 + qi * (3 * r3 + qi * (4 * r4 + qi * 5 * a[20])))

@@ -1,4 +1,6 @@
-"""Bootstrap of a surface with 21 coefficients, resampled by runs: the library and a loop over SciPy."""
+"""Bootstrap of a surface with 21 coefficients, resampled by runs: the library and a loop over
+SciPy.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +12,26 @@ import airmuscle as am
 
 REFITS = 1000
 RUNS = 20
-HEADER = ("variant", "median", "minimum", "ratio to library", "maximum difference of a standard deviation")
+HEADER = (
+    "variant",
+    "median",
+    "minimum",
+    "ratio to library",
+    "maximum difference of a standard deviation",
+)
 TEXT = (
-    f"The points of the static fit in {RUNS} runs; {REFITS} bootstrap samples of as many runs, drawn with replacement. "
-    "The SciPy loop calls `scipy.linalg.lstsq` on the rows of each sample; its design matrix is computed once. Both "
-    "use the same samples. The library sums one normal matrix per run, in an orthonormal basis, for all samples in "
-    "one matrix product."
+    f"The points of the static fit in {RUNS} runs; {REFITS} bootstrap samples of as many runs,"
+    " drawn with replacement. The SciPy loop calls `scipy.linalg.lstsq` on the rows of each"
+    " sample; its design matrix is computed once. Both use the same samples. The library sums one"
+    " normal matrix per run, in an orthonormal basis, for all samples in one matrix product."
 )
 
 
 def refit_library(runs: list[am.Recording]) -> np.ndarray:
     """Coefficients of every refit with the library, including the initial fit."""
-    initial = am.fit(am.characteristic.ContractileSurface.blank(), runs, censoring=am.bench.UNCENSORED)
+    initial = am.fit(
+        am.characteristic.ContractileSurface.blank(), runs, censoring=am.bench.UNCENSORED
+    )
     return am.bench.bootstrap(initial, runs, refits=REFITS, by=am.bench.RunSplit(), seed=0).values
 
 
@@ -33,7 +43,9 @@ def refit_scipy(columns: np.ndarray, force: np.ndarray) -> np.ndarray:
     blocks = np.array_split(np.arange(force.size), RUNS)
     coefficients = []
     for counts in samples:
-        rows = np.concatenate([block for block, n in zip(blocks, counts, strict=True) for _ in range(n)])
+        rows = np.concatenate(
+            [block for block, n in zip(blocks, counts, strict=True) for _ in range(n)]
+        )
         coefficients.append(lstsq(columns[rows], force[rows], check_finite=False)[0])
     return np.array(coefficients)
 
@@ -43,7 +55,8 @@ def section(rounds: int = 5) -> Section:
     data = make_points()
     parts = np.array_split(np.arange(len(data)), RUNS)
     runs = [am.Recording(data.rows(rows).columns, f"run {i:02d}") for i, rows in enumerate(parts)]
-    columns, force = design_matrix(data), data["force"]
+    columns = design_matrix(data)
+    force = data["force"]
     variants = {
         "`bootstrap`, including the fit": lambda: refit_library(runs),
         "loop over SciPy": lambda: refit_scipy(columns, force),
@@ -70,7 +83,12 @@ def section(rounds: int = 5) -> Section:
             "x",
             True,
         ),
-        Target("bootstrap: difference of the standard deviations", differences[second], 1e-6, "relative"),
+        Target(
+            "bootstrap: difference of the standard deviations",
+            differences[second],
+            1e-6,
+            "relative",
+        ),
     )
     return Section("Bootstrap of the surface, 1000 refits", TEXT, HEADER, rows, targets)
 

@@ -22,18 +22,29 @@ from airmuscle.engine.compile.program import CompiledSystem, compile_system
 
 RTOL = 1e-6
 SIDE_NAMES = ("left", "right")
-HEADER = ("states", "plant", "derivative", "25 s", "minimum", "steps", "one step", "ratio to single system")
+HEADER = (
+    "states",
+    "plant",
+    "derivative",
+    "25 s",
+    "minimum",
+    "steps",
+    "one step",
+    "ratio to single system",
+)
 TEXT = (
-    "The joints of `joints.py`, whose equations are written as one system, and plants of the library's components: "
-    "muscles, `WithTubes` with `Tube`, `Isothermal` or `EnergyBalance`; the mechanism and, for ten states, a valve "
-    "with a first-order spool are defined in the benchmark. Both have the same rates to rounding, which is checked; "
-    "their steps differ slightly, because a plant has other nominal values. The ratio is that of the minimum times of "
-    "one derivative, because other load can double some 50 ns. `ProportionalValve` has a second-order spool, so that "
-    "two such valves give twelve states, for which there is no single system. Rodas4 at rtol 1e-6."
+    "The joints of `joints.py`, whose equations are written as one system, and plants of the"
+    " library's components: muscles, `WithTubes` with `Tube`, `Isothermal` or `EnergyBalance`; the"
+    " mechanism and, for ten states, a valve with a first-order spool are defined in the benchmark."
+    " Both have the same rates to rounding, which is checked; their steps differ slightly, because"
+    " a plant has other nominal values. The ratio is that of the minimum times of one derivative,"
+    " because other load can double some 50 ns. `ProportionalValve` has a second-order spool, so"
+    " that two such valves give twelve states, for which there is no single system. Rodas4 at rtol"
+    " 1e-6."
 )
 REASON = (
-    "with half-open valves no branch saves time, and its cost depends on register allocation; with closed valves both "
-    "take 40 ns"
+    "with half-open valves no branch saves time, and its cost depends on register allocation; with"
+    " closed valves both take 40 ns"
 )
 
 
@@ -51,12 +62,21 @@ class Antagonists(am.Mechanism):
     def coordinates(self) -> tuple[am.physics.Coordinate, ...]:
         return (am.physics.Coordinate("angle", "speed", "rad", 0.1, 1.0),)
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(
+        self, q: Mapping[str, Value], resting_lengths: Sequence[Value]
+    ) -> tuple[Value, ...]:
         left, right = resting_lengths
-        return self.offset + self.radius * q["angle"] / left, self.offset - self.radius * q["angle"] / right
+        return (
+            self.offset + self.radius * q["angle"] / left,
+            self.offset - self.radius * q["angle"] / right,
+        )
 
     def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], pulls: Mapping[str, Value], inputs: Mapping[str, Value]
+        self,
+        q: Mapping[str, Value],
+        v: Mapping[str, Value],
+        pulls: Mapping[str, Value],
+        inputs: Mapping[str, Value],
     ) -> Mapping[str, Value]:
         torque = pulls["angle"] - self.friction * v["speed"] - self.load * ops.sin(q["angle"])
         return {"angle": torque / self.inertia}
@@ -64,7 +84,9 @@ class Antagonists(am.Mechanism):
 
 @model
 class LaggedValve(am.Circuit):
-    """The servo valve of `JointWithHeat`: a spool that follows fill minus discharge as a first-order lag."""
+    """The servo valve of `JointWithHeat`: a spool that follows fill minus discharge as a
+    first-order lag.
+    """
 
     supply: am.Supply
     valve: am.Valve
@@ -91,14 +113,20 @@ class LaggedValve(am.Circuit):
             self.valve, airs[0], am.physics.ambient_air(ambient), ops.maximum(-spool, 0.0)
         )
         moving = (inputs["fill"] - inputs["discharge"] - spool) / self.lag
-        return am.physics.CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
+        return am.physics.CircuitFlows(
+            (incoming - outgoing,), incoming, outgoing, {"spool": moving}
+        )
 
 
 @model
 class JointWithUpstreamHeat(JointWithHeat):
-    """`JointWithHeat` with the upstream temperature in the flow of a tube, as the components have."""
+    """`JointWithHeat` with the upstream temperature in the flow of a tube, as the components
+    have.
+    """
 
-    def _flows(self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any) -> tuple[Any, Any]:
+    def _flows(
+        self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any
+    ) -> tuple[Any, Any]:
         incoming, _ = super()._flows(side, state, pressure, fill, discharge)
         wall = self.ambient.temperature
         in_tube = state[f"{side}.tube_mass"] * am.physics.GAS_CONSTANT * wall / self.tube_volume
@@ -110,12 +138,20 @@ class JointWithUpstreamHeat(JointWithHeat):
 def component_plant(system: Joint) -> am.Plant:
     """A joint of `joints.py`, made of components."""
     muscles = tuple(dataclasses.replace(system.muscle, name=name) for name in SIDE_NAMES)
-    mechanism = Antagonists(system.inertia, system.radius, system.friction, system.load, system.offset)
+    mechanism = Antagonists(
+        system.inertia, system.radius, system.friction, system.load, system.offset
+    )
     tube = am.physics.Tube(system.tube, system.tube_volume)
     if isinstance(system, JointWithHeat):
-        line = am.physics.WithTubes(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
+        line = am.physics.WithTubes(
+            LaggedValve(system.supply, system.valve, system.spool_lag), tube
+        )
         return am.Plant(
-            muscles, (line, line), mechanism, am.physics.EnergyBalance(system.heat_transfer), system.ambient
+            muscles,
+            (line, line),
+            mechanism,
+            am.physics.EnergyBalance(system.heat_transfer),
+            system.ambient,
         )
     line = am.physics.WithTubes(am.FillDischarge(system.supply, system.valve, system.valve), tube)
     return am.Plant(muscles, (line, line), mechanism, am.Isothermal(), system.ambient)
@@ -123,9 +159,12 @@ def component_plant(system: Joint) -> am.Plant:
 
 def with_proportional_valves(system: JointWithHeat) -> am.Plant:
     """The joint with heat transfer and a 5/3 proportional valve for each muscle: twelve states."""
-    plant, spool = component_plant(system), am.physics.SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
+    plant = component_plant(system)
+    spool = am.physics.SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
     valve = am.physics.ProportionalValve(system.supply, system.valve, system.valve, spool)
-    return dataclasses.replace(plant, circuit=(am.physics.WithTubes(valve, plant.circuits[0].tube),) * 2)
+    return dataclasses.replace(
+        plant, circuit=(am.physics.WithTubes(valve, plant.circuits[0].tube),) * 2
+    )
 
 
 def written_name(name: str) -> str:
@@ -133,19 +172,30 @@ def written_name(name: str) -> str:
     return name.replace("internal_energy", "energy").replace("tube.air_mass", "tube_mass")
 
 
-def check_rates(single: CompiledSystem, composed: CompiledSystem, start: Mapping[str, float]) -> float:
-    """The maximum difference of the rates, relative to the maximum of each; raises AssertionError above 1e-12."""
-    rng, names = np.random.default_rng(1), [s.name for s in single.system.states]
+def check_rates(
+    single: CompiledSystem, composed: CompiledSystem, start: Mapping[str, float]
+) -> float:
+    """The maximum difference of the rates, relative to the maximum of each; raises AssertionError
+    above 1e-12.
+    """
+    rng = np.random.default_rng(1)
+    names = [s.name for s in single.system.states]
     order = [names.index(written_name(s.name)) for s in composed.system.states]
     y0 = np.array([start[name] for name in names])
-    rates, expected = [], []
+    rates = []
+    expected = []
     for _ in range(100):
-        y, u = y0 * rng.uniform(0.8, 1.2, y0.size) + 0.1 * (y0 == 0) * rng.standard_normal(y0.size), rng.random(4)
+        y = y0 * rng.uniform(0.8, 1.2, y0.size) + 0.1 * (y0 == 0) * rng.standard_normal(y0.size)
+        u = rng.random(4)
         expected.append(single.rates(y, u)[order])
         rates.append(composed.rates(y[order], u))
-    worst = float((np.abs(np.array(rates) - expected).max(axis=0) / np.abs(expected).max(axis=0)).max())
+    worst = float(
+        (np.abs(np.array(rates) - expected).max(axis=0) / np.abs(expected).max(axis=0)).max()
+    )
     if not worst < 1e-12:
-        raise AssertionError(f"the rates of the components differ by {worst:.2g} from those of the single system")
+        raise AssertionError(
+            f"the rates of the components differ by {worst:.2g} from those of the single system"
+        )
     return worst
 
 
@@ -156,7 +206,9 @@ def _spools() -> am.Schedule:
         side: [*changes_of[f"{side}.fill"], *((t, -v) for t, v in changes_of[f"{side}.discharge"])]
         for side in SIDE_NAMES
     }
-    return am.Schedule({f"{side}.command": tuple(sorted(changes)) for side, changes in both.items()})
+    return am.Schedule(
+        {f"{side}.command": tuple(sorted(changes)) for side, changes in both.items()}
+    )
 
 
 def _run(plant: am.Plant, single: Run, command: am.Schedule = JOINT_PULSES) -> Run:
@@ -166,9 +218,14 @@ def _run(plant: am.Plant, single: Run, command: am.Schedule = JOINT_PULSES) -> R
 
 
 def pairs() -> tuple[tuple[Run, Run | None], ...]:
-    """Runs of plants of components, each with the run of the equivalent single system, if there is one."""
-    six, ten = runs()[6], runs()[10]
-    heated = JointWithUpstreamHeat(**{f.name: getattr(ten.system, f.name) for f in dataclasses.fields(ten.system)})
+    """Runs of plants of components, each with the run of the equivalent single system, if there is
+    one.
+    """
+    six = runs()[6]
+    ten = runs()[10]
+    heated = JointWithUpstreamHeat(
+        **{f.name: getattr(ten.system, f.name) for f in dataclasses.fields(ten.system)}
+    )
     return (
         (_run(component_plant(six.system), six), six),
         (_run(component_plant(heated), ten), dataclasses.replace(ten, system=heated)),
@@ -176,19 +233,30 @@ def pairs() -> tuple[tuple[Run, Run | None], ...]:
     )
 
 
-def measure(composed: Run, single: Run | None, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tuple[Target, ...]]:
+def measure(
+    composed: Run, single: Run | None, rounds: int
+) -> tuple[tuple[tuple[str, ...], ...], tuple[Target, ...]]:
     """Rows and target of one pair."""
     both = {"components": composed} | ({"single system": single} if single else {})
     ready = {name: compile_system(run.system) for name, run in both.items()}
     if single:
         check_rates(ready["single system"], ready["components"], single.initial_state)
-    derivatives = time_variants({n: make_calls(ready[n], run.initial_state) for n, run in both.items()}, rounds)
-    simulations = time_variants({n: kernel(run, ready[n], am.Rodas4(RTOL)) for n, run in both.items()}, rounds)
+    derivatives = time_variants(
+        {n: make_calls(ready[n], run.initial_state) for n, run in both.items()}, rounds
+    )
+    simulations = time_variants(
+        {n: kernel(run, ready[n], am.Rodas4(RTOL)) for n, run in both.items()}, rounds
+    )
     last = derivatives[list(both)[-1]].minimum
-    rows, size = [], len(composed.system.states)
+    rows = []
+    size = len(composed.system.states)
     for name, run in both.items():
         steps = am.Rodas4(RTOL).run(ready[name], run.segments, 0.0, run.vector, run.times).steps
-        cells = (derivatives[name].minimum / CALLS, simulations[name].median, simulations[name].minimum)
+        cells = (
+            derivatives[name].minimum / CALLS,
+            simulations[name].median,
+            simulations[name].minimum,
+        )
         ratio = f"{derivatives[name].minimum / last:.3g}" if single else ""
         rows.append(
             (
@@ -204,14 +272,22 @@ def measure(composed: Run, single: Run | None, rounds: int) -> tuple[tuple[tuple
         return tuple(rows), ()
     ratio = derivatives["components"].minimum / last
     return tuple(rows), (
-        Target(f"{size} states: derivative of components / single system", ratio, 1.1, "x", reason=REASON),
+        Target(
+            f"{size} states: derivative of components / single system",
+            ratio,
+            1.1,
+            "x",
+            reason=REASON,
+        ),
     )
 
 
 def section(rounds: int = 15) -> Section:
     """The complete benchmark."""
     parts = [measure(*pair, rounds) for pair in pairs()]
-    rows, targets = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
+    rows, targets = (
+        tuple(x for part in column for x in part) for column in zip(*parts, strict=True)
+    )
     return Section("Plants of components and single systems", TEXT, HEADER, rows, targets)
 
 

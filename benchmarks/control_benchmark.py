@@ -1,12 +1,15 @@
-"""Control benchmark of the antagonistic joint: all standard controllers on all truths, and the page of their results.
+"""Control benchmark of the antagonistic joint: all standard controllers on all truths, and the page
+of their results.
 
-    python benchmarks/control_benchmark.py [--quick] [--searches 3] [--on-off-searches 3] [--processes 2]
+    python benchmarks/control_benchmark.py [--quick] [--searches 3] [--on-off-searches 3]
+    [--processes 2]
                                            [--results FOLDER] [--out PAGE]
 
-Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed truth is one of
-them, so that it is run for the page alone. A controller with its searches and runs is a file in the folder of the
-results: an interrupted run goes on where it was, as long as the program and the settings are the same. `--quick` is a
-smaller form with one search on two truths of development, for a look at a change.
+Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed
+truth is one of them, so that it is run for the page alone. A controller with its searches and runs
+is a file in the folder of the results: an interrupted run goes on where it was, as long as the
+program and the settings are the same. `--quick` is a smaller form with one search on two truths of
+development, for a look at a change.
 """
 
 from __future__ import annotations
@@ -47,7 +50,9 @@ PACKAGES = ("control", "core", "design", "engine", "physics")
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
-    """Truths, seeds of the searches, most sets of gains for each gain, and runs of a commissioning."""
+    """Truths, seeds of the searches, most sets of gains for each gain, and runs of a
+    commissioning.
+    """
 
     truths: tuple[int, ...]
     seeds: tuple[int, ...]
@@ -82,14 +87,18 @@ def searches(joint: BenchmarkJoint, kind: str, settings: Settings) -> list[tuple
 
 
 def measure(settings: Settings, folder: Path, processes: int, switched: int) -> list[Part]:
-    """All parts, from their files where these exist; `switched` is the number of searches for on/off valves."""
+    """All parts, from their files where these exist; `switched` is the number of searches for
+    on/off valves.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     jobs = []
     for kind, joint in JOINTS.items():
         count = switched if kind == "on/off" else len(settings.seeds)
         own = dataclasses.replace(settings, seeds=settings.seeds[:count])
         for names in searches(joint(settings.truths[:1]), kind, own):
-            name = f"{kind}-{names[0]}-{fingerprint(own)}.pickle".replace("/", "-").replace(" ", "-")
+            name = f"{kind}-{names[0]}-{fingerprint(own)}.pickle".replace("/", "-").replace(
+                " ", "-"
+            )
             jobs.append((kind, names, own, folder / name))
     waiting = [job for job in jobs if not job[-1].exists()]
     with concurrent.futures.ProcessPoolExecutor(processes) as pool:
@@ -97,21 +106,33 @@ def measure(settings: Settings, folder: Path, processes: int, switched: int) -> 
         for done, each in enumerate(concurrent.futures.as_completed(pending), 1):
             each.result()
             if sys.stderr.isatty():
-                print(f"\rcontrollers: {done} of {len(waiting)}".ljust(78), end="", file=sys.stderr, flush=True)
+                print(
+                    f"\rcontrollers: {done} of {len(waiting)}".ljust(78),
+                    end="",
+                    file=sys.stderr,
+                    flush=True,
+                )
     return [pickle.loads(job[-1].read_bytes()) for job in jobs]
 
 
 def measure_part(kind: str, names: tuple[str, ...], settings: Settings, path: Path) -> None:
     """Write the results of contenders that share their searches, complete or not at all."""
-    started, joint = time.process_time(), JOINTS[kind](settings.truths)
+    started = time.process_time()
+    joint = JOINTS[kind](settings.truths)
     contenders = [each for each in standard_contenders(joint) if each.name in names]
     found = benchmark_controllers(
-        joint, contenders, STANDARD_TASKS, seeds=settings.seeds, sets_per_gain=settings.sets_per_gain,
+        joint,
+        contenders,
+        STANDARD_TASKS,
+        seeds=settings.seeds,
+        sets_per_gain=settings.sets_per_gain,
         commissioning_runs=settings.commissioning_runs,
-    ).results  # fmt: skip
+    ).results
     curve = None
     if (kind, names[0]) == ("proportional", LEARNED):
-        curve = learn(joint, found[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=settings.seeds[0])
+        curve = learn(
+            joint, found[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=settings.seeds[0]
+        )
     kept = tuple(map(without_recordings, found))
     staging = path.with_suffix(f".{os.getpid()}.part")
     staging.write_bytes(pickle.dumps(Part(kind, kept, curve, time.process_time() - started)))
@@ -121,13 +142,15 @@ def measure_part(kind: str, names: tuple[str, ...], settings: Settings, path: Pa
 def without_recordings(result: ContenderResult) -> ContenderResult:
     """A result whose runs have metrics alone."""
     return dataclasses.replace(
-        result, runs={key: dataclasses.replace(run, recording=None) for key, run in result.runs.items()}
+        result,
+        runs={key: dataclasses.replace(run, recording=None) for key, run in result.runs.items()},
     )
 
 
 def fingerprint(settings: Settings) -> str:
     """A text that changes with the settings and with the program."""
-    digest, source = hashlib.sha256(repr(settings).encode()), Path(airmuscle.__file__).parent
+    digest = hashlib.sha256(repr(settings).encode())
+    source = Path(airmuscle.__file__).parent
     for package in PACKAGES:
         for path in sorted((source / package).rglob("*.py")):
             digest.update(path.read_bytes())
@@ -152,15 +175,30 @@ def main() -> None:
     here = Path(__file__).parent
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--searches", type=int, default=len(FULL.seeds), help="of each controller (3); 1 for --quick")
-    parser.add_argument("--on-off-searches", type=int, help="of those with on/off valves; the same unless given")
+    parser.add_argument(
+        "--searches",
+        type=int,
+        default=len(FULL.seeds),
+        help="of each controller (3); 1 for --quick",
+    )
+    parser.add_argument(
+        "--on-off-searches", type=int, help="of those with on/off valves; the same unless given"
+    )
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--results", type=Path, default=here.parent / "build" / "control_benchmark")
-    parser.add_argument("--out", type=Path, help="default: CONTROL.md beside this file; of --quick in the results")
+    parser.add_argument(
+        "--out", type=Path, help="default: CONTROL.md beside this file; of --quick in the results"
+    )
     given = parser.parse_args()
-    settings = QUICK if given.quick else dataclasses.replace(FULL, seeds=tuple(range(1, given.searches + 1)))
+    settings = (
+        QUICK
+        if given.quick
+        else dataclasses.replace(FULL, seeds=tuple(range(1, given.searches + 1)))
+    )
     out = given.out or (given.results / "quick.md" if given.quick else here / "CONTROL.md")
-    parts = measure(settings, given.results, given.processes, given.on_off_searches or len(settings.seeds))
+    parts = measure(
+        settings, given.results, given.processes, given.on_off_searches or len(settings.seeds)
+    )
     curve = next(part.curve for part in parts if part.curve)
     text = page(collect(parts, settings), curve, settings, sum(part.cpu for part in parts))
     staging = out.with_name(f".{out.name}.part")

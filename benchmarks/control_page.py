@@ -1,4 +1,6 @@
-"""Page of the control benchmark: rankings, targets and what holds on all truths; every word of a result is computed."""
+"""Page of the control benchmark: rankings, targets and what holds on all truths; every word of a
+result is computed.
+"""
 
 from __future__ import annotations
 
@@ -19,18 +21,31 @@ from airmuscle.report import Table, shown_columns
 
 SINES = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
 """Targets of the rms error [degree] of sines of 20 degrees by frequency [Hz] (chosen)."""
-RATIO_TARGET, LEARNING_TARGET, HOLD_TARGET, REST_TARGET, SHARE_TARGET = 3.0, 0.15, 0.5, 10.0, 5.0
+RATIO_TARGET = 3.0
+LEARNING_TARGET = 0.15
+HOLD_TARGET = 0.5
+REST_TARGET = 10.0
+SHARE_TARGET = 5.0
 SCORE_TARGET = 1.1
 FURTHER = ("max_error", "strokes", "air")
-PLAIN, FORWARD, BOTH = "PID", "feed-forward + PID", "angle and stiffness"
+PLAIN = "PID"
+FORWARD = "feed-forward + PID"
+BOTH = "angle and stiffness"
 Row = tuple[str, str, str, str]
 
 
-def page(results: Mapping[str, BenchmarkResult], curve: LearningCurve, settings: Any, cpu: float) -> str:
+def page(
+    results: Mapping[str, BenchmarkResult], curve: LearningCurve, settings: Any, cpu: float
+) -> str:
     """The page in Markdown."""
     known = {kind: without_sealed(result) for kind, result in results.items()}
     lines = ["# Results of the control benchmark", "", *introduction(known, settings, cpu), ""]
-    lines += ["## Targets", "", *rows(("target, commissioned", "bound", "reached", ""), targets(known, curve)), ""]
+    lines += [
+        "## Targets",
+        "",
+        *rows(("target, commissioned", "bound", "reached", ""), targets(known, curve)),
+        "",
+    ]
     lines += ["## What holds on every truth", "", *orders(known["proportional"]), ""]
     for kind, title in (("proportional", "Proportional valves"), ("on/off", "On/off valves")):
         lines += [f"## {title}", "", f"{sentence(known[kind].joint.valve)}", "", *part(known[kind])]
@@ -42,20 +57,30 @@ def page(results: Mapping[str, BenchmarkResult], curve: LearningCurve, settings:
 
 def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: float) -> list[str]:
     """What was computed, how long it took, and the truths."""
-    result, switched = results["proportional"], results["on/off"]
+    result = results["proportional"]
+    switched = results["on/off"]
     options = (
-        f" --searches {len(result.seeds)} --on-off-searches {len(switched.seeds)}" if settings.slow else " --quick"
+        f" --searches {len(result.seeds)} --on-off-searches {len(switched.seeds)}"
+        if settings.slow
+        else " --quick"
     )
-    seeds = "; ".join(f"{kind} valves, seeds {', '.join(map(str, each.seeds))}" for kind, each in results.items())
+    seeds = "; ".join(
+        f"{kind} valves, seeds {', '.join(map(str, each.seeds))}" for kind, each in results.items()
+    )
     return [
-        f"Results of `benchmarks/control_benchmark.py{options}` on {datetime.date.today()}, Python "
-        f"{platform.python_version()}; {cpu / 60:.3g} minutes of CPU time. All figures are simulations. [Comparison of "
-        "controllers](../docs/benchmark.md) describes joint, truths, groups, tasks and metrics; their numbers are "
-        "chosen. All text of this page but the headings is computed from the results.",
+        (
+            f"Results of `benchmarks/control_benchmark.py{options}` on {datetime.date.today()},"
+            f" Python {platform.python_version()}; {cpu / 60:.3g} minutes of CPU time. All figures"
+            " are simulations. [Comparison of controllers](../docs/benchmark.md) describes joint,"
+            " truths, groups, tasks and metrics; their numbers are chosen. All text of this page"
+            " but the headings is computed from the results."
+        ),
         "",
-        f"Searches: {seeds}; at most {settings.sets_per_gain} sets of gains for "
-        f"each gain. Commissioning: {settings.commissioning_runs} runs on each truth. The controllers of the package "
-        "were developed on other truths of the same family (seeds 1 to 6).",
+        (
+            f"Searches: {seeds}; at most {settings.sets_per_gain} sets of gains for each gain."
+            f" Commissioning: {settings.commissioning_runs} runs on each truth. The controllers of"
+            " the package were developed on other truths of the same family (seeds 1 to 6)."
+        ),
         "",
         *(f"* {kind} valves: {convergence(each)}" for kind, each in results.items()),
         "",
@@ -64,17 +89,25 @@ def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: flo
 
 
 def convergence(result: BenchmarkResult) -> str:
-    """How many searches have converged, and the controllers whose searches differ by more than the stated spread."""
+    """How many searches have converged, and the controllers whose searches differ by more than the
+    stated spread.
+    """
     found = search_table(result.joint, result.results)
     if found is None:
         return "nothing was tuned."
     ended = [list(map(int, str(each).split(" of "))) for each in found.columns["converged"]]
     pairs = zip(found.columns["controller"], found.columns["spread"], strict=True)
     beyond = [str(name) for name, value in pairs if value is not None and value > SEARCH_SPREAD]
-    text = f"{sum(n for n, _ in ended)} of {sum(m for _, m in ended)} searches converged within their sets of gains; "
+    text = (
+        f"{sum(n for n, _ in ended)} of {sum(m for _, m in ended)} searches converged within their"
+        " sets of gains; "
+    )
     if len(result.seeds) == 1:
         return text + "one search each, so that its spread is not known."
-    return text + f"objectives that differ by more than {100 * SEARCH_SPREAD:g} %: {', '.join(beyond) or 'none'}."
+    return (
+        text + f"objectives that differ by more than {100 * SEARCH_SPREAD:g} %:"
+        f" {', '.join(beyond) or 'none'}."
+    )
 
 
 def without_sealed(result: BenchmarkResult) -> BenchmarkResult:
@@ -114,21 +147,27 @@ def orders(result: BenchmarkResult) -> list[str]:
     """The pairs of controllers whose order is the same on every truth, in every search."""
     lines = []
     for group in result.groups:
-        ratios, names = result.ratios(group), list(result.scores(group))
+        ratios = result.ratios(group)
+        names = list(result.scores(group))
         pairs = [
-            f"{a} before {b}" for i, a in enumerate(names) for b in names[i + 1 :]
+            f"{a} before {b}"
+            for i, a in enumerate(names)
+            for b in names[i + 1 :]
             if (ratios[a].max(axis=0) < ratios[b].min(axis=0)).all()
-        ]  # fmt: skip
+        ]
         total = len(names) * (len(names) - 1) // 2
-        lines.append(f"* {sentence(group)[:-1]}, {len(pairs)} of {total} pairs: {'; '.join(pairs) or 'none'}.")
+        lines.append(
+            f"* {sentence(group)[:-1]}, {len(pairs)} of {total} pairs:"
+            f" {'; '.join(pairs) or 'none'}."
+        )
     best = {group: next(iter(result.scores(group))) for group in result.groups}
     if PLAIN in result.contenders(Group.COMMISSIONED):
         ours = best[Group.COMMISSIONED]
         for frequency in SINES:
             ratio = ratio_of(result, f"sine {frequency:g} Hz", PLAIN, ours, Group.COMMISSIONED)
             lines.append(
-                f"* {sentence(Group.COMMISSIONED)[:-1]}, {frequency:g} Hz: {PLAIN} has at least {ratio.min():.2g} "
-                f"times the rms error of {ours} (median {np.median(ratio):.2g})."
+                f"* {sentence(Group.COMMISSIONED)[:-1]}, {frequency:g} Hz: {PLAIN} has at least"
+                f" {ratio.min():.2g} times the rms error of {ours} (median {np.median(ratio):.2g})."
             )
     return lines
 
@@ -139,11 +178,22 @@ def ratio_of(result: BenchmarkResult, task: str, first: str, second: str, group:
 
 
 def targets(results: Mapping[str, BenchmarkResult], curve: LearningCurve) -> list[Row]:
-    """The targets: name, bound, what was reached over searches and truths, and where all searches meet it."""
-    data, switched, group = results["proportional"], results["on/off"], Group.COMMISSIONED
+    """The targets: name, bound, what was reached over searches and truths, and where all searches
+    meet it.
+    """
+    data = results["proportional"]
+    switched = results["on/off"]
+    group = Group.COMMISSIONED
     best = next(iter(data.scores(group)))
     median = float(np.median(data.ratios(group)[best]))
-    found = [single(f"smallest score, median ({best})", f"≤ {SCORE_TARGET:g}", f"{median:.3f}", median <= SCORE_TARGET)]
+    found = [
+        single(
+            f"smallest score, median ({best})",
+            f"≤ {SCORE_TARGET:g}",
+            f"{median:.3f}",
+            median <= SCORE_TARGET,
+        )
+    ]
     for name in dict.fromkeys((FORWARD, best)):
         for frequency, bound in SINES.items():
             errors = data.values(name, f"sine {frequency:g} Hz", "rmse", group)
@@ -151,18 +201,42 @@ def targets(results: Mapping[str, BenchmarkResult], curve: LearningCurve) -> lis
     for frequency in list(SINES)[:3]:
         ratio = ratio_of(data, f"sine {frequency:g} Hz", PLAIN, FORWARD, group)
         met = met_on(ratio >= RATIO_TARGET)
-        found.append((f"{PLAIN} / {FORWARD}, {frequency:g} Hz", f"≥ {RATIO_TARGET:g}", spread(ratio), met))
+        found.append(
+            (f"{PLAIN} / {FORWARD}, {frequency:g} Hz", f"≥ {RATIO_TARGET:g}", spread(ratio), met)
+        )
     for name in switched.contenders(group):
-        for metric, bound, unit in (("max_error", HOLD_TARGET, "°"), ("strokes", REST_TARGET, " 1/s")):
+        for metric, bound, unit in (
+            ("max_error", HOLD_TARGET, "°"),
+            ("strokes", REST_TARGET, " 1/s"),
+        ):
             values = switched.values(name, "hold", metric, group)
-            found.append(below(f"on/off valves at rest, {name}, {metric.replace('_', ' ')}", bound, values, unit))
+            found.append(
+                below(
+                    f"on/off valves at rest, {name}, {metric.replace('_', ' ')}",
+                    bound,
+                    values,
+                    unit,
+                )
+            )
     for metric, scale in (("max_error", 10.0), ("stiffness_error", 1.0)):
         values = scale * data.values(BOTH, "stiffness change", metric, group)
         found.append(below(f"{BOTH}, {metric.replace('_', ' ')}", SHARE_TARGET, values, " %"))
-    late, last = float(curve.errors[10:].max()), f"trials 11 to {curve.errors.size}"
-    found.append(single(f"learning, {last}", f"≤ {LEARNING_TARGET:g}°", f"{late:.3f}°", late <= LEARNING_TARGET))
+    late = float(curve.errors[10:].max())
+    last = f"trials 11 to {curve.errors.size}"
+    found.append(
+        single(
+            f"learning, {last}", f"≤ {LEARNING_TARGET:g}°", f"{late:.3f}°", late <= LEARNING_TARGET
+        )
+    )
     rise = max(0.0, float(np.diff(curve.errors).max()))
-    found.append(single("learning, rises", f"≤ {curve.spread:.3f}° (noise)", f"{rise:.3f}°", rise <= curve.spread))
+    found.append(
+        single(
+            "learning, rises",
+            f"≤ {curve.spread:.3f}° (noise)",
+            f"{rise:.3f}°",
+            rise <= curve.spread,
+        )
+    )
     return found
 
 
@@ -189,18 +263,26 @@ def spread(values: Any) -> str:
 def learning(curve: LearningCurve) -> list[str]:
     """The errors of repeated trials."""
     return [
-        f"{curve.contender}, {curve.task.name}; rms error [degree] of trials 1 to {curve.errors.size}:", "",
+        (
+            f"{curve.contender}, {curve.task.name}; rms error [degree] of trials 1 to"
+            f" {curve.errors.size}:"
+        ),
+        "",
         ", ".join(f"{error:.3f}" for error in curve.errors) + ".",
-    ]  # fmt: skip
+    ]
 
 
 def table(made: Table, digits: int = 4) -> list[str]:
     """A table of a report in Markdown, with its title and note."""
     shown = shown_columns(made, chosen=False)
-    heads, title = [each.heading for each in shown], made.title
-    if len(units := {re.search(r" \[.*\]$|$", head)[0] for head in heads[1:]}) == 1:  # that of all goes to the title
+    heads = [each.heading for each in shown]
+    title = made.title
+    if (
+        len(units := {re.search(r" \[.*\]$|$", head)[0] for head in heads[1:]}) == 1
+    ):  # that of all goes to the title
         (unit,) = units
-        heads, title = [head.removesuffix(unit) for head in heads], title.replace(",", f"{unit},", 1)
+        heads = [head.removesuffix(unit) for head in heads]
+        title = title.replace(",", f"{unit},", 1)
     cells = [[_cell(value, digits) for value in each.cells] for each in shown]
     return [sentence(title), "", *rows(heads, zip(*cells, strict=True)), "", made.note, ""]
 
@@ -208,13 +290,23 @@ def table(made: Table, digits: int = 4) -> list[str]:
 def rows(headings: Iterable[str], cells: Iterable[Iterable[str]]) -> list[str]:
     """Lines of a table in Markdown."""
     heads = list(headings)
-    return [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|", *(f"| {' | '.join(each)} |" for each in cells)]
+    return [
+        f"| {' | '.join(heads)} |",
+        "|---" * len(heads) + "|",
+        *(f"| {' | '.join(each)} |" for each in cells),
+    ]
 
 
 def _cell(value: Any, digits: int) -> str:
     if isinstance(value, str):
         return value
-    return "–" if value is None or math.isnan(value) else "∞" if math.isinf(value) else f"{value:.{digits}g}"
+    return (
+        "–"
+        if value is None or math.isnan(value)
+        else "∞"
+        if math.isinf(value)
+        else f"{value:.{digits}g}"
+    )
 
 
 def sentence(text: str) -> str:

@@ -1,4 +1,5 @@
-"""Margins, multi-rate loops and filters, beside python-control, own loops with SciPy, and own NumPy.
+"""Margins, multi-rate loops and filters, beside python-control, own loops with SciPy, and own
+NumPy.
 
 python benchmarks/control_tools.py
 """
@@ -14,25 +15,39 @@ from joints import chosen_muscle
 from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
-from airmuscle.control import PID, Cascade, ExtendedKalmanFilter, MovingHorizonEstimator, Multirate, linearise_loop
+from airmuscle.control import (
+    PID,
+    Cascade,
+    ExtendedKalmanFilter,
+    MovingHorizonEstimator,
+    Multirate,
+    linearise_loop,
+)
 from airmuscle.engine import ControlLoop, Measurement, Rodas4, Schedule, SplitRange
 from airmuscle.physics import FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
 
 VALVE = Valve(2.6e-9, 0.4)
-LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0), Polytropic(1.2))
+LIFT = Plant(
+    chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0), Polytropic(1.2)
+)
 SPLIT = SplitRange("fill", "discharge")
-INNER, OUTER = PID("pressure", SPLIT, 2e-5), PID("position", "pressure", 4e6, integral_time=0.5)
-H, DURATION, ROWS, HORIZON = 1e-3, 2.0, 400, 10
+INNER = PID("pressure", SPLIT, 2e-5)
+OUTER = PID("position", "pressure", 4e6, integral_time=0.5)
+H = 1e-3
+DURATION = 2.0
+ROWS = 400
+HORIZON = 10
 HEADER = ("what", "median", "minimum", "times the library", "difference")
 TEXT = (
-    "A lifted load of 2 kg with a cascade; all numbers are chosen. Margins: gain, phase and delay margin and the "
-    "sensitivity peak of the sampled loop, with the linearisation, and of a `LinearLoop`; python-control takes the "
-    "same system, and gives neither a delay margin nor a gain margin at the Nyquist frequency, where it is here. "
-    f"Multi-rate: {DURATION:g} s with the pressure at 1 kHz and the position at 100 Hz, whole; own loop: `solve_ivp` "
-    "(LSODA, rtol 1e-8), timed once, from sample to sample with plant and law in Python. Filters: "
-    f"{ROWS} rows of pressure and position; own filter: the algebra in NumPy, with the step and the derivatives of the "
-    f"library; the moving horizon has {HORIZON} samples and no bounds. Difference: of phase margin and peak relative, "
-    "of columns in parts of their range."
+    "A lifted load of 2 kg with a cascade; all numbers are chosen. Margins: gain, phase and delay"
+    " margin and the sensitivity peak of the sampled loop, with the linearisation, and of a"
+    " `LinearLoop`; python-control takes the same system, and gives neither a delay margin nor a"
+    f" gain margin at the Nyquist frequency, where it is here. Multi-rate: {DURATION:g} s with the"
+    " pressure at 1 kHz and the position at 100 Hz, whole; own loop: `solve_ivp` (LSODA, rtol"
+    f" 1e-8), timed once, from sample to sample with plant and law in Python. Filters: {ROWS} rows"
+    " of pressure and position; own filter: the algebra in NumPy, with the step and the"
+    f" derivatives of the library; the moving horizon has {HORIZON} samples and no bounds."
+    " Difference: of phase margin and peak relative, of columns in parts of their range."
 )
 
 
@@ -42,7 +57,9 @@ def margin_variants() -> tuple[dict[str, Callable[[], Any]], float]:
     loop = ControlLoop(INNER, 5e-3, Schedule({"pressure": ((0.0, 2e5),)}))
     linear = linearise_loop(LIFT, loop, state, {"fill": 0.01})
     runs: dict[str, Callable[[], Any]] = {
-        "margins, linearise_loop and margins": lambda: linearise_loop(LIFT, loop, state, {"fill": 0.01}).margins(),
+        "margins, linearise_loop and margins": (
+            lambda: linearise_loop(LIFT, loop, state, {"fill": 0.01}).margins()
+        ),
         "margins of a LinearLoop": linear.margins,
     }
     if not is_installed("control"):
@@ -61,7 +78,12 @@ def own_loop(law: Any, start: dict[str, float], setpoint: float) -> np.ndarray:
     """The position (K,) at the samples of a loop that SciPy integrates from sample to sample."""
     from scipy.integrate import solve_ivp
 
-    names, memory, state, told = [s.name for s in LIFT.states], law.init(), np.array(list(start.values())), []
+    names, memory, state, told = (
+        [s.name for s in LIFT.states],
+        law.init(),
+        np.array(list(start.values())),
+        [],
+    )
     ranges = {"fill": (0.0, 1.0), "discharge": (0.0, 1.0)}
     commands = dict.fromkeys(ranges, 0.0)
 
@@ -82,22 +104,35 @@ def own_loop(law: Any, start: dict[str, float], setpoint: float) -> np.ndarray:
 def loop_variants() -> tuple[dict[str, Callable[[], Any]], float]:
     """A multi-rate loop by the library and by SciPy, and the difference of the positions."""
     law = Cascade(Multirate(OUTER, 10), INNER, (0.0,), (5e5,))
-    start, setpoint = am.find_equilibrium(LIFT, pressure=1e5), 0.015
+    start = am.find_equilibrium(LIFT, pressure=1e5)
+    setpoint = 0.015
     loop = ControlLoop(law, H, Schedule({"position": ((0.0, setpoint),)}))
 
     def library(integrator: Any = None) -> Any:
-        return am.simulate(LIFT, loop, duration=DURATION, initial_state=start, output_times=H, integrator=integrator)
+        return am.simulate(
+            LIFT,
+            loop,
+            duration=DURATION,
+            initial_state=start,
+            output_times=H,
+            integrator=integrator,
+        )
 
-    exact, theirs = library(Rodas4(1e-9)), own_loop(law, start, setpoint)
+    exact = library(Rodas4(1e-9))
+    theirs = own_loop(law, start, setpoint)
     ours = np.interp(H * np.arange(theirs.size), exact["time"], exact["position"])
     difference = float(np.abs(ours - theirs).max() / np.ptp(theirs))
-    return {"multi-rate loop, simulate": library,
-            "multi-rate loop, solve_ivp": lambda: own_loop(law, start, setpoint)}, difference  # fmt: skip
+    return {
+        "multi-rate loop, simulate": library,
+        "multi-rate loop, solve_ivp": lambda: own_loop(law, start, setpoint),
+    }, difference
 
 
 def own_filter(judged: ExtendedKalmanFilter, record: Any, first: Any) -> np.ndarray:
     """The means (K, n) of an extended Kalman filter whose algebra is NumPy."""
-    mean, covariance, told = first.mean, first.covariance, []
+    mean = first.mean
+    covariance = first.covariance
+    told = []
     values = np.column_stack([record[name] for name in judged.measured])
     inputs = np.column_stack([record[name] for name in LIFT.inputs])
     for k, value in enumerate(values):
@@ -119,10 +154,15 @@ def filter_variants() -> tuple[dict[str, Callable[[], Any]], dict[str, float]]:
     h = 5e-3
     command = Schedule({"fill": ((0.2, 0.4), (0.5, 0.0)), "discharge": ((1.2, 0.3), (1.5, 0.0))})
     run = am.simulate(LIFT, command, duration=h * (ROWS - 1), initial_state=start, output_times=h)
-    kept, random = np.searchsorted(run["time"], h * np.arange(ROWS) - 1e-9), np.random.default_rng(3)
+    kept = np.searchsorted(run["time"], h * np.arange(ROWS) - 1e-9)
+    random = np.random.default_rng(3)
     noise = {"pressure": 500.0, "position": 2e-5}
-    columns = {name: run[name][kept] + random.normal(scale=s, size=ROWS) for name, s in noise.items()}
-    record = am.Recording({"time": h * np.arange(ROWS), **{n: run[n][kept] for n in LIFT.inputs}, **columns}, "noise")
+    columns = {
+        name: run[name][kept] + random.normal(scale=s, size=ROWS) for name, s in noise.items()
+    }
+    record = am.Recording(
+        {"time": h * np.arange(ROWS), **{n: run[n][kept] for n in LIFT.inputs}, **columns}, "noise"
+    )
     judged = ExtendedKalmanFilter(LIFT, tuple(noise), h, {"air_mass": 2e-6, "speed": 0.02}, noise)
     first = judged.start(start, {"air_mass": 2e-6, "position": 1e-3, "speed": 5e-3})
     horizon = MovingHorizonEstimator(judged, HORIZON)
@@ -132,7 +172,9 @@ def filter_variants() -> tuple[dict[str, Callable[[], Any]], dict[str, float]]:
     window = horizon.estimate(record, first)
     theirs = np.column_stack([window[name] for name in judged.states])
     differences = {
-        "extended Kalman filter, NumPy": float((np.abs(own_filter(judged, record, first) - table) / ranges).max()),
+        "extended Kalman filter, NumPy": float(
+            (np.abs(own_filter(judged, record, first) - table) / ranges).max()
+        ),
         "moving horizon, estimate": float((np.abs(theirs - table) / ranges).max()),
     }
     return {
@@ -148,8 +190,13 @@ def section(rounds: int = 5) -> Section:
     margins, of_margins = margin_variants()
     loops, of_loops = loop_variants()
     filters, of_filters = filter_variants()
-    differences = {"margins, python-control": of_margins, "multi-rate loop, solve_ivp": of_loops, **of_filters}
-    rows, ratios = [], {}
+    differences = {
+        "margins, python-control": of_margins,
+        "multi-rate loop, solve_ivp": of_loops,
+        **of_filters,
+    }
+    rows = []
+    ratios = {}
     for runs in (margins, loops, filters):
         times = time_variants(runs, 1 if runs is loops else rounds)
         ours = next(iter(times.values()))
@@ -157,16 +204,32 @@ def section(rounds: int = 5) -> Section:
             ratios[name] = timed.ratio_to(ours)
             difference = f"{differences[name]:.1g}" if name in differences else ""
             ratio = f"{ratios[name]:.3g}"
-            rows.append((name, format_time(timed.median), format_time(timed.minimum), ratio, difference))
+            rows.append(
+                (name, format_time(timed.median), format_time(timed.minimum), ratio, difference)
+            )
     targets = [
-        Target("multi-rate loop: solve_ivp / simulate", ratios["multi-rate loop, solve_ivp"], 100, "x", at_least=True),
+        Target(
+            "multi-rate loop: solve_ivp / simulate",
+            ratios["multi-rate loop, solve_ivp"],
+            100,
+            "x",
+            at_least=True,
+        ),
         Target("multi-rate loop: difference of the position", of_loops, 1e-6, ""),
-        Target("filter: NumPy / estimate", ratios["extended Kalman filter, NumPy"], 1, "x", at_least=True),
+        Target(
+            "filter: NumPy / estimate",
+            ratios["extended Kalman filter, NumPy"],
+            1,
+            "x",
+            at_least=True,
+        ),
         Target("filter: difference", of_filters["extended Kalman filter, NumPy"], 1e-9, ""),
     ]
     if is_installed("control"):
         targets.append(Target("margins: difference from python-control", of_margins, 1e-9, ""))
-    return Section("Margins, multi-rate loops and filters", TEXT, HEADER, tuple(rows), tuple(targets))
+    return Section(
+        "Margins, multi-rate loops and filters", TEXT, HEADER, tuple(rows), tuple(targets)
+    )
 
 
 if __name__ == "__main__":

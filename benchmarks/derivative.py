@@ -1,4 +1,6 @@
-"""Time of one evaluation of the derivative of a plant with many muscles, called from compiled code."""
+"""Time of one evaluation of the derivative of a plant with many muscles, called from compiled
+code.
+"""
 
 from __future__ import annotations
 
@@ -19,24 +21,34 @@ from airmuscle.engine.compile.program import CompiledSystem, compile_system
 HEADER = ("plant", "median", "minimum", "per muscle")
 CALLS = 10_000
 TEXT = (
-    f"{MUSCLES} muscles on one mass, 26 states: for each muscle the flow through two valves, volume, pressure, "
-    f"characteristic, spring and damper; half-open valves. {CALLS} calls in a compiled loop, each at a state that "
-    "depends on the previous call."
+    f"{MUSCLES} muscles on one mass, 26 states: for each muscle the flow through two valves,"
+    f" volume, pressure, characteristic, spring and damper; half-open valves. {CALLS} calls in a"
+    " compiled loop, each at a state that depends on the previous call."
 )
-REASON = "with half-open valves, both valves and the surface with its force limits are computed in every evaluation"
+REASON = (
+    "with half-open valves, both valves and the surface with its force limits are computed in every"
+    " evaluation"
+)
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _calls(function: Any, x: Any, u: Any, c: Any, f: Any, count: Any) -> None:
-    at_x, at_u, at_c, at_f = pointer(x), pointer(u), pointer(c), pointer(f)
+    at_x = pointer(x)
+    at_u = pointer(u)
+    at_c = pointer(c)
+    at_f = pointer(f)
     for _ in range(count):
         invoke(function, (at_x, at_u, at_c, at_f))
         for i in range(x.shape[0]):
             x[i] += 1e-30 * f[i]
 
 
-def make_calls(ready: CompiledSystem, start: Mapping[str, float], count: int = CALLS) -> Callable[[], Array]:
-    """A function that evaluates the derivative `count` times in sequence and returns the last result."""
+def make_calls(
+    ready: CompiledSystem, start: Mapping[str, float], count: int = CALLS
+) -> Callable[[], Array]:
+    """A function that evaluates the derivative `count` times in sequence and returns the last
+    result.
+    """
     x = np.array([start[s.name] for s in ready.system.states])
     u, f = np.full(max(ready.sizes.inputs, 1), 0.5), np.empty(x.size)
 
@@ -51,7 +63,9 @@ def chou_hannaford_muscles() -> am.Plant:
     """The same plant with the characteristic of Chou and Hannaford (1996), the simplest one."""
     plant = many_muscles()
     law = am.characteristic.ChouHannaford1996(BRAID)
-    return dataclasses.replace(plant, muscle=tuple(dataclasses.replace(m, contractile=law) for m in plant.muscles))
+    return dataclasses.replace(
+        plant, muscle=tuple(dataclasses.replace(m, contractile=law) for m in plant.muscles)
+    )
 
 
 def section(rounds: int = 15) -> Section:
@@ -61,12 +75,17 @@ def section(rounds: int = 15) -> Section:
         "of Chou and Hannaford (1996)": chou_hannaford_muscles(),
     }
     variants = {
-        f"{MUSCLES} muscles {name}": make_calls(compile_system(plant), dict(am.find_equilibrium(plant, pressure=1e5)))
+        f"{MUSCLES} muscles {name}": make_calls(
+            compile_system(plant), dict(am.find_equilibrium(plant, pressure=1e5))
+        )
         for name, plant in plants.items()
     }
     times = time_variants(variants, rounds)
     rows = tuple(
-        (name, *(format_time(t / CALLS) for t in (time.median, time.minimum, time.median / MUSCLES)))
+        (
+            name,
+            *(format_time(t / CALLS) for t in (time.median, time.minimum, time.median / MUSCLES)),
+        )
         for name, time in times.items()
     )
     targets = tuple(

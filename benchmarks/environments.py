@@ -1,4 +1,5 @@
-"""Learning environments: steps a second of 4096 joints, single environments, a Stepper, and rollout of MuJoCo.
+"""Learning environments: steps a second of 4096 joints, single environments, a Stepper, and rollout
+of MuJoCo.
 
 python benchmarks/environments.py
 """
@@ -20,23 +21,26 @@ from airmuscle.core.errors import AirmuscleWarning
 from airmuscle.engine import Double, Single
 from airmuscle.engine.processes import available_cores
 
-COUNT, SUBSTEPS, PERIOD = 4096, 10, 0.01
+COUNT = 4096
+SUBSTEPS = 10
+PERIOD = 0.01
 STEPS = 20
 """Steps of a single environment in one timing."""
 HEADER = ("what", "median", "minimum", "environment steps a second")
 TEXT = (
-    f"`airmuscle/Joint-v0`, a period of {PERIOD * 1e3:g} ms in {SUBSTEPS} steps of RK4. The rows of vectors are one "
-    f"call of `step` with random actions for {COUNT} environments on all cores ({available_cores()}), with randomised "
-    "parameters and new episodes where one ends; `kernel` is the integration alone. The single environment is that of "
-    "`gymnasium.make`, with its wrappers. `mujoco.rollout` advances as many models of one hinge with two actuators "
-    "`cylinder`, which are first-order lags of a force without muscle, valve and gas, by as many steps of its "
-    "integrator implicitfast, on as many threads."
+    f"`airmuscle/Joint-v0`, a period of {PERIOD * 1e3:g} ms in {SUBSTEPS} steps of RK4. The rows of"
+    f" vectors are one call of `step` with random actions for {COUNT} environments on all cores"
+    f" ({available_cores()}), with randomised parameters and new episodes where one ends; `kernel`"
+    " is the integration alone. The single environment is that of `gymnasium.make`, with its"
+    " wrappers. `mujoco.rollout` advances as many models of one hinge with two actuators"
+    " `cylinder`, which are first-order lags of a force without muscle, valve and gas, by as many"
+    " steps of its integrator implicitfast, on as many threads."
 )
 MODEL = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body>
 <joint name="j" axis="0 1 0" damping="0.2"/>
 <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3" mass="1" contype="0" conaffinity="0"/></body></worldbody>
 <actuator><cylinder name="l" joint="j" gear="0.04" timeconst="0.05" area="0.000314" ctrlrange="0 6e5"/>
-<cylinder name="r" joint="j" gear="-0.04" timeconst="0.05" area="0.000314" ctrlrange="0 6e5"/></actuator></mujoco>"""
+<cylinder name="r" joint="j" gear="-0.04" timeconst="0.05" area="0.000314" ctrlrange="0 6e5"/></actuator></mujoco>"""  # noqa: E501
 """One joint with two native cylinders; the numbers are chosen."""
 
 
@@ -50,7 +54,10 @@ def vector_steps(precision: Any, count: int) -> tuple[Callable[[], Any], Callabl
     import gymnasium
 
     env = gymnasium.make_vec(
-        "airmuscle/Joint-v0", num_envs=count, vectorization_mode="vector_entry_point", precision=precision
+        "airmuscle/Joint-v0",
+        num_envs=count,
+        vectorization_mode="vector_entry_point",
+        precision=precision,
     )
     env.reset(seed=0)
     tables = np.random.default_rng(0).uniform(-1, 1, (16, count, 2)).astype(np.float32)
@@ -106,18 +113,33 @@ def rollout_steps(count: int) -> Callable[[], Any]:
 
 
 def features(observations: np.ndarray) -> np.ndarray:
-    """Error, speed, rate of the reference, difference of the pressures [bar], reference, 1 of joints (N, 6)."""
+    """Error, speed, rate of the reference, difference of the pressures [bar], reference, 1 of
+    joints (N, 6).
+    """
     angle, speed, left, right, target, later = observations.T
-    return np.stack([target - angle, speed, (later - target) / PERIOD, left - right, target, np.ones(len(angle))], 1)
+    return np.stack(
+        [
+            target - angle,
+            speed,
+            (later - target) / PERIOD,
+            left - right,
+            target,
+            np.ones(len(angle)),
+        ],
+        1,
+    )
 
 
 def policy_returns(envs: Any, weights: np.ndarray, seed: int) -> np.ndarray:
     """Returns (N,) of the policies u = tanh(w . features) with weights (N, 6), actions u and -u."""
     observations, _ = envs.reset(seed=seed)
-    total, running = np.zeros(len(weights)), np.ones(len(weights), dtype=bool)
+    total = np.zeros(len(weights))
+    running = np.ones(len(weights), dtype=bool)
     for _ in range(500):
         u = np.tanh(np.einsum("nk,nk->n", features(observations), weights))
-        observations, rewards, terminated, truncated, _ = envs.step(np.stack([u, -u], 1).astype(np.float32))
+        observations, rewards, terminated, truncated, _ = envs.step(
+            np.stack([u, -u], 1).astype(np.float32)
+        )
         total += np.where(running, rewards, 0.0)
         running &= ~(terminated | truncated)
     return total
@@ -126,17 +148,26 @@ def policy_returns(envs: Any, weights: np.ndarray, seed: int) -> np.ndarray:
 def searched_policy(
     generations: int = 25, episodes: int = 512, candidates: int = 64
 ) -> tuple[np.ndarray, float, float]:
-    """Weights of a cross-entropy search, their mean return in fresh episodes, and the CPU time of the search [s]."""
+    """Weights of a cross-entropy search, their mean return in fresh episodes, and the CPU time of
+    the search [s].
+    """
     import gymnasium
 
-    envs = gymnasium.make_vec("airmuscle/Joint-v0", num_envs=episodes, vectorization_mode="vector_entry_point")
-    random, begun = np.random.default_rng(0), time.process_time()
-    mean, deviation = np.zeros(6), np.array([10.0, 1.0, 1.0, 1.0, 3.0, 1.0])
+    envs = gymnasium.make_vec(
+        "airmuscle/Joint-v0", num_envs=episodes, vectorization_mode="vector_entry_point"
+    )
+    random = np.random.default_rng(0)
+    begun = time.process_time()
+    mean = np.zeros(6)
+    deviation = np.array([10.0, 1.0, 1.0, 1.0, 3.0, 1.0])
     for generation in range(generations):
         tried = mean + deviation * random.standard_normal((candidates, 6))
-        returns = policy_returns(envs, np.repeat(tried, episodes // candidates, axis=0), 1000 + generation)
+        returns = policy_returns(
+            envs, np.repeat(tried, episodes // candidates, axis=0), 1000 + generation
+        )
         best = tried[np.argsort(returns.reshape(candidates, -1).mean(1))[-10:]]
-        mean, deviation = best.mean(0), best.std(0) + 1e-3
+        mean = best.mean(0)
+        deviation = best.std(0) + 1e-3
     spent = time.process_time() - begun
     return mean, float(policy_returns(envs, np.tile(mean, (episodes, 1)), 777_777).mean()), spent
 
@@ -154,9 +185,11 @@ def variants(count: int) -> tuple[dict[str, Callable[[], Any]], dict[str, int]]:
             step, kernel = vector_steps(precision, count)
             runs |= {f"vector environment, {name}": step, f"kernel, {name}": kernel}
             sizes |= {f"vector environment, {name}": count, f"kernel, {name}": count}
-        runs["single environment"], sizes["single environment"] = single_steps(), STEPS
+        runs["single environment"] = single_steps()
+        sizes["single environment"] = STEPS
     if is_installed("mujoco"):
-        runs["mujoco.rollout"], sizes["mujoco.rollout"] = rollout_steps(count), count
+        runs["mujoco.rollout"] = rollout_steps(count)
+        sizes["mujoco.rollout"] = count
     return runs, sizes
 
 
@@ -167,7 +200,10 @@ def section(rounds: int = 9, count: int = COUNT) -> Section:
     rows = [
         (
             name,
-            *(format_time(t / (STEPS if sizes[name] == STEPS else 1)) for t in (timed.median, timed.minimum)),
+            *(
+                format_time(t / (STEPS if sizes[name] == STEPS else 1))
+                for t in (timed.median, timed.minimum)
+            ),
             f"{sizes[name] / timed.minimum / 1e3:.4g} k",
         )
         for name, timed in times.items()
@@ -177,17 +213,27 @@ def section(rounds: int = 9, count: int = COUNT) -> Section:
         key = f"vector environment, {name}"
         if key in times:
             rate = count / times[key].minimum / 1e6
-            targets.append(Target(f"environments: {name}, two cores", rate, limit, "M steps/s", at_least=True))
+            targets.append(
+                Target(f"environments: {name}, two cores", rate, limit, "M steps/s", at_least=True)
+            )
     if "single environment" in times:
         alone = times["single environment"].minimum / STEPS * 1e6
         targets.append(Target("environments: one step of a single one", alone, 25, "us"))
     if {"mujoco.rollout", "vector environment, double"} <= times.keys():
         ratio = times["mujoco.rollout"].ratio_to(times["vector environment, double"])
-        targets.append(Target("environments: mujoco.rollout / vector, double", ratio, 15, "x", at_least=True))
+        targets.append(
+            Target("environments: mujoco.rollout / vector, double", ratio, 15, "x", at_least=True)
+        )
     if is_installed("gymnasium") and count == COUNT:
         _, mean, spent = searched_policy()
-        rows.append(("search of a policy of six numbers, 25 x 512 episodes (CPU)", f"{spent:.3g} s", "", ""))
-        targets.append(Target("environments: its mean return in 512 fresh episodes", mean, 485, "", at_least=True))
+        rows.append(
+            ("search of a policy of six numbers, 25 x 512 episodes (CPU)", f"{spent:.3g} s", "", "")
+        )
+        targets.append(
+            Target(
+                "environments: its mean return in 512 fresh episodes", mean, 485, "", at_least=True
+            )
+        )
     missing = [package for package in ("gymnasium", "mujoco") if not is_installed(package)]
     note = f" Not installed and omitted: {', '.join(missing)}." if missing else ""
     return Section("Learning environments", TEXT + note, HEADER, tuple(rows), tuple(targets))

@@ -1,9 +1,9 @@
 """Runs of the benchmarks: 25 s on plants with three, six, eight and ten states.
 
-Three states: a Hill-type muscle with a surface of 21 coefficients, two MATRIX valves and a hanging mass, with filling
-and discharge as in the third paper. Conductance and critical ratio of the valve, supply, gas and schedule are those of
-the paper (Hošovský et al.); surface, spring, damper and mass are chosen. Eight states: six such muscles in parallel.
-Six and ten states: `joints.py`.
+Three states: a Hill-type muscle with a surface of 21 coefficients, two MATRIX valves and a hanging
+mass, with filling and discharge as in the third paper. Conductance and critical ratio of the valve,
+supply, gas and schedule are those of the paper (Hošovský et al.); surface, spring, damper and mass
+are chosen. Eight states: six such muscles in parallel. Six and ten states: `joints.py`.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ DURATION = 25.0
 SPACING = 0.01
 BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
 BOX = ((-1e4, 6e5), (-0.05, 0.35))
-"""Validity range of the surface: gauge pressure [Pa] and contraction [1]. It starts below ambient pressure, so that a
-muscle at rest is inside and the compared codes need no extrapolation there."""
+"""Validity range of the surface: gauge pressure [Pa] and contraction [1]. It starts below ambient
+pressure, so that a muscle at rest is inside and the compared codes need no extrapolation there."""
 FILL_DISCHARGE = am.Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
 JOINT_PULSES = am.Schedule(
     {
@@ -38,18 +38,24 @@ JOINT_PULSES = am.Schedule(
 
 
 def measured_force(pressure: Array, contraction: Array) -> Array:
-    """Force [N] of a synthetic muscle: Tondu and Lopez (2000), end correction decreasing with pressure (chosen).
+    """Force [N] of a synthetic muscle: Tondu and Lopez (2000), end correction decreasing with
+    pressure (chosen).
 
     F = pi r_0^2 p (a (1 - k(p) eps)^2 - b),   a = 3/tan^2(theta_0),   b = 1/sin^2(theta_0)
     """
-    a, b = 3 / np.tan(BRAID.braid_angle) ** 2, 1 / np.sin(BRAID.braid_angle) ** 2
+    a = 3 / np.tan(BRAID.braid_angle) ** 2
+    b = 1 / np.sin(BRAID.braid_angle) ** 2
     end_correction = 1.25 + 0.6 * np.exp(-pressure / 1.5e5)
-    return np.asarray(np.pi * BRAID.radius**2 * pressure * (a * (1 - end_correction * contraction) ** 2 - b))
+    return np.asarray(
+        np.pi * BRAID.radius**2 * pressure * (a * (1 - end_correction * contraction) ** 2 - b)
+    )
 
 
 @functools.cache
 def surface() -> am.characteristic.ContractileSurface:
-    """The polynomial of degree five fitted to `measured_force` on a grid over its validity range."""
+    """The polynomial of degree five fitted to `measured_force` on a grid over its validity
+    range.
+    """
     blank = am.characteristic.ContractileSurface.blank().with_validity_range(*BOX)
     p, eps = (grid.ravel() for grid in np.meshgrid(*(np.linspace(*ends, 41) for ends in BOX)))
     columns = np.column_stack([np.asarray(c) for c in blank.basis(p, eps)])
@@ -58,11 +64,13 @@ def surface() -> am.characteristic.ContractileSurface:
 
 
 def hanging(muscles: int = 1) -> am.Plant:
-    """Muscles in parallel on one mass, each with two valves and a different stiffness: one state per muscle, and two.
+    """Muscles in parallel on one mass, each with two valves and a different stiffness: one state
+    per muscle, and two.
 
     One muscle gives the plant with three states.
     """
-    matrix, supply = am.Valve(2.6167e-9, 0.433), am.Supply(650e3 - am.Ambient().pressure)
+    matrix = am.Valve(2.6167e-9, 0.433)
+    supply = am.Supply(650e3 - am.Ambient().pressure)
     each = [
         am.Muscle(
             surface(),
@@ -80,7 +88,9 @@ def hanging(muscles: int = 1) -> am.Plant:
 
 
 def staggered_schedule(plant: am.Plant) -> am.Schedule:
-    """The schedule of the third paper for the first muscle, delayed by 0.2 s for each further muscle."""
+    """The schedule of the third paper for the first muscle, delayed by 0.2 s for each further
+    muscle.
+    """
     changes = {}
     for i, prefix in enumerate(plant.prefixes):
         for name, instants in FILL_DISCHARGE.changes.items():
@@ -90,7 +100,9 @@ def staggered_schedule(plant: am.Plant) -> am.Schedule:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Run:
-    """A system with initial state and input signal; `lever` converts its coordinate to a displacement [m]."""
+    """A system with initial state and input signal; `lever` converts its coordinate to a
+    displacement [m].
+    """
 
     system: System
     initial_state: dict[str, float]
@@ -125,13 +137,22 @@ class Run:
 def lifting_run(muscles: int) -> Run:
     """The run of the plant with several muscles on one mass."""
     plant = hanging(muscles)
-    return Run(plant, dict(am.find_equilibrium(plant, pressure=0.0)), staggered_schedule(plant), "position", 1.0)
+    return Run(
+        plant,
+        dict(am.find_equilibrium(plant, pressure=0.0)),
+        staggered_schedule(plant),
+        "position",
+        1.0,
+    )
 
 
 @functools.cache
 def runs() -> dict[int, Run]:
-    """The runs by number of states: 3, one muscle; 6 and 10, a joint with two muscles; 8, six muscles on one mass."""
-    six, ten = joint(), joint(heat=True)
+    """The runs by number of states: 3, one muscle; 6 and 10, a joint with two muscles; 8, six
+    muscles on one mass.
+    """
+    six = joint()
+    ten = joint(heat=True)
     return {
         3: lifting_run(1),
         6: Run(six, joint_start(six), JOINT_PULSES, "angle", six.radius),

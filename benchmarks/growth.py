@@ -20,14 +20,22 @@ PULSED = 5.0
 """Simulated time with pulse-width modulation [s]."""
 REFERENCE = 1e-12
 HEADER = (
-    *("varied", "plant", "value", "time per simulated second", "steps per simulated second", "one step"),
+    *(
+        "varied",
+        "plant",
+        "value",
+        "time per simulated second",
+        "steps per simulated second",
+        "one step",
+    ),
     *("maximum error [m]", "preparation"),
 )
 TEXT = (
-    "The kernel of Rodas4 alone, output every 10 ms; the reference is Rodas4 at rtol 1e-12. Parallel muscles on one "
-    "mass are filled one after the other, so that more muscles also mean more restarts. With PWM both valves of every "
-    "muscle are driven by pulses, whose switching times are met exactly. Preparation: the time to trace, generate and "
-    "compile a new plant; with PWM, the time to generate the pulses of one simulated second."
+    "The kernel of Rodas4 alone, output every 10 ms; the reference is Rodas4 at rtol 1e-12."
+    " Parallel muscles on one mass are filled one after the other, so that more muscles also mean"
+    " more restarts. With PWM both valves of every muscle are driven by pulses, whose switching"
+    " times are met exactly. Preparation: the time to trace, generate and compile a new plant; with"
+    " PWM, the time to generate the pulses of one simulated second."
 )
 Row = tuple[str, ...]
 
@@ -46,29 +54,41 @@ class Case:
 
     def kernel(self, rtol: float | None = None) -> Callable[[], Array]:
         """A call of the kernel, with another tolerance for the reference."""
-        bound, state = am.Rodas4(rtol or self.rtol).bind(compile_system(self.run.system)), self.run.vector
+        bound = am.Rodas4(rtol or self.rtol).bind(compile_system(self.run.system))
+        state = self.run.vector
         times = np.linspace(0.0, self.duration, round(self.duration / SPACING) + 1)
         return lambda: bound.run(self.segments, 0.0, state, times)
 
 
 def measure_cases(cases: list[Case], rounds: int, preparation: Mapping[str, float]) -> list[Row]:
-    """The rows of the cases, timed in turn; `preparation` [s] by `plant` and `value` is the last column."""
+    """The rows of the cases, timed in turn; `preparation` [s] by `plant` and `value` is the last
+    column.
+    """
     times = time_variants({f"{c.plant}{c.value}": c.kernel() for c in cases}, rounds)
-    rows, references = [], {}
+    rows = []
+    references = {}
     for case, time in zip(cases, times.values(), strict=True):
         key = (id(case.run), id(case.segments))
         if key not in references:
             references[key] = case.kernel(REFERENCE)().rows
         solution = case.kernel()()
         error = case.run.error(solution.rows, references[key])
-        second, prepared = time.median / case.duration, preparation.get(f"{case.plant}{case.value}")
+        second = time.median / case.duration
+        prepared = preparation.get(f"{case.plant}{case.value}")
         cells = (
             format_time(second),
             f"{solution.steps / case.duration:.3g}",
             format_time(time.median / solution.steps),
         )
         rows.append(
-            (case.varied, case.plant, case.value, *cells, f"{error:.1e}", format_time(prepared) if prepared else "")
+            (
+                case.varied,
+                case.plant,
+                case.value,
+                *cells,
+                f"{error:.1e}",
+                format_time(prepared) if prepared else "",
+            )
         )
     return rows
 
@@ -76,10 +96,17 @@ def measure_cases(cases: list[Case], rounds: int, preparation: Mapping[str, floa
 def by_tolerance(rounds: int) -> list[Row]:
     """Rows for one, two and six muscles over the tolerance."""
     rows = []
-    for states, plant in ((3, "1 muscle, 3 states"), (10, "2 muscles, 10 states"), (8, "6 muscles, 8 states")):
+    for states, plant in (
+        (3, "1 muscle, 3 states"),
+        (10, "2 muscles, 10 states"),
+        (8, "6 muscles, 8 states"),
+    ):
         run = runs()[states]
         segments = run.segments
-        cases = [Case("tolerance", plant, f"{rtol:.0e}", run, segments, DURATION, rtol) for rtol in TOLERANCES]
+        cases = [
+            Case("tolerance", plant, f"{rtol:.0e}", run, segments, DURATION, rtol)
+            for rtol in TOLERANCES
+        ]
         rows += measure_cases(cases, rounds, {})
     return rows
 
@@ -87,16 +114,30 @@ def by_tolerance(rounds: int) -> list[Row]:
 def by_muscles(rounds: int) -> list[Row]:
     """Rows over the number of muscles in one plant."""
     each = {k: lifting_run(k) for k in MUSCLES}
-    cases = [Case("muscles", "on one mass", str(k), run, run.segments, DURATION) for k, run in each.items()]
-    compiling = time_variants({f"on one mass{k}": lambda s=run.system: compile_anew(s) for k, run in each.items()}, 1)
+    cases = [
+        Case("muscles", "on one mass", str(k), run, run.segments, DURATION)
+        for k, run in each.items()
+    ]
+    compiling = time_variants(
+        {f"on one mass{k}": lambda s=run.system: compile_anew(s) for k, run in each.items()}, 1
+    )
     return measure_cases(cases, rounds, {name: time.minimum for name, time in compiling.items()})
 
 
 def pwm_command(plant: am.Plant, frequency: float) -> am.engine.WithDrivers:
-    """Duty ratios 0.3 of filling and 0.1 of discharge for every muscle; interchanged in the second half of the run."""
-    large, small = ((0.0, 0.3), (PULSED / 2, 0.1)), ((0.0, 0.1), (PULSED / 2, 0.3))
-    duties = {f"{p}{name}": duty for p in plant.prefixes for name, duty in (("fill", large), ("discharge", small))}
-    return am.engine.WithDrivers(am.Schedule(duties), {name: am.engine.PWM(frequency) for name in duties})
+    """Duty ratios 0.3 of filling and 0.1 of discharge for every muscle; interchanged in the second
+    half of the run.
+    """
+    large = ((0.0, 0.3), (PULSED / 2, 0.1))
+    small = ((0.0, 0.1), (PULSED / 2, 0.3))
+    duties = {
+        f"{p}{name}": duty
+        for p in plant.prefixes
+        for name, duty in (("fill", large), ("discharge", small))
+    }
+    return am.engine.WithDrivers(
+        am.Schedule(duties), {name: am.engine.PWM(frequency) for name in duties}
+    )
 
 
 def by_frequency(rounds: int) -> list[Row]:
@@ -108,9 +149,15 @@ def by_frequency(rounds: int) -> list[Row]:
         def driven(frequency: float, run: Run = run) -> am.engine.PiecewiseLinear:
             return pwm_command(run.system, frequency).segments(run.system.inputs, 0.0, PULSED)
 
-        cases = [Case("PWM frequency", label, f"{f:g} Hz", run, driven(f), PULSED) for f in FREQUENCIES]
-        making = time_variants({f"{label}{f:g} Hz": lambda f=f: driven(f) for f in FREQUENCIES}, rounds)
-        rows += measure_cases(cases, rounds, {name: time.minimum / PULSED for name, time in making.items()})
+        cases = [
+            Case("PWM frequency", label, f"{f:g} Hz", run, driven(f), PULSED) for f in FREQUENCIES
+        ]
+        making = time_variants(
+            {f"{label}{f:g} Hz": lambda f=f: driven(f) for f in FREQUENCIES}, rounds
+        )
+        rows += measure_cases(
+            cases, rounds, {name: time.minimum / PULSED for name, time in making.items()}
+        )
     return rows
 
 

@@ -1,4 +1,5 @@
-"""Actuators of learning stacks: a step of 4096 x 8 muscles in PyTorch, Warp and ONNX Runtime, beside BatchStepper.
+"""Actuators of learning stacks: a step of 4096 x 8 muscles in PyTorch, Warp and ONNX Runtime,
+beside BatchStepper.
 
 python benchmarks/learning.py
 """
@@ -24,16 +25,21 @@ from airmuscle.engine.processes import available_cores
 from airmuscle.engine.run.batch.stepper import BatchStepper
 from airmuscle.physics import open_plant
 
-ENVIRONMENTS, MUSCLES, DT = 4096, 8, 1e-3
+ENVIRONMENTS = 4096
+MUSCLES = 8
+DT = 1e-3
 COUNT = ENVIRONMENTS * MUSCLES
 PLANTS = {"valves": ("lift-dmsp-20", ""), "regulator": ("joint-dmsp-20-itv2050", "left")}
-"""A muscle between two on/off valves (one state), and one behind a pressure regulator with heat (ten states)."""
+"""A muscle between two on/off valves (one state), and one behind a pressure regulator with heat
+(ten states).
+"""
 HEADER = ("what", "median", "minimum", "muscle steps a second")
 TEXT = (
-    f"One `compute` of {ENVIRONMENTS} x {MUSCLES} muscles DMSP-20-300: outputs, and a step of RK4 of {DT * 1e3:g} ms, "
-    f"in single precision, on {available_cores()} cores. `valves` is `lift-dmsp-20`, `regulator` a muscle of "
-    "`joint-dmsp-20-itv2050`. PyTorch is compiled by `torch.compile`. Warp runs the threads of a kernel one after the "
-    "other on one core; its kernels are made for GPUs. `BatchStepper` is the step of `simulate_batch`, with outputs."
+    f"One `compute` of {ENVIRONMENTS} x {MUSCLES} muscles DMSP-20-300: outputs, and a step of RK4"
+    f" of {DT * 1e3:g} ms, in single precision, on {available_cores()} cores. `valves` is"
+    " `lift-dmsp-20`, `regulator` a muscle of `joint-dmsp-20-itv2050`. PyTorch is compiled by"
+    " `torch.compile`. Warp runs the threads of a kernel one after the other on one core; its"
+    " kernels are made for GPUs. `BatchStepper` is the step of `simulate_batch`, with outputs."
 )
 
 
@@ -57,7 +63,8 @@ def torch_step(plant: Any, muscle: str, command: float) -> Callable[[], Any]:
 
     torch.set_num_threads(available_cores())
     module = module_of(plant, muscle, am.outlets.TorchStack())
-    actuator, shape = module.Muscle((ENVIRONMENTS, MUSCLES)), (ENVIRONMENTS, MUSCLES)
+    actuator = module.Muscle((ENVIRONMENTS, MUSCLES))
+    shape = (ENVIRONMENTS, MUSCLES)
     length = torch.full(shape, 0.95 * module.RESTING_LENGTH)
     state, compute = actuator.start(1e5, length), torch.compile(actuator.compute)
     given = torch.full(shape, command), length, torch.zeros(shape)
@@ -75,9 +82,12 @@ def warp_step(plant: Any, muscle: str, command: float) -> Callable[[], Any]:
 
     wp.config.quiet = True
     module = module_of(plant, muscle, am.outlets.WarpStack(), "_warp")
-    actuator, length = module.Muscle(COUNT, device="cpu"), 0.95 * module.RESTING_LENGTH
+    actuator = module.Muscle(COUNT, device="cpu")
+    length = 0.95 * module.RESTING_LENGTH
     actuator.start(1e5, length)
-    given = [wp.full(COUNT, value, dtype=module.real, device="cpu") for value in (command, length, 0.0)]
+    given = [
+        wp.full(COUNT, value, dtype=module.real, device="cpu") for value in (command, length, 0.0)
+    ]
     return lambda: actuator.compute(*given, DT)
 
 
@@ -86,16 +96,23 @@ def onnx_step(plant: Any, muscle: str, command: float) -> Callable[[], Any]:
     import onnxruntime as runtime
 
     folder = Path(tempfile.mkdtemp())
-    am.outlets.write_actuator(plant, folder, am.outlets.OnnxStack(Single()), name="muscle", muscle=muscle)
+    am.outlets.write_actuator(
+        plant, folder, am.outlets.OnnxStack(Single()), name="muscle", muscle=muscle
+    )
     options = runtime.SessionOptions()
-    options.intra_op_num_threads, options.log_severity_level = available_cores(), 3
+    options.intra_op_num_threads = available_cores()
+    options.log_severity_level = 3
     sessions = [
-        runtime.InferenceSession(str(folder / f"{name}.onnx"), options, providers=["CPUExecutionProvider"])
+        runtime.InferenceSession(
+            str(folder / f"{name}.onnx"), options, providers=["CPUExecutionProvider"]
+        )
         for name in ("muscle_start", "muscle")
     ]
     full = {"command": command, "length": 0.95 * 0.3, "speed": 0.0}
     given = {key: np.full(COUNT, value, np.float32) for key, value in full.items()}
-    (state,) = sessions[0].run(["state"], {"pressure": np.full(COUNT, 1e5, np.float32), "length": given["length"]})
+    (state,) = sessions[0].run(
+        ["state"], {"pressure": np.full(COUNT, 1e5, np.float32), "length": given["length"]}
+    )
     given |= {"state": state, "dt": np.array(DT, np.float32)}
     return lambda: sessions[1].run(["tension", "next_state"], given)
 
@@ -104,7 +121,11 @@ def library_step(plant: Any, muscle: str, command: float) -> Callable[[], Any]:
     """A step of the library's lanes."""
     alone = plant
     if muscle:
-        first = {"muscle": plant.muscles[0], "circuit": plant.circuits[0], "mechanism": am.HangingMass(1.0)}
+        first = {
+            "muscle": plant.muscles[0],
+            "circuit": plant.circuits[0],
+            "mechanism": am.HangingMass(1.0),
+        }
         alone = dataclasses.replace(plant, **first)
     part = open_plant(alone, (0.015,))
     stepper = BatchStepper(part, COUNT, am.RungeKutta4(DT), precision=Single())
@@ -122,14 +143,19 @@ def section(rounds: int = 9) -> Section:
     """The complete benchmark."""
     runs: dict[str, Callable[[], Any]] = {}
     for kind, (name, muscle) in PLANTS.items():
-        plant, command = am.load(name).plant, 0.5 if kind == "valves" else 3e5
+        plant = am.load(name).plant
+        command = 0.5 if kind == "valves" else 3e5
         runs[f"BatchStepper, {kind}"] = library_step(plant, muscle, command)
         for package, step in STACKS.items():
             if is_installed(package) and (package != "onnxruntime" or is_installed("onnx")):
                 runs[f"{package}, {kind}"] = step(plant, muscle, command)
     times = time_variants(runs, rounds)
     rows = [
-        (name, *(format_time(t) for t in (time.median, time.minimum)), f"{COUNT / time.minimum / 1e6:.3g} M")
+        (
+            name,
+            *(format_time(t) for t in (time.median, time.minimum)),
+            f"{COUNT / time.minimum / 1e6:.3g} M",
+        )
         for name, time in times.items()
     ]
     targets = [
@@ -137,7 +163,9 @@ def section(rounds: int = 9) -> Section:
         for name in times
         if name.startswith("torch")
     ]
-    missing = [package for package in ("torch", "warp", "onnx", "onnxruntime") if not is_installed(package)]
+    missing = [
+        package for package in ("torch", "warp", "onnx", "onnxruntime") if not is_installed(package)
+    ]
     note = f" Not installed and omitted: {', '.join(missing)}." if missing else ""
     return Section("Actuators of learning stacks", TEXT + note, HEADER, tuple(rows), tuple(targets))
 

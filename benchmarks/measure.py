@@ -1,9 +1,9 @@
 """Timing of benchmark variants, targets, and Markdown output.
 
-All variants are timed in one process, in each round once and in random order. A ratio is the median of the ratios of
-each round, because a change of the machine load affects all variants of a round alike. Each timing follows a call that
-is not timed: the first call after another variant fills the caches of the processor again, which takes a call of 0.2 ms
-half of its time.
+All variants are timed in one process, in each round once and in random order. A ratio is the median
+of the ratios of each round, because a change of the machine load affects all variants of a round
+alike. Each timing follows a call that is not timed: the first call after another variant fills the
+caches of the processor again, which takes a call of 0.2 ms half of its time.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ PACKAGES = (
     *("scikit-sundae", "diffrax", "jax", "control", "mujoco", "gymnasium"),
 )
 MIN_DURATION = 0.004
-"""Minimum duration [s] of a timing: faster variants are called several times per round, because of clock resolution."""
+"""Minimum duration [s] of a timing: faster variants are called several times per round, because of
+clock resolution.
+"""
 MAX_WARM_UP = 0.05
 """Duration [s] of a call from which on the state of the caches before it no longer matters."""
 
@@ -36,7 +38,7 @@ if status.exists():  # getrusage also counts the parent process before the fork
 else:
     import resource
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3))
-"""
+"""  # noqa: E501
 """Python code that prints the peak memory of its own process [MB]."""
 
 
@@ -60,11 +62,14 @@ class Times:
 
 
 def time_variants(variants: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, Times]:
-    """Time the variants, after one warm-up call each, in an order that is the same in each process."""
+    """Time the variants, after one warm-up call each, in an order that is the same in each
+    process.
+    """
     once = {name: _seconds(run, 1, warm=True) for name, run in variants.items()}
     calls = {name: max(1, round(MIN_DURATION / seconds)) for name, seconds in once.items()}
     durations: dict[str, list[float]] = {name: [] for name in variants}
-    order, shuffle = list(variants), random.Random(0).shuffle
+    order = list(variants)
+    shuffle = random.Random(0).shuffle
     for _ in range(rounds):
         shuffle(order)
         for name in order:
@@ -83,7 +88,9 @@ def _seconds(run: Callable[[], Any], calls: int, warm: bool) -> float:
 
 @dataclasses.dataclass(frozen=True)
 class Target:
-    """Target of a benchmark: a measured value with an upper limit or, if `at_least`, a lower limit."""
+    """Target of a benchmark: a measured value with an upper limit or, if `at_least`, a lower
+    limit.
+    """
 
     name: str
     measured: float
@@ -100,7 +107,12 @@ class Target:
     @property
     def cells(self) -> tuple[str, ...]:
         target = f"{'>=' if self.at_least else '<='} {self.limit:g} {self.unit}"
-        return (self.name, f"{self.measured:.3g} {self.unit}", target, "met" if self.met else "**missed**")
+        return (
+            self.name,
+            f"{self.measured:.3g} {self.unit}",
+            target,
+            "met" if self.met else "**missed**",
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,9 +162,17 @@ def package_versions() -> str:
 
 def describe_machine() -> str:
     """Processor, number of cores, operating system and load."""
-    load, cores = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan"), os.cpu_count() or 1
-    busy = "; under other load, so that times are too long and only ratios are valid" if load > cores / 2 + 1 else ""
-    return f"{_processor()}, {cores} cores, {platform.system()}, load average at the end {load:.1f}{busy}"
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    cores = os.cpu_count() or 1
+    busy = (
+        "; under other load, so that times are too long and only ratios are valid"
+        if load > cores / 2 + 1
+        else ""
+    )
+    return (
+        f"{_processor()}, {cores} cores, {platform.system()}, load average at the end"
+        f" {load:.1f}{busy}"
+    )
 
 
 def _processor() -> str:
@@ -165,7 +185,8 @@ def _processor() -> str:
     name = known.get("model name", "")
     if not name or name == "unknown":
         name = (
-            f"{known.get('vendor_id', platform.machine())} family {known.get('cpu family')} model {known.get('model')}"
+            f"{known.get('vendor_id', platform.machine())} family {known.get('cpu family')} model"
+            f" {known.get('model')}"
         )
     wide = " with AVX-512" if "avx512f" in known.get("flags", "") else ""
     return f"{name}{wide}"

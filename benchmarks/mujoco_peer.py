@@ -1,4 +1,6 @@
-"""ode8 at 1e-4 s over 25 s compared with RK4 of MuJoCo, with the same muscles as compiled C callbacks."""
+"""ode8 at 1e-4 s over 25 s compared with RK4 of MuJoCo, with the same muscles as compiled C
+callbacks.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +28,17 @@ STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
 ERROR_LIMIT = 1e-6
 """Maximum error of the position [m] in the comparison at equal error (chosen)."""
 TEXT = (
-    "A mass on a vertical slide joint without contacts; a muscle is an actuator whose activation is its air mass. One "
-    "call of `mj_step` takes all steps between two output times. The callbacks are C code that skips closed valves "
-    "and the extrapolation beyond the validity range. RungeKutta4 is the method of MuJoCo; Rodas4 is the default of "
-    "the library. The targets compare at equal error: each method takes its coarsest step of "
-    f"{', '.join(f'{step * 1e3:g}' for step in STEPS)} ms whose position error is at most {ERROR_LIMIT * 1e6:g} um."
+    "A mass on a vertical slide joint without contacts; a muscle is an actuator whose activation"
+    " is its air mass. One call of `mj_step` takes all steps between two output times. The"
+    " callbacks are C code that skips closed valves and the extrapolation beyond the validity"
+    " range. RungeKutta4 is the method of MuJoCo; Rodas4 is the default of the library. The"
+    " targets compare at equal error: each method takes its coarsest step of"
+    f" {', '.join(f'{step * 1e3:g}' for step in STEPS)} ms whose position error is at most"
+    f" {ERROR_LIMIT * 1e6:g} um."
 )
 BODY = """<mujoco><option timestep="{step!r}" integrator="RK4" gravity="0 0 {gravity!r}"><flag contact="disable"
 constraint="disable"/></option><worldbody><body><joint name="lift" type="slide" axis="0 0 1"/>
-<geom type="sphere" size="0.05" mass="{mass!r}"/></body></worldbody><actuator>{actuators}</actuator></mujoco>"""
+<geom type="sphere" size="0.05" mass="{mass!r}"/></body></worldbody><actuator>{actuators}</actuator></mujoco>"""  # noqa: E501
 ACTUATOR = '<general joint="lift" dyntype="user" gaintype="user" biastype="user"/>'
 
 
@@ -42,7 +46,11 @@ def missing_note() -> str:
     """The reason why this benchmark cannot be run; empty if it can."""
     if importlib.util.find_spec("mujoco") is None:
         return "Omitted, because mujoco is not installed: pip install mujoco."
-    return "" if compilers() else "Omitted, because there is no C compiler for the callbacks of MuJoCo."
+    return (
+        ""
+        if compilers()
+        else "Omitted, because there is no C compiler for the callbacks of MuJoCo."
+    )
 
 
 def model_xml(plant: am.Plant, step: float) -> str:
@@ -50,7 +58,7 @@ def model_xml(plant: am.Plant, step: float) -> str:
     load = plant.mechanism
     return BODY.format(
         step=step, gravity=-load.gravity, mass=load.mass, actuators=ACTUATOR * len(plant.muscles)
-    )  # fmt: skip
+    )
 
 
 def compile_callbacks(folder: pathlib.Path, muscles: int) -> ctypes.CDLL:
@@ -61,10 +69,13 @@ def compile_callbacks(folder: pathlib.Path, muscles: int) -> ctypes.CDLL:
     (library,) = [path for path in home.iterdir() if path.name.startswith("libmujoco.")]
     for source in (SOURCE, CALLBACKS):
         shutil.copy(source, folder)
-    compiler, target = compilers()[0], folder / f"callbacks{muscles}.so"
+    compiler = compilers()[0]
+    target = folder / f"callbacks{muscles}.so"
     options = [f"-I{home / 'include'}", f"-DMUSCLES={muscles}", "-DSKIP"]
     linked = (str(library), f"-Wl,-rpath,{home}", "-lm")
-    compile_source([compiler, *FLAGS, "-ffast-math", *options], folder / CALLBACKS.name, target, linked)
+    compile_source(
+        [compiler, *FLAGS, "-ffast-math", *options], folder / CALLBACKS.name, target, linked
+    )
     return ctypes.CDLL(str(target))
 
 
@@ -81,8 +92,11 @@ def make_mujoco_run(run: Run, library: ctypes.CDLL, step: float = STEP) -> Calla
     library.hold.argtypes = library.open_valves.argtypes = [ctypes.c_void_p]
 
     def call(keep: Any = (plant, inputs)) -> Array:
-        data, row = mujoco.MjData(model), 0
-        data.act[:], data.qpos[0], data.qvel[0] = run.vector[:-2], run.vector[-2], run.vector[-1]
+        data = mujoco.MjData(model)
+        row = 0
+        data.act[:] = run.vector[:-2]
+        data.qpos[0] = run.vector[-2]
+        data.qvel[0] = run.vector[-1]
         rows[0] = run.vector
         library.hold(plant.ctypes.data)
         library.install()
@@ -91,7 +105,8 @@ def make_mujoco_run(run: Run, library: ctypes.CDLL, step: float = STEP) -> Calla
             for _ in range(count):
                 mujoco.mj_step(model, data, every)
                 row += 1
-                rows[row, :-2], rows[row, -2:] = data.act, (data.qpos[0], data.qvel[0])
+                rows[row, :-2] = data.act
+                rows[row, -2:] = (data.qpos[0], data.qvel[0])
         library.remove_all()
         return rows
 
@@ -103,8 +118,11 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
     run = lifting_run(muscles)
     ready = compile_system(run.system)
     reference = kernel(run, ready, am.Rodas4(1e-11))()
-    segments, times, state = run.segments, run.times, run.vector
-    library_name, mujoco_name = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
+    segments = run.segments
+    times = run.times
+    state = run.vector
+    library_name = "DormandPrince8(1e-4), kernel"
+    mujoco_name = "MuJoCo RK4(1e-4), C callbacks"
 
     def kernel_call(method: am.engine.Integrator) -> Callable[[], Array]:
         bound = method.bind(ready)
@@ -141,10 +159,21 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
         )
         for name, t in times_of.items()
     )
-    names = {kind: f"{kind}, coarsest step, {step * 1e3:g} ms" for kind, (step, _) in coarsest.items()}
-    best = min((names["RungeKutta4"], names["DormandPrince8"]), key=lambda name: times_of[name].median)
-    target = f"muscles: {muscles}: MuJoCo RK4 with C callbacks / fixed step of the library, at equal error"
-    return rows, (Target(target, times_of[names["MuJoCo"]].ratio_to(times_of[best]), 12.0, "x", at_least=True),)
+    names = {
+        kind: f"{kind}, coarsest step, {step * 1e3:g} ms" for kind, (step, _) in coarsest.items()
+    }
+    best = min(
+        (names["RungeKutta4"], names["DormandPrince8"]), key=lambda name: times_of[name].median
+    )
+    target = (
+        f"muscles: {muscles}: MuJoCo RK4 with C callbacks / fixed step of the library, at equal"
+        " error"
+    )
+    return rows, (
+        Target(
+            target, times_of[names["MuJoCo"]].ratio_to(times_of[best]), 12.0, "x", at_least=True
+        ),
+    )
 
 
 def coarsest_step(
@@ -164,7 +193,9 @@ def section(rounds: int = 5) -> Section:
     if missing_note():
         return Section(title, missing_note(), HEADER, ())
     parts = [measure(muscles, max(1, rounds // muscles)) for muscles in (1, 2, 6)]
-    rows, targets = (tuple(x for part in column for x in part) for column in zip(*parts, strict=True))
+    rows, targets = (
+        tuple(x for part in column for x in part) for column in zip(*parts, strict=True)
+    )
     return Section(title, TEXT, HEADER, rows, targets)
 
 

@@ -1,7 +1,8 @@
-"""Exported programs: time of a step in an FMU and in MuJoCo, of a run in C and JavaScript, and sizes of the code.
+"""Exported programs: time of a step in an FMU and in MuJoCo, of a run in C and JavaScript, and
+sizes of the code.
 
-Needs gcc; node, ziglang and mujoco where their rows are measured. Kernel and C are timed in turn in one process, the
-other rows are processor times of a process of their own.
+Needs gcc; node, ziglang and mujoco where their rows are measured. Kernel and C are timed in turn in
+one process, the other rows are processor times of a process of their own.
 """
 
 from __future__ import annotations
@@ -27,12 +28,13 @@ from airmuscle.outlets.export.mujoco_plugin import check_mujoco
 
 STEPS = 1000
 TEXT = (
-    f"The runs of {DURATION:g} s with Rodas4(1e-6), with three, six, eight and ten states. `DoStep` of 1 ms is called "
-    "from C, an input being set and an output read in each, with a jump of the input every 50 steps. C is the "
-    "integration of the same steps without output, timed in turn with the kernel of the library, which is called from "
-    "Python, in one process; their ratio is the median over the rounds, all times are the least. "
-    "WebAssembly is the same C, compiled by zig and run in Node; JavaScript writes the "
-    "last row only. The step in MuJoCo is RK4 of 1 ms of a mass: with the muscle, less that without."
+    f"The runs of {DURATION:g} s with Rodas4(1e-6), with three, six, eight and ten states. `DoStep`"
+    " of 1 ms is called from C, an input being set and an output read in each, with a jump of the"
+    " input every 50 steps. C is the integration of the same steps without output, timed in turn"
+    " with the kernel of the library, which is called from Python, in one process; their ratio is"
+    " the median over the rounds, all times are the least. WebAssembly is the same C, compiled by"
+    " zig and run in Node; JavaScript writes the last row only. The step in MuJoCo is RK4 of 1 ms"
+    " of a mass: with the muscle, less that without."
 )
 HEADER = ("program", "time", "relative to the kernel", "machine code")
 DO_STEP = """
@@ -63,7 +65,7 @@ int main(void)
   printf("%.9g", best / 1000.0);
   return 0;
 }
-"""
+"""  # noqa: E501
 RUNS = """
 #define main exported_main
 #include "main.c"
@@ -86,7 +88,15 @@ void integrate(int count)
 }
 """
 """The integration alone, as the kernel makes it: no row is written."""
-WASM_OPTIONS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O2", "-ffp-contract=off", "-s")
+WASM_OPTIONS = (
+    "-target",
+    "wasm32-wasi",
+    "-mexec-model=reactor",
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",
+    "-s",
+)
 LAST_ROW = """
 import {simulate} from "./plant.mjs";
 const integrate = count => { for (let k = 0; k < count; k++) simulate(); };
@@ -94,7 +104,7 @@ const integrate = count => { for (let k = 0; k < count; k++) simulate(); };
 IN_WASM = """
 import {readFileSync} from "fs";
 const {instance: {exports: {integrate}}} = await WebAssembly.instantiate(readFileSync("plant.wasm"));
-"""
+"""  # noqa: E501
 SCRIPT = """
 let best = 1e9;
 for (let round = 0; round < 9; round++) {
@@ -111,13 +121,20 @@ def built(folder: Path, *sources: str) -> float:
     """The number that a C program prints."""
     command = ["gcc", "-std=c99", "-O2", "-ffp-contract=off", *sources, "-o", "program", "-lm"]
     subprocess.run(command, cwd=folder, check=True)
-    return float(subprocess.run(["./program"], cwd=folder, check=True, capture_output=True, text=True).stdout)
+    return float(
+        subprocess.run(["./program"], cwd=folder, check=True, capture_output=True, text=True).stdout
+    )
 
 
 def problem_of(case: Run) -> am.Problem:
     """The run with a row at its end only."""
     return am.Problem(
-        case.system, case.command, DURATION, case.initial_state, integrator=am.Rodas4(1e-6), output_times=(DURATION,)
+        case.system,
+        case.command,
+        DURATION,
+        case.initial_state,
+        integrator=am.Rodas4(1e-6),
+        output_times=(DURATION,),
     )
 
 
@@ -135,7 +152,9 @@ def processor_time(call: Callable[[], object], count: int = 20) -> float:
 
 def do_step(case: Run, folder: Path) -> float:
     """Processor time of a DoStep of 1 ms [s]."""
-    path = am.outlets.write_fmu(problem_of(case), folder / "a.fmu", fmi=2, name="plant", binary=False).path
+    path = am.outlets.write_fmu(
+        problem_of(case), folder / "a.fmu", fmi=2, name="plant", binary=False
+    ).path
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder / "fmu")
     text = (folder / "fmu" / "modelDescription.xml").read_text()
@@ -154,19 +173,25 @@ def code_size(folder: Path, source: str) -> str:
     if shutil.which("size") is None:
         return "-"
     subprocess.run(["gcc", "-std=c99", "-Os", "-c", source, "-o", "size.o"], cwd=folder, check=True)
-    text = subprocess.run(["size", "size.o"], cwd=folder, check=True, capture_output=True, text=True).stdout
+    text = subprocess.run(
+        ["size", "size.o"], cwd=folder, check=True, capture_output=True, text=True
+    ).stdout
     return f"{int(text.split()[6]) / 1e3:.1f} kB"
 
 
 def in_node(folder: Path, script: str) -> float:
     """The number that a JavaScript module prints."""
     (folder / "driver.mjs").write_text(script)
-    done = subprocess.run(["node", "driver.mjs"], cwd=folder, check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        ["node", "driver.mjs"], cwd=folder, check=True, capture_output=True, text=True
+    )
     return float(done.stdout)
 
 
 def in_webassembly(folder: Path) -> float | None:
-    """Processor time of a run of the C sources in WebAssembly [s]; None without the cross compiler."""
+    """Processor time of a run of the C sources in WebAssembly [s]; None without the cross
+    compiler.
+    """
     try:
         compiler = find_cross_compiler()
     except ParameterError:
@@ -179,29 +204,42 @@ def in_webassembly(folder: Path) -> float | None:
 def in_c(folder: Path) -> Callable[[], object]:
     """A run of the C sources, which a shared library makes in this process."""
     options = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared"]
-    subprocess.run(["gcc", *options, "driver.c", "plant.c", "-o", "plant.so", "-lm"], cwd=folder, check=True)
+    subprocess.run(
+        ["gcc", *options, "driver.c", "plant.c", "-o", "plant.so", "-lm"], cwd=folder, check=True
+    )
     function = ctypes.CDLL(str(folder / "plant.so")).integrate
     return lambda: function(1)
 
 
 def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     """The rows of one plant."""
-    name, problem = f"{len(case.system.states)} states", problem_of(case)
+    name = f"{len(case.system.states)} states"
+    problem = problem_of(case)
     bound = am.Rodas4(1e-6).bind(compile_system(case.system))
-    end, state = np.array([DURATION]), case.vector
+    end = np.array([DURATION])
+    state = case.vector
     am.outlets.write_program(problem, folder / "c", am.outlets.C99(), name="plant")
     (folder / "c" / "driver.c").write_text(RUNS)
     times = time_variants(
-        {"kernel": lambda: bound.run(case.segments, 0.0, state, end), "C": in_c(folder / "c")}, 5 * rounds
+        {"kernel": lambda: bound.run(case.segments, 0.0, state, end), "C": in_c(folder / "c")},
+        5 * rounds,
     )
-    kernel, ratio = times["kernel"].minimum, times["C"].ratio_to(times["kernel"])
+    kernel = times["kernel"].minimum
+    ratio = times["C"].ratio_to(times["kernel"])
     rows = [(f"{name}: kernel", format_time(kernel), "1", "")]
     size = code_size(folder / "c", "plant.c")
     rows.append((f"{name}: C", format_time(times["C"].minimum), f"{ratio:.2f}", size))
     if shutil.which("node"):
         am.outlets.write_program(problem, folder / "js", am.outlets.JavaScript(), name="plant")
-        others = {"JavaScript": in_node(folder / "js", LAST_ROW + SCRIPT), "WebAssembly": in_webassembly(folder / "c")}
-        rows += [(f"{name}: {k}", format_time(v), f"{v / kernel:.2f}", "") for k, v in others.items() if v is not None]
+        others = {
+            "JavaScript": in_node(folder / "js", LAST_ROW + SCRIPT),
+            "WebAssembly": in_webassembly(folder / "c"),
+        }
+        rows += [
+            (f"{name}: {k}", format_time(v), f"{v / kernel:.2f}", "")
+            for k, v in others.items()
+            if v is not None
+        ]
     step = do_step(case, folder)
     rows.append((f"{name}: FMU, DoStep of 1 ms", format_time(step), "", ""))
     targets = [Target(f"C against the kernel, {name}", ratio, 1.15, "")]
@@ -217,7 +255,8 @@ def in_mujoco(case: Run, folder: Path) -> float:
     times = []
     for with_muscle in (True, False):
         spec = mujoco.MjSpec()
-        spec.option.timestep, spec.option.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_RK4
+        spec.option.timestep = 1e-3
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         body = spec.worldbody.add_body(name="load")
         body.add_joint(name="z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1], damping=1e3)
         body.add_geom(size=[0.05, 0, 0], mass=5.0)
@@ -227,7 +266,9 @@ def in_mujoco(case: Run, folder: Path) -> float:
         data = mujoco.MjData(model)
         if with_muscle:
             muscle.initialise(model, data, "muscle", pressure=1e5)
-        times.append(processor_time(lambda m=model, d=data: mujoco.mj_step(m, d, nstep=STEPS), 1) / STEPS)
+        times.append(
+            processor_time(lambda m=model, d=data: mujoco.mj_step(m, d, nstep=STEPS), 1) / STEPS
+        )
     return times[0] - times[1]
 
 
@@ -238,7 +279,8 @@ def section(rounds: int = 5) -> Section:
     for case in runs().values():
         with tempfile.TemporaryDirectory() as folder:
             more, reached = rows_of(case, Path(folder), rounds)
-            rows, targets = rows + more, targets + reached
+            rows = rows + more
+            targets = targets + reached
     try:
         with tempfile.TemporaryDirectory() as folder:
             step = in_mujoco(runs()[3], Path(folder))

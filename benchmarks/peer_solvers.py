@@ -1,8 +1,8 @@
 """Solvers of other packages for the runs of `filling.py`, each in its fastest configuration.
 
-A solver is created once per run. For an rtol it returns a function that computes the rows (N, n); all preparation is
-done before. The absolute tolerance is always rtol times the nominal value of each state, and every solver restarts at
-each switching time of the schedule.
+A solver is created once per run. For an rtol it returns a function that computes the rows (N, n);
+all preparation is done before. The absolute tolerance is always rtol times the nominal value of
+each state, and every solver restarts at each switching time of the schedule.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from airmuscle.engine.compile.program import CompiledSystem
 
 Solver = Callable[[float], Callable[[], Array]]
 MAX_STEPS = 1_000_000
-PADDED, NEWTON = (512, 2048), 1e-2
+PADDED = (512, 2048)
+NEWTON = 1e-2
 
 
 def segments_of(run: Run) -> Iterator[tuple[Array, Array]]:
@@ -57,7 +58,8 @@ def sundae_by_hand(run: Run, ready: CompiledSystem) -> Solver:
 
 def sundae_compiled(run: Run, ready: CompiledSystem) -> Solver:
     """CVODE of scikit-sundae with compiled rates, which it can only call from Python."""
-    address, precomputed = ready.address["rhs"], ready.precomputed
+    address = ready.address["rhs"]
+    precomputed = ready.precomputed
 
     def function(openings: Array) -> Callable[[float, Array, Array], None]:
         def into(t: float, y: Array, yp: Array) -> None:
@@ -90,13 +92,16 @@ def _sundae(run: Run, function: Callable[[Array], Callable[[float, Array, Array]
 
 
 def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
-    """CVODES of CasADi on the expressions from which the library generates machine code, with parameters substituted,
-    states scaled by their nominal values, and an exact Jacobian."""
+    """CVODES of CasADi on the expressions from which the library generates machine code, with
+    parameters substituted, states scaled by their nominal values, and an exact Jacobian."""
     import casadi
 
-    traced, size = ready.program.traced, run.nominal
+    traced = ready.program.traced
+    size = run.nominal
     z = casadi.SX.sym("z", size.size)
-    rates = casadi.substitute(traced.f, casadi.vertcat(traced.x, traced.p), casadi.vertcat(size * z, ready.parameters))
+    rates = casadi.substitute(
+        traced.f, casadi.vertcat(traced.x, traced.p), casadi.vertcat(size * z, ready.parameters)
+    )
     equations = {"x": z, "u": traced.u, "ode": rates / size}
 
     def at(rtol: float) -> Callable[[], Array]:
@@ -105,7 +110,9 @@ def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
         for times, _ in segments_of(run):
             if times.size not in integrators:
                 grid = (SPACING * np.arange(1, times.size)).tolist()
-                integrators[times.size] = casadi.integrator("run", "cvodes", equations, 0.0, grid, settings)
+                integrators[times.size] = casadi.integrator(
+                    "run", "cvodes", equations, 0.0, grid, settings
+                )
         parts = [(integrators[times.size], openings) for times, openings in segments_of(run)]
 
         def call() -> Array:
@@ -132,12 +139,13 @@ def casadi_cvodes_jit(run: Run, ready: CompiledSystem) -> Solver:
 
 
 def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
-    """Kvaerno5 of diffrax on the library's laws with JAX arrays, compiled by jit, forward mode only.
+    """Kvaerno5 of diffrax on the library's laws with JAX arrays, compiled by jit, forward mode
+    only.
 
-    One solve per segment: with `jump_ts`, the long steps of a state of rest reach the opening of a valve, and the
-    states become infinite. Output times are padded to two lengths, so that only two functions are compiled. A tolerance
-    of 0.01 of the Newton iterations instead of rtol, and XLA with one thread, each reduce the time by a factor of two
-    to five.
+    One solve per segment: with `jump_ts`, the long steps of a state of rest reach the opening of a
+    valve, and the states become infinite. Output times are padded to two lengths, so that only two
+    functions are compiled. A tolerance of 0.01 of the Newton iterations instead of rtol, and XLA
+    with one thread, each reduce the time by a factor of two to five.
     """
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
     import diffrax
@@ -145,10 +153,16 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
     from jax import numpy as jnp
 
     jax.config.update("jax_enable_x64", True)
-    system, names, nominal = run.system, [s.name for s in run.system.states], jnp.asarray(run.nominal)
+    system, names, nominal = (
+        run.system,
+        [s.name for s in run.system.states],
+        jnp.asarray(run.nominal),
+    )
 
     def rates(t: Any, y: Any, u: Any) -> Any:
-        values = system.rates(dict(zip(names, y, strict=True)), dict(zip(system.inputs, u, strict=True)))
+        values = system.rates(
+            dict(zip(names, y, strict=True)), dict(zip(system.inputs, u, strict=True))
+        )
         return jnp.stack([jnp.asarray(values[name], dtype=float) for name in names])
 
     method = diffrax.Kvaerno5(root_finder=diffrax.VeryChord(rtol=NEWTON, atol=NEWTON * nominal))
@@ -156,20 +170,32 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
     @jax.jit
     def segment(y: Any, u: Any, times: Any, rtol: Any) -> Any:
         return diffrax.diffeqsolve(
-            diffrax.ODETerm(rates), method, times[0], times[-1], 1e-5, y, args=u,
-            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol * nominal), max_steps=MAX_STEPS,
-            saveat=diffrax.SaveAt(ts=times), adjoint=diffrax.ForwardMode(), throw=False,
-        ).ys  # fmt: skip
+            diffrax.ODETerm(rates),
+            method,
+            times[0],
+            times[-1],
+            1e-5,
+            y,
+            args=u,
+            stepsize_controller=diffrax.PIDController(rtol=rtol, atol=rtol * nominal),
+            max_steps=MAX_STEPS,
+            saveat=diffrax.SaveAt(ts=times),
+            adjoint=diffrax.ForwardMode(),
+            throw=False,
+        ).ys
 
     def padded(times: Array) -> Any:
         length = next(n for n in PADDED if n >= times.size)
         return jnp.asarray(np.append(times, np.full(length - times.size, times[-1])))
 
-    parts = [(padded(times), times.size, jnp.asarray(openings)) for times, openings in segments_of(run)]
+    parts = [
+        (padded(times), times.size, jnp.asarray(openings)) for times, openings in segments_of(run)
+    ]
 
     def at(rtol: float) -> Callable[[], Array]:
         def call() -> Array:
-            y, rows = jnp.asarray(run.vector), [run.vector[None]]
+            y = jnp.asarray(run.vector)
+            rows = [run.vector[None]]
             for times, size, openings in parts:
                 states = segment(y, openings, times, rtol)
                 y = states[-1]
@@ -182,15 +208,18 @@ def diffrax_kvaerno5(run: Run, ready: CompiledSystem) -> Solver:
 
 
 def control_response(run: Run, ready: CompiledSystem) -> Solver:
-    """input_output_response of python-control: LSODA of solve_ivp with interpolated inputs; hand-written rates, with
-    one system for each set of valve openings, so that the rates do not depend on inputs."""
+    """input_output_response of python-control: LSODA of solve_ivp with interpolated inputs;
+    hand-written rates, with one system for each set of valve openings, so that the rates do not
+    depend on inputs."""
     import control
 
     under = hand_written_rates(run)
 
     def system(openings: Array) -> Any:
         rates = under(openings)[0]
-        return control.nlsys(lambda t, x, u, params: rates(t, x), None, inputs=0, states=run.vector.size)
+        return control.nlsys(
+            lambda t, x, u, params: rates(t, x), None, inputs=0, states=run.vector.size
+        )
 
     def at(rtol: float) -> Callable[[], Array]:
         settings = {"rtol": rtol, "atol": rtol * run.nominal}
@@ -200,9 +229,15 @@ def control_response(run: Run, ready: CompiledSystem) -> Solver:
             rows = [run.vector[None]]
             for part, times in parts:
                 response = control.input_output_response(
-                    part, times[[0, -1]], 0.0, rows[-1][-1], solve_ivp_method="LSODA", solve_ivp_kwargs=settings,
-                    evaluation_times=times, return_states=True,
-                )  # fmt: skip
+                    part,
+                    times[[0, -1]],
+                    0.0,
+                    rows[-1][-1],
+                    solve_ivp_method="LSODA",
+                    solve_ivp_kwargs=settings,
+                    evaluation_times=times,
+                    return_states=True,
+                )
                 rows.append(response.states.T[1:])
             return np.concatenate(rows)
 

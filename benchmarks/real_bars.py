@@ -2,8 +2,9 @@
 
     python benchmarks/real_bars.py FOLDER
 
-FOLDER holds the files of `real_data.py` and `*fill*.csv` of `real_fills.py`. The law is the one that the command
-recommends for repeats 8 and 9 together; a run that is left out stands for a further repeat.
+FOLDER holds the files of `real_data.py` and `*fill*.csv` of `real_fills.py`. The law is the one
+that the command recommends for repeats 8 and 9 together; a run that is left out stands for a
+further repeat.
 """
 
 from __future__ import annotations
@@ -38,15 +39,23 @@ class Bar(NamedTuple):
     def __str__(self) -> str:
         met = self.value >= self.limit if self.least else self.value <= self.limit
         sign = ">=" if self.least else "<="
-        return f"{self.name:<75}{self.value:>8.3g} {self.unit:<4}{sign} {self.limit:g}  {'met' if met else 'MISSED'}"
+        return (
+            f"{self.name:<75}{self.value:>8.3g} {self.unit:<4}{sign} {self.limit:g} "
+            f" {'met' if met else 'MISSED'}"
+        )
 
 
 def law_bars(train: list[am.Recording], test: list[am.Recording]) -> list[Bar]:
-    """One law for further runs and other lengths: its errors on rows left out, and its force at slack rows."""
+    """One law for further runs and other lengths: its errors on rows left out, and its force at
+    slack rows.
+    """
     joint = am.bench.select_for_both([*train, *test], workers=2)
-    (by_run, by_length), candidate = joint.recommended, joint.recommended[0].candidate
+    by_run, by_length = joint.recommended
+    candidate = joint.recommended[0].candidate
     first = am.fit(candidate.law, train).model
-    lengths = {str(run.constants["specimen"]): float(run.constants["resting_length"]) for run in train}
+    lengths = {
+        str(run.constants["specimen"]): float(run.constants["resting_length"]) for run in train
+    }
     middle = sorted(lengths, key=lambda name: lengths[name])[1]
     between = next(each.rmse for each in by_length.fold_scores if each.fold == middle)
     repeated = rms(force_residuals(first, pulling(test), CEILING))
@@ -62,13 +71,23 @@ def law_bars(train: list[am.Recording], test: list[am.Recording]) -> list[Bar]:
 def command_bars(folder: Path) -> list[Bar]:
     """Wall time of `airmuscle fit --compare` with all ramps, and its CPU time."""
     files = sorted(str(path) for path in folder.glob("*.csv") if NAME.search(path.name))
-    before, begin = os.times(), time.perf_counter()
+    before = os.times()
+    begin = time.perf_counter()
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([*program(), "fit", *files, "--compare", "--out", f"{out}/fit"], check=True, capture_output=True)
+        subprocess.run(
+            [*program(), "fit", *files, "--compare", "--out", f"{out}/fit"],
+            check=True,
+            capture_output=True,
+        )
     after = os.times()
-    used = after.children_user + after.children_system - before.children_user - before.children_system
+    used = (
+        after.children_user + after.children_system - before.children_user - before.children_system
+    )
     seconds = time.perf_counter() - begin
-    return [Bar("airmuscle fit --compare, wall time", seconds, 20.0, "s"), Bar("the same, CPU time", used, 28.0, "s")]
+    return [
+        Bar("airmuscle fit --compare, wall time", seconds, 20.0, "s"),
+        Bar("the same, CPU time", used, 28.0, "s"),
+    ]
 
 
 def main() -> None:
@@ -83,7 +102,13 @@ def main() -> None:
     fills = [fit.rms(model.sensor) / 1e3 for model, fit in fits]
     bars = [
         *law_bars(train, test),
-        Bar("stated 95 % intervals of surfaces, repeat 8 against 9", 100 * float(np.mean(surfaces)), 85.0, "%", True),
+        Bar(
+            "stated 95 % intervals of surfaces, repeat 8 against 9",
+            100 * float(np.mean(surfaces)),
+            85.0,
+            "%",
+            True,
+        ),
         Bar("the same of pooled laws", 100 * float(np.mean(pooled)), 85.0, "%", True),
         *(Bar(f"fill {i + 1}: rms residual", error, 0.5, "kPa") for i, error in enumerate(fills)),
         *command_bars(folder),

@@ -2,12 +2,13 @@
 
     python benchmarks/real_data.py FOLDER
 
-FOLDER holds CSV files named `..._cut<cm>cm_held<cm>cm_test<n>.csv` with the columns time, pressure, force, length and
-rest_length, units in the headers. Repeat 8 is fitted, with its slack rows as bounds; the rows of repeat 9 above 2 N are
-used for validation, and its slack rows for the greatest force of the law where the muscle is slack.
-Each error is compared with the repeatability, the difference of the two repeats: a fit below it is overfitted. The
-model is selected with repeat 8 alone, for each purpose, before repeat 9 is used; one law for further runs and other
-lengths is also selected with both repeats, by leaving out runs and specimens.
+FOLDER holds CSV files named `..._cut<cm>cm_held<cm>cm_test<n>.csv` with the columns time, pressure,
+force, length and rest_length, units in the headers. Repeat 8 is fitted, with its slack rows as
+bounds; the rows of repeat 9 above 2 N are used for validation, and its slack rows for the greatest
+force of the law where the muscle is slack. Each error is compared with the repeatability, the
+difference of the two repeats: a fit below it is overfitted. The model is selected with repeat 8
+alone, for each purpose, before repeat 9 is used; one law for further runs and other lengths is also
+selected with both repeats, by leaving out runs and specimens.
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ import pandas as pd
 import airmuscle as am
 from airmuscle.bench.identify.candidate_scores import count_parameters
 from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.compared_points import evaluated_rows, force_residuals, residuals_of_rows
+from airmuscle.bench.identify.compared_points import (
+    evaluated_rows,
+    force_residuals,
+    residuals_of_rows,
+)
 from airmuscle.core.errors import IdentificationError
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
@@ -44,7 +49,11 @@ def read(path: Path) -> am.Recording:
     }
     match = NAME.search(path.name)
     assert match is not None
-    return am.Recording(columns, path.stem, {"resting_length": rest, "specimen": f"{match[1]} cm", "repeat": match[3]})
+    return am.Recording(
+        columns,
+        path.stem,
+        {"resting_length": rest, "specimen": f"{match[1]} cm", "repeat": match[3]},
+    )
 
 
 def repeats(folder: Path) -> tuple[list[am.Recording], list[am.Recording]]:
@@ -61,7 +70,9 @@ def rms(errors: np.ndarray) -> float:
 
 
 def repeatability(first: Sequence[am.Recording], second: Sequence[am.Recording]) -> float:
-    """The rms difference of the repeats [N]: medians of repeat 8 at the pressure and branch of each row of repeat 9."""
+    """The rms difference of the repeats [N]: medians of repeat 8 at the pressure and branch of each
+    row of repeat 9.
+    """
     differences = []
     for a, b in zip(first, second, strict=True):
         for branch in (1, 2):
@@ -75,7 +86,9 @@ def repeatability(first: Sequence[am.Recording], second: Sequence[am.Recording])
     return rms(np.concatenate(differences))
 
 
-def select_specimen(runs: Sequence[am.Recording], specimen: str, *, others: bool = False) -> list[am.Recording]:
+def select_specimen(
+    runs: Sequence[am.Recording], specimen: str, *, others: bool = False
+) -> list[am.Recording]:
     """The runs of one specimen, or of all others."""
     return [run for run in runs if (run.constants["specimen"] == specimen) != others]
 
@@ -97,11 +110,15 @@ def slack_force(model: am.characteristic.ForceLaw, runs: Sequence[am.Recording])
 
 
 def validation_errors(
-    candidate: am.bench.Candidate, train: list[am.Recording], test: list[am.Recording], specimens: list[str]
+    candidate: am.bench.Candidate,
+    train: list[am.Recording],
+    test: list[am.Recording],
+    specimens: list[str],
 ) -> list[float]:
-    """Error on repeat 9, greatest force at its slack rows, then the error on each specimen left out of the fit; NaN if
-    the others do not determine the law."""
-    law, fixed = candidate.law, candidate.fixed
+    """Error on repeat 9, greatest force at its slack rows, then the error on each specimen left out
+    of the fit; NaN if the others do not determine the law."""
+    law = candidate.law
+    fixed = candidate.fixed
     complete = am.fit(law, train, fixed=fixed).model
     errors = [rms(force_residuals(complete, pulling(test), CEILING)), slack_force(complete, test)]
     for name in specimens:
@@ -115,11 +132,14 @@ def validation_errors(
 
 
 def single_surface_errors(train: list[am.Recording], test: list[am.Recording]) -> np.ndarray:
-    """Errors on repeat 9 of a surface with 21 coefficients for one specimen (minimum-norm solution)."""
+    """Errors on repeat 9 of a surface with 21 coefficients for one specimen (minimum-norm
+    solution).
+    """
     matrices = []
     for runs in (train, test):
         p, c = (np.concatenate([run[n] for run in runs]) for n in ("pressure", "contraction"))
-        x, q = c / 0.075 - 1, p / 3.13e5 - 1
+        x = c / 0.075 - 1
+        q = p / 3.13e5 - 1
         matrices.append(np.column_stack([x**i * q**j for j in range(6) for i in range(6 - j)]))
     goal, truth = (np.concatenate([run["force"] for run in runs]) for runs in (train, test))
     norms = np.linalg.norm(matrices[0], axis=0)
@@ -138,14 +158,23 @@ def main() -> None:
     for name, runs in (("repeat 8", train), ("repeats 8 and 9", train + test)):
         print(f"\n{name}: {am.bench.select_for_both(runs, workers=2)}", flush=True)
     floor = repeatability(pulling(train), pulling(test))
-    print(f"\nrms error of the force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), validated on repeat 9")
+    print(
+        f"\nrms error of the force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), validated"
+        " on repeat 9"
+    )
     columns = "".join(f"{'no ' + name:>9}" for name in specimens)
     print(f"{'law':<68}{'P':>5}{'rep. 9':>9}{'at slack':>9}{columns}{'repeat.':>9}")
     each = [
-        single_surface_errors(pulling(select_specimen(train, name)), pulling(select_specimen(test, name)))
+        single_surface_errors(
+            pulling(select_specimen(train, name)), pulling(select_specimen(test, name))
+        )
         for name in specimens
     ]
-    print(format_row("one surface of degree 5 per length", 63, [rms(np.concatenate(each)), np.nan], floor))
+    print(
+        format_row(
+            "one surface of degree 5 per length", 63, [rms(np.concatenate(each)), np.nan], floor
+        )
+    )
     print(format_row("  each length", 21, [rms(e) for e in each], floor))
     candidates = [
         am.bench.Candidate("one surface of degree 5 for all lengths", blank_surface(5)),
@@ -156,7 +185,12 @@ def main() -> None:
             try:
                 size = count_parameters(am.fit(candidate.law, train, fixed=candidate.fixed))
                 print(
-                    format_row(candidate.name, size, validation_errors(candidate, train, test, specimens), floor),
+                    format_row(
+                        candidate.name,
+                        size,
+                        validation_errors(candidate, train, test, specimens),
+                        floor,
+                    ),
                     flush=True,
                 )
             except IdentificationError as error:

@@ -1,4 +1,6 @@
-"""Synthetic measurement files of a rig as laboratories have them: slack rows, loops, uneven runs, resolution."""
+"""Synthetic measurement files of a rig as laboratories have them: slack rows, loops, uneven runs,
+resolution.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,15 @@ def make_columns(length: float, contraction: float, repeat: int) -> dict[str, np
     held = contraction * (1 + 0.05 * (muscle - 1))
     force = true_force(pressure, held, length, muscle)
     width = random.uniform(0.05, 0.1) * true_force(np.array([MAX_PRESSURE]), 0.0, length, muscle)[0]
-    loop = width / 2 * np.where(phase < 0.5, -1.0, 1.0) * np.minimum(1.0, 12 * np.minimum(share, 1.05 - share))
-    measured = force + loop * (force > 0) + 1.5 * random.standard_normal(ROWS) + random.normal(0.0, 1.5)
+    loop = (
+        width
+        / 2
+        * np.where(phase < 0.5, -1.0, 1.0)
+        * np.minimum(1.0, 12 * np.minimum(share, 1.05 - share))
+    )
+    measured = (
+        force + loop * (force > 0) + 1.5 * random.standard_normal(ROWS) + random.normal(0.0, 1.5)
+    )
     return {
         "time [s]": np.round(60 * phase, 2),
         "pressure [kPa]": np.round((pressure + 500 * random.standard_normal(ROWS)) / 1e3, 1),
@@ -54,7 +63,9 @@ def write_files(folder: Path) -> list[Path]:
             for repeat in range(2):
                 columns = make_columns(length, contraction, repeat)
                 path = folder / f"{1e3 * length:.0f}mm_{100 * contraction:.0f}_{repeat + 1}.csv"
-                rows = "\n".join(",".join(f"{x:g}" for x in row) for row in zip(*columns.values(), strict=True))
+                rows = "\n".join(
+                    ",".join(f"{x:g}" for x in row) for row in zip(*columns.values(), strict=True)
+                )
                 heading = f"# resting_length [mm] = {1e3 * length:g}\n{','.join(columns)}\n"
                 path.write_text(f"{heading}{rows}\n", encoding="utf-8")
                 paths.append(path)

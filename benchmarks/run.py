@@ -80,7 +80,7 @@ caches of the processor again. The tables state the median and the minimum of th
 ratios within a round. Targets in seconds apply to the minimum, because other load can only increase a time. Each
 table also states the errors. Linear algebra uses one thread in all variants.
 Total time {seconds:.0f} s.
-"""
+"""  # noqa: E501
 
 
 def describe_missed(targets: Sequence[Target]) -> str:
@@ -91,16 +91,27 @@ def describe_missed(targets: Sequence[Target]) -> str:
             reasons.setdefault(target.reason or "not known", []).append(target.name)
     if not reasons:
         return "No target was missed.\n"
-    return "\n".join(f"Missed: {'; '.join(names)}. Reason: {reason}.\n" for reason, names in reasons.items())
+    return "\n".join(
+        f"Missed: {'; '.join(names)}. Reason: {reason}.\n" for reason, names in reasons.items()
+    )
 
 
 def report(sections: Sequence[Section], seconds: float) -> str:
     """The text of RESULTS.md."""
     targets = [target for section in sections for target in section.targets]
-    head = HEAD.format(date=today(), machine=describe_machine(), versions=package_versions(), seconds=seconds)
+    head = HEAD.format(
+        date=today(), machine=describe_machine(), versions=package_versions(), seconds=seconds
+    )
     summary = table(("quantity", "measured", "target", ""), [target.cells for target in targets])
     return "\n".join(
-        [head, "## Targets\n", summary, "", describe_missed(targets), *(section.markdown() for section in sections)]
+        [
+            head,
+            "## Targets\n",
+            summary,
+            "",
+            describe_missed(targets),
+            *(section.markdown() for section in sections),
+        ]
     )
 
 
@@ -108,11 +119,15 @@ def main() -> None:
     """Run and print each benchmark, then write RESULTS.md."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--rounds-factor", type=float, default=1.0, help="factor of the number of rounds, for a busy machine"
+        "--rounds-factor",
+        type=float,
+        default=1.0,
+        help="factor of the number of rounds, for a busy machine",
     )
     parser.add_argument("--print-only", action="store_true", help="do not write RESULTS.md")
     options = parser.parse_args()
-    start, sections = time.perf_counter(), []
+    start = time.perf_counter()
+    sections = []
     for section, rounds in SECTIONS:
         sections.append(section(max(1, round(rounds * options.rounds_factor))))
         print_section(sections[-1])

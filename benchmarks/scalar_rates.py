@@ -1,7 +1,8 @@
-"""Hand-written rates of the benchmark plants in scalar Python, as a user would write them for SciPy.
+"""Hand-written rates of the benchmark plants in scalar Python, as a user would write them for
+SciPy.
 
-All constants are precomputed as local variables; closed valves, the extrapolation outside the validity range and the
-root of choked flow are skipped. The library is not called during a run.
+All constants are precomputed as local variables; closed valves, the extrapolation outside the
+validity range and the root of choked flow are skipped. The library is not called during a run.
 """
 
 from __future__ import annotations
@@ -21,7 +22,11 @@ Scalar = Callable[[float, float], float]
 
 def valve_flow(valve: am.Valve, temperature: float) -> Scalar:
     """Mass flow [kg/s] from one absolute pressure to another [Pa], fully open."""
-    scale = valve.conductance * am.physics.REFERENCE_DENSITY * sqrt(am.physics.REFERENCE_TEMPERATURE / temperature)
+    scale = (
+        valve.conductance
+        * am.physics.REFERENCE_DENSITY
+        * sqrt(am.physics.REFERENCE_TEMPERATURE / temperature)
+    )
     b, laminar = valve.critical_ratio, float(valve.laminar_slope())
     inverse = 1.0 / (1.0 - b)
 
@@ -31,7 +36,8 @@ def valve_flow(valve: am.Valve, temperature: float) -> Scalar:
                 return scale * up
             beyond = (down - b * up) * inverse
             root = up * up - beyond * beyond
-            ellipse, chord = sqrt(root) if root > 1.0 else 1.0, laminar * (up - down)
+            ellipse = sqrt(root) if root > 1.0 else 1.0
+            chord = laminar * (up - down)
             return scale * (ellipse if ellipse < chord else chord)
         return -flow(down, up)
 
@@ -39,10 +45,32 @@ def valve_flow(valve: am.Valve, temperature: float) -> Scalar:
 
 
 def extrapolate(law: am.characteristic.ContractileSurface) -> Scalar:
-    """Extrapolation of the surface by its tangent beyond the validity range, in scaled arguments."""
-    (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
-        law.coefficients
-    )
+    """Extrapolation of the surface by its tangent beyond the validity range, in scaled
+    arguments.
+    """
+    (
+        a00,
+        a10,
+        a20,
+        a30,
+        a40,
+        a50,
+        a01,
+        a11,
+        a21,
+        a31,
+        a41,
+        a02,
+        a12,
+        a22,
+        a32,
+        a03,
+        a13,
+        a23,
+        a04,
+        a14,
+        a05,
+    ) = law.coefficients
     rows = (
         (a00, a10, a20, a30, a40, a50),
         (a01, a11, a21, a31, a41),
@@ -65,23 +93,56 @@ def extrapolate(law: am.characteristic.ContractileSurface) -> Scalar:
 
 def hill(plant: am.Plant) -> Callable[[Sequence[float]], Rates]:
     """A function from valve openings to the rates of the plant with three states."""
-    muscle, load, circuit, ambient = plant.muscles[0], plant.mechanism, plant.circuits[0], plant.ambient
-    law, length = muscle.contractile, muscle.geometry.resting_length
+    muscle = plant.muscles[0]
+    load = plant.mechanism
+    circuit = plant.circuits[0]
+    ambient = plant.ambient
+    law = muscle.contractile
+    length = muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
     rt, outside, source = (
         am.physics.GAS_CONSTANT * ambient.temperature,
         ambient.pressure,
         am.physics.absolute_pressure(circuit.supply.pressure, ambient),
     )
-    fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
-    stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
-    inverse_mass, gravity, per_length, cc = 1.0 / load.mass, load.gravity, 1.0 / length, c * c
-    low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
-    low_q, scale_q = law.min_pressure, 2.0 / (law.max_pressure - law.min_pressure)
-    min_force, max_force, tangent = law.min_force, law.max_force, extrapolate(law)
-    (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
-        law.coefficients
+    fill_flow, discharge_flow = (
+        valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge)
     )
+    stiffness = muscle.spring.stiffness
+    damping = muscle.damper.damping
+    growth = muscle.damper.damping_slope
+    inverse_mass = 1.0 / load.mass
+    gravity = load.gravity
+    per_length = 1.0 / length
+    cc = c * c
+    low_x = law.min_contraction
+    scale_x = 2.0 / (law.max_contraction - law.min_contraction)
+    low_q = law.min_pressure
+    scale_q = 2.0 / (law.max_pressure - law.min_pressure)
+    min_force, max_force, tangent = law.min_force, law.max_force, extrapolate(law)
+    (
+        a00,
+        a10,
+        a20,
+        a30,
+        a40,
+        a50,
+        a01,
+        a11,
+        a21,
+        a31,
+        a41,
+        a02,
+        a12,
+        a22,
+        a32,
+        a03,
+        a13,
+        a23,
+        a04,
+        a14,
+        a05,
+    ) = law.coefficients
 
     def rates_at(openings: Sequence[float]) -> Rates:
         fill, discharge = openings
@@ -92,12 +153,15 @@ def hill(plant: am.Plant) -> Callable[[Sequence[float]], Rates]:
             s = 1.0 - contraction
             p = air * rt / (k * s * (1.0 - cc * s * s))
             gauge = p - outside
-            x, q = (contraction - low_x) * scale_x - 1.0, (gauge - low_q) * scale_q - 1.0
+            x = (contraction - low_x) * scale_x - 1.0
+            q = (gauge - low_q) * scale_q - 1.0
             if -1.0 <= x <= 1.0 and -1.0 <= q <= 1.0:
                 r0 = a00 + x * (a10 + x * (a20 + x * (a30 + x * (a40 + x * a50))))
                 r1 = a01 + x * (a11 + x * (a21 + x * (a31 + x * a41)))
                 r2 = a02 + x * (a12 + x * (a22 + x * a32))
-                force = r0 + q * (r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05))))
+                force = r0 + q * (
+                    r1 + q * (r2 + q * (a03 + x * (a13 + x * a23) + q * (a04 + x * a14 + q * a05)))
+                )
             else:
                 force = tangent(x, q)
             force = min_force if force < min_force else max_force if force > max_force else force
@@ -117,12 +181,19 @@ def hill(plant: am.Plant) -> Callable[[Sequence[float]], Rates]:
 
 
 def _force(system: Joint) -> Callable[[float, float, float], float]:
-    """A function from gauge pressure [Pa], contraction [1] and shortening speed [m/s] to the tension [N]."""
+    """A function from gauge pressure [Pa], contraction [1] and shortening speed [m/s] to the
+    tension [N].
+    """
     muscle = system.muscle
-    length, clamp = muscle.geometry.resting_length, muscle.contractile
+    length = muscle.geometry.resting_length
+    clamp = muscle.contractile
     k, c = stretch_factor(muscle.geometry)
-    area, ccc, stiffness = -k / length, 3.0 * c * c, muscle.spring.stiffness * length
-    damping, min_force, max_force = muscle.damper.damping, clamp.min_force, clamp.max_force
+    area = -k / length
+    ccc = 3.0 * c * c
+    stiffness = muscle.spring.stiffness * length
+    damping = muscle.damper.damping
+    min_force = clamp.min_force
+    max_force = clamp.max_force
 
     def force(gauge: float, contraction: float, speed: float) -> float:
         s = 1.0 - contraction
@@ -136,15 +207,20 @@ def _force(system: Joint) -> Callable[[float, float, float], float]:
 
 def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
     """A function from valve openings to the rates of the joint with six states."""
-    ambient, length = system.ambient, system.muscle.geometry.resting_length
+    ambient = system.ambient
+    length = system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
-    rt, outside, cc = am.physics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    rt = am.physics.GAS_CONSTANT * ambient.temperature
+    outside = ambient.pressure
+    cc = c * c
     in_tube, source, radius = (
         rt / system.tube_volume,
         am.physics.absolute_pressure(system.supply.pressure, ambient),
         system.radius,
     )
-    lever, offset, inverse_inertia = radius / length, system.offset, 1.0 / system.inertia
+    lever = radius / length
+    offset = system.offset
+    inverse_inertia = 1.0 / system.inertia
     friction, load, force = system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, ambient.temperature) for v in (system.valve, system.tube))
 
@@ -153,10 +229,15 @@ def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
 
         def rates(t: float, y: Any) -> list[float]:
             angle, speed, air_l, tube_l, air_r, tube_r = y.tolist()
-            eps_l, eps_r, v = offset + lever * angle, offset - lever * angle, radius * speed
-            sl, sr = 1.0 - eps_l, 1.0 - eps_r
-            p_l, p_r = air_l * rt / (k * sl * (1.0 - cc * sl * sl)), air_r * rt / (k * sr * (1.0 - cc * sr * sr))
-            t_l, t_r = tube_l * in_tube, tube_r * in_tube
+            eps_l = offset + lever * angle
+            eps_r = offset - lever * angle
+            v = radius * speed
+            sl = 1.0 - eps_l
+            sr = 1.0 - eps_r
+            p_l = air_l * rt / (k * sl * (1.0 - cc * sl * sl))
+            p_r = air_r * rt / (k * sr * (1.0 - cc * sr * sr))
+            t_l = tube_l * in_tube
+            t_r = tube_r * in_tube
             through_l, through_r = tube(t_l, p_l), tube(t_r, p_r)
             in_l = in_r = 0.0
             if left_fill:
@@ -177,26 +258,44 @@ def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
 
 
 def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
-    """A function from valve openings to the rates of the joint with ten states: heat transfer and spools."""
-    ambient, length = system.ambient, system.muscle.geometry.resting_length
+    """A function from valve openings to the rates of the joint with ten states: heat transfer and
+    spools.
+    """
+    ambient = system.ambient
+    length = system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
-    wall, outside, cc = ambient.temperature, ambient.pressure, c * c
+    wall = ambient.temperature
+    outside = ambient.pressure
+    cc = c * c
     in_tube, source = (
         am.physics.GAS_CONSTANT * wall / system.tube_volume,
         am.physics.absolute_pressure(system.supply.pressure, ambient),
     )
-    radius, offset, inverse_inertia = system.radius, system.offset, 1.0 / system.inertia
+    radius = system.radius
+    offset = system.offset
+    inverse_inertia = 1.0 / system.inertia
     lever, friction, load, force = radius / length, system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, wall) for v in (system.valve, system.tube))
-    transfer, inverse_lag, cp = system.heat_transfer, 1.0 / system.spool_lag, HEAT_CAPACITY + am.physics.GAS_CONSTANT
-    inverse_cv, ratio, per_length = 1.0 / HEAT_CAPACITY, am.physics.GAS_CONSTANT / HEAT_CAPACITY, 1.0 / length
+    transfer = system.heat_transfer
+    inverse_lag = 1.0 / system.spool_lag
+    cp = HEAT_CAPACITY + am.physics.GAS_CONSTANT
+    inverse_cv = 1.0 / HEAT_CAPACITY
+    ratio = am.physics.GAS_CONSTANT / HEAT_CAPACITY
+    per_length = 1.0 / length
 
     def side(
-        contraction: float, speed: float, air: float, tube_air: float, energy: float, spool: float, goal: float
+        contraction: float,
+        speed: float,
+        air: float,
+        tube_air: float,
+        energy: float,
+        spool: float,
+        goal: float,
     ) -> tuple[float, float, float, float, float]:
         s = 1.0 - contraction
         css = cc * s * s
-        p, temperature = energy * ratio / (k * s * (1.0 - css)), energy * inverse_cv / air
+        p = energy * ratio / (k * s * (1.0 - css))
+        temperature = energy * inverse_cv / air
         t = tube_air * in_tube
         incoming = 0.0
         if spool > 0.0:
@@ -211,14 +310,20 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
         return tension, through, incoming - through, heating, (goal - spool) * inverse_lag
 
     def rates_at(openings: Sequence[float]) -> Rates:
-        goal_l, goal_r = openings[0] - openings[1], openings[2] - openings[3]
+        goal_l = openings[0] - openings[1]
+        goal_r = openings[2] - openings[3]
 
         def rates(t: float, y: Any) -> list[float]:
-            angle, speed, air_l, tube_l, energy_l, spool_l, air_r, tube_r, energy_r, spool_r = y.tolist()
-            turn, v = lever * angle, radius * speed
+            angle, speed, air_l, tube_l, energy_l, spool_l, air_r, tube_r, energy_r, spool_r = (
+                y.tolist()
+            )
+            turn = lever * angle
+            v = radius * speed
             pull_l, *left = side(offset + turn, v, air_l, tube_l, energy_l, spool_l, goal_l)
             pull_r, *right = side(offset - turn, -v, air_r, tube_r, energy_r, spool_r, goal_r)
-            turning = (radius * (pull_l - pull_r) - friction * speed - load * sin(angle)) * inverse_inertia
+            turning = (
+                radius * (pull_l - pull_r) - friction * speed - load * sin(angle)
+            ) * inverse_inertia
             return [speed, turning, *left, *right]
 
         return rates

@@ -1,4 +1,6 @@
-"""Residual and Jacobian with respect to eight parameters: cost relative to a simulation, and JAX jacfwd."""
+"""Residual and Jacobian with respect to eight parameters: cost relative to a simulation, and JAX
+jacfwd.
+"""
 
 from __future__ import annotations
 
@@ -34,25 +36,38 @@ FREE = (
 )
 SENSORS = {"pressure": 1e3, "position": 1e-4}
 """Standard deviations of the noise [Pa, m]; chosen."""
-DURATION, SPACING, STEP = 5.0, 0.01, 1e-3
+DURATION = 5.0
+SPACING = 0.01
+STEP = 1e-3
 COMMAND = am.Schedule({"fill": ((0.5, 1.0), (2.5, 0.0)), "discharge": ((3.0, 1.0), (4.5, 0.0))})
-METHODS: dict[str, am.engine.Integrator] = {"RungeKutta4(1e-3)": am.RungeKutta4(STEP), "Rodas4(1e-6)": am.Rodas4()}
+METHODS: dict[str, am.engine.Integrator] = {
+    "RungeKutta4(1e-3)": am.RungeKutta4(STEP),
+    "Rodas4(1e-6)": am.Rodas4(),
+}
 LIBRARY = "RungeKutta4(1e-3), residual and Jacobian"
 FORMS = ("a tuple", "an array")
-HEADER = ("method", "variant", "median", "minimum", "ratio to a simulation", "maximum difference of the Jacobian")
+HEADER = (
+    "method",
+    "variant",
+    "median",
+    "minimum",
+    "ratio to a simulation",
+    "maximum difference of the Jacobian",
+)
 REASON = (
-    "a simulation skips closed valves and the extrapolation, which makes it 20 % faster; residual and Jacobian gain "
-    "12 %, because the derivatives with respect to the limits of the validity range need the slopes of the "
-    "extrapolation"
+    "a simulation skips closed valves and the extrapolation, which makes it 20 % faster; residual"
+    " and Jacobian gain 12 %, because the derivatives with respect to the limits of the validity"
+    " range need the slopes of the extrapolation"
 )
 TEXT = (
-    "The plant with three states, filled and discharged within 5 s; 501 rows of pressure and position; eight "
-    "parameters. A simulation is `simulate` from a given initial state, with its Recording. Residual and Jacobian are "
-    "those of the fit: they include the initial equilibrium for the parameters with its derivatives, and "
-    "the weighting by the sensors. JAX uses the equations of the library, the initial state and its derivatives, as "
-    "one compiled function of `lax.scan` with RK4 and `jacfwd`, in 64 bits, with one thread; the state is a tuple of "
-    "numbers or an array. Differences are relative to the maximum of each column of the Jacobian of Rodas4 at rtol "
-    "1e-11."
+    "The plant with three states, filled and discharged within 5 s; 501 rows of pressure and"
+    " position; eight parameters. A simulation is `simulate` from a given initial state, with its"
+    " Recording. Residual and Jacobian are those of the fit: they include the initial equilibrium"
+    " for the parameters with its derivatives, and the weighting by the sensors. JAX uses the"
+    " equations of the library, the initial state and its derivatives, as one compiled function of"
+    " `lax.scan` with RK4 and `jacfwd`, in 64 bits, with one thread; the state is a tuple of"
+    " numbers or an array. Differences are relative to the maximum of each column of the Jacobian"
+    " of Rodas4 at rtol 1e-11."
 )
 
 
@@ -77,7 +92,9 @@ def case() -> Case:
     """The record of the identification benchmarks."""
     plant, rng = hanging(), np.random.default_rng(1)
     run = am.simulate(plant, COMMAND, duration=DURATION, output_times=SPACING)
-    noisy = {name: run[name] + size * rng.standard_normal(len(run)) for name, size in SENSORS.items()}
+    noisy = {
+        name: run[name] + size * rng.standard_normal(len(run)) for name, size in SENSORS.items()
+    }
     return Case(
         plant,
         Experiment(run.with_columns(**noisy), COMMAND, InitialConditions.at_rest(plant, 0.0)),
@@ -90,7 +107,12 @@ def simulation(method: am.engine.Integrator) -> Callable[[], am.Recording]:
 
     def run() -> am.Recording:
         return am.simulate(
-            plant, COMMAND, duration=DURATION, initial_state=start, output_times=SPACING, integrator=method
+            plant,
+            COMMAND,
+            duration=DURATION,
+            initial_state=start,
+            output_times=SPACING,
+            integrator=method,
         )
 
     return run
@@ -100,12 +122,16 @@ def kernel(method: am.engine.Integrator) -> Callable[[], Array]:
     """A function that runs the kernel alone for the same rows."""
     bound, segments = method.bind(compile_system(case().plant)), case().segments
     times = case().experiment.recording["time"].copy()
-    start = np.array([case().experiment.initial_conditions.guess[s.name] for s in case().plant.states])
+    start = np.array(
+        [case().experiment.initial_conditions.guess[s.name] for s in case().plant.states]
+    )
     return lambda: bound.run(segments, 0.0, start, times).rows
 
 
 def jacobian(method: am.engine.Integrator) -> Callable[[], tuple[Array, Array]]:
-    """A function that computes the residual (R,) and the Jacobian (R, 8) with respect to the scaled parameters."""
+    """A function that computes the residual (R,) and the Jacobian (R, 8) with respect to the scaled
+    parameters.
+    """
     problem = case().problem(method)
     at = np.array([u.value for u in problem.unknowns]) / problem.scales
     return lambda: problem.residuals(at)
@@ -116,16 +142,25 @@ def evaluate_in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:
     import jax.numpy as jnp
 
     table: dict[int, Callable[..., Any]] = {
-        Operation.ADD: lambda a, b: a + b, Operation.SUBTRACT: lambda a, b: a - b,
-        Operation.MULTIPLY: lambda a, b: a * b, Operation.DIVIDE: lambda a, b: a / b, Operation.NEGATE: lambda a: -a,
-        Operation.SQUARE: lambda a: a * a, Operation.TWICE: lambda a: a + a, Operation.INVERSE: lambda a: 1.0 / a,
-        Operation.SQRT: jnp.sqrt, Operation.SIN: jnp.sin, Operation.COS: jnp.cos,
+        Operation.ADD: lambda a, b: a + b,
+        Operation.SUBTRACT: lambda a, b: a - b,
+        Operation.MULTIPLY: lambda a, b: a * b,
+        Operation.DIVIDE: lambda a, b: a / b,
+        Operation.NEGATE: lambda a: -a,
+        Operation.SQUARE: lambda a: a * a,
+        Operation.TWICE: lambda a: a + a,
+        Operation.INVERSE: lambda a: 1.0 / a,
+        Operation.SQRT: jnp.sqrt,
+        Operation.SIN: jnp.sin,
+        Operation.COS: jnp.cos,
         Operation.LESS_EQUAL: lambda a, b: jnp.where(a <= b, 1.0, 0.0),
-        Operation.LESS: lambda a, b: jnp.where(a < b, 1.0, 0.0), Operation.NOT: lambda a: 1.0 - a,
+        Operation.LESS: lambda a, b: jnp.where(a < b, 1.0, 0.0),
+        Operation.NOT: lambda a: 1.0 - a,
         Operation.MASK: lambda c, a: jnp.where(c != 0, a, 0.0),
         Operation.SELECT: lambda c, a, b: jnp.where(c != 0, a, b),
-        Operation.MAXIMUM: jnp.maximum, Operation.MINIMUM: jnp.minimum,
-    }  # fmt: skip
+        Operation.MAXIMUM: jnp.maximum,
+        Operation.MINIMUM: jnp.minimum,
+    }
     known: dict[Operand, Any] = {}
 
     def value(operand: Operand) -> Any:
@@ -139,8 +174,12 @@ def evaluate_in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:
 
 
 def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
-    """The same residual and Jacobian as one JAX function. Raises ImportError if JAX is not installed."""
-    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")  # one thread is fastest
+    """The same residual and Jacobian as one JAX function. Raises ImportError if JAX is not
+    installed.
+    """
+    os.environ.setdefault(
+        "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false"
+    )  # one thread is fastest
     import jax
     import jax.numpy as jnp
 
@@ -150,9 +189,12 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
     indices = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     values = np.array([leaves[index].value for index in indices])
     start, by_start = case().problem(am.RungeKutta4(STEP)).record_models[0].initial_state(values)
-    t, names = trace_system(plant), [s.name for s in plant.states]
+    t = trace_system(plant)
+    names = [s.name for s in plant.states]
     outputs = list(t.output_names)
-    seen = [t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS]
+    seen = [
+        t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS
+    ]
     rates = instructions([t.x, t.u, t.p], [t.f])
     observed = instructions([t.x, t.u, t.p], [casadi.vertcat(*seen)])
     recording, count = case().experiment.recording, round(DURATION / STEP)
@@ -172,7 +214,11 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
             k2 = evaluate_in_jax(rates, (moved(x, STEP / 2, k1), u, p))
             k3 = evaluate_in_jax(rates, (moved(x, STEP / 2, k2), u, p))
             k4 = evaluate_in_jax(rates, (moved(x, STEP, k3), u, p))
-            return moved(x, STEP / 6, [a + 2 * (b + c) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)])
+            return moved(
+                x,
+                STEP / 6,
+                [a + 2 * (b + c) + d for a, b, c, d in zip(k1, k2, k3, k4, strict=True)],
+            )
 
         def one(x: Any, u: Any) -> Any:
             return (jnp.stack(step(tuple(x), u)) if stacked else step(x, u)), None
@@ -183,9 +229,15 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
 
         begin = tuple(start[i] + (by_start[i] * values) @ (scaled - 1.0) for i in range(start.size))
         rows = jax.lax.scan(row, jnp.stack(begin) if stacked else begin, inputs_of_rows)[1]
-        columns = [jnp.concatenate([begin[i][None], rows[:, i] if stacked else rows[i]]) for i in range(start.size)]
+        columns = [
+            jnp.concatenate([begin[i][None], rows[:, i] if stacked else rows[i]])
+            for i in range(start.size)
+        ]
         modelled = evaluate_in_jax(observed, (columns, [0.0] * inputs_of_rows.shape[2], p))
-        errors = [(y - recording[name]) / size for y, (name, size) in zip(modelled, SENSORS.items(), strict=True)]
+        errors = [
+            (y - recording[name]) / size
+            for y, (name, size) in zip(modelled, SENSORS.items(), strict=True)
+        ]
         return jnp.stack(errors, axis=1).ravel()
 
     both = jax.jit(lambda z: (residual(z), jax.jacfwd(residual)(z)))
@@ -201,7 +253,10 @@ def section(rounds: int) -> Section:
         variants[f"{name}, kernel of the simulation"] = kernel(method)
         variants[f"{name}, residual and Jacobian"] = jacobian(method)
     times = time_variants(variants, rounds)
-    ratios = {name: t.ratio_to(times[f"{name.partition(',')[0]}, simulation"]) for name, t in times.items()}
+    ratios = {
+        name: t.ratio_to(times[f"{name.partition(',')[0]}, simulation"])
+        for name, t in times.items()
+    }
     limits = {LIBRARY: 2.0, "Rodas4(1e-6), residual and Jacobian": 5.0}
     targets = [
         Target(f"{name}, 8 parameters", ratios[name], limit, "simulations", reason=REASON)
@@ -209,27 +264,52 @@ def section(rounds: int) -> Section:
     ]
     text = TEXT
     try:
-        jax_variants = {f"RungeKutta4(1e-3), JAX jacfwd, state as {form}": make_jax_variant(form) for form in FORMS}
+        jax_variants = {
+            f"RungeKutta4(1e-3), JAX jacfwd, state as {form}": make_jax_variant(form)
+            for form in FORMS
+        }
     except ImportError:
         text += "\n\nJAX is not installed, so that its rows are omitted."
     else:
         # Timed separately, because the idle threads of JAX slow down what is timed after it.
         jax_times = time_variants({LIBRARY: variants[LIBRARY], **jax_variants}, max(rounds // 2, 1))
-        library, variants = jax_times.pop(LIBRARY), variants | jax_variants
+        library = jax_times.pop(LIBRARY)
+        variants = variants | jax_variants
         ratios |= {name: t.ratio_to(library) * ratios[LIBRARY] for name, t in jax_times.items()}
         times |= jax_times
         ratio = min(t.ratio_to(library) for t in jax_times.values())
         targets.append(
-            Target("residual and Jacobian: JAX jacfwd, faster form / library", ratio, 10.0, "x", at_least=True)
+            Target(
+                "residual and Jacobian: JAX jacfwd, faster form / library",
+                ratio,
+                10.0,
+                "x",
+                at_least=True,
+            )
         )
     rows, reference = [], jacobian(am.Rodas4(1e-11))()[1]
     for name, t in times.items():
         method, _, variant = name.partition(", ")
         difference = ""
         if "simulation" not in variant:
-            difference = f"{(np.abs(variants[name]()[1] - reference) / np.abs(reference).max(axis=0)).max():.0e}"
-        rows.append((method, variant, format_time(t.median), format_time(t.minimum), f"{ratios[name]:.3g}", difference))
-    return Section("Residual and Jacobian with respect to eight parameters", text, HEADER, tuple(rows), tuple(targets))
+            difference = f"{(np.abs(variants[name]()[1] - reference) / np.abs(reference).max(axis=0)).max():.0e}"  # noqa: E501
+        rows.append(
+            (
+                method,
+                variant,
+                format_time(t.median),
+                format_time(t.minimum),
+                f"{ratios[name]:.3g}",
+                difference,
+            )
+        )
+    return Section(
+        "Residual and Jacobian with respect to eight parameters",
+        text,
+        HEADER,
+        tuple(rows),
+        tuple(targets),
+    )
 
 
 if __name__ == "__main__":

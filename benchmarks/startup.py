@@ -1,4 +1,6 @@
-"""Time from process start to the first result: library and command line, with warm and cold cache."""
+"""Time from process start to the first result: library and command line, with warm and cold
+cache.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +15,11 @@ from new_plant import run_python
 
 HEADER = ("process", "median", "minimum")
 TEXT = (
-    "Complete processes from start to end, with cached bytecode as after an installation. Warm: the machine code of "
-    "the kernels is cached. Cold: the cache is empty, and a message on stderr announces the compilation of the "
-    "kernels. The library builds a plant with three states from a muscle of its library, computes its equilibrium and "
-    "simulates 25 s. `airmuscle` is the installed entry point."
+    "Complete processes from start to end, with cached bytecode as after an installation. Warm: the"
+    " machine code of the kernels is cached. Cold: the cache is empty, and a message on stderr"
+    " announces the compilation of the kernels. The library builds a plant with three states from a"
+    " muscle of its library, computes its equilibrium and simulates 25 s. `airmuscle` is the"
+    " installed entry point."
 )
 SIMULATE = """
 import airmuscle as am
@@ -26,8 +29,8 @@ plant = am.Plant(am.load("dmsp-20-300").muscle, circuit, am.HangingMass(10.0))
 am.simulate(plant, am.Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), duration=25.0)
 """
 REASON = (
-    "import of NumPy (0.1 s), declaration of the models (0.1 s), import of CasADi and LLVM, compilation of the plant "
-    "(0.15 s)"
+    "import of NumPy (0.1 s), declaration of the models (0.1 s), import of CasADi and LLVM,"
+    " compilation of the plant (0.15 s)"
 )
 EVALUATE = ["evaluate", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"]
 

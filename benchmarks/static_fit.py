@@ -12,10 +12,11 @@ POINTS = 1000
 NOISE = 2.0
 HEADER = ("variant", "median", "minimum", "ratio to library", "maximum difference of a coefficient")
 TEXT = (
-    f"{POINTS} points of a synthetic muscle (see `filling.py`) with Gaussian noise of {NOISE:g} N; both scale "
-    "contraction and pressure in the same way. Both compute standard errors and correlations, the library also rank "
-    "and condition number. The residual for lmfit is a matrix product, the fastest form; one variant also gives this "
-    "matrix as its derivative. Differences are relative to the largest coefficient of the library."
+    f"{POINTS} points of a synthetic muscle (see `filling.py`) with Gaussian noise of {NOISE:g} N;"
+    " both scale contraction and pressure in the same way. Both compute standard errors and"
+    " correlations, the library also rank and condition number. The residual for lmfit is a matrix"
+    " product, the fastest form; one variant also gives this matrix as its derivative. Differences"
+    " are relative to the largest coefficient of the library."
 )
 
 
@@ -35,7 +36,9 @@ def design_matrix(data: am.Recording) -> Array:
 
 def fit_library(data: am.Recording) -> Array:
     """The coefficients fitted by the library, without censoring."""
-    model = am.fit(am.characteristic.ContractileSurface.blank(), data, censoring=am.bench.UNCENSORED).model
+    model = am.fit(
+        am.characteristic.ContractileSurface.blank(), data, censoring=am.bench.UNCENSORED
+    ).model
     assert isinstance(model, am.characteristic.ContractileSurface)
     return np.array(model.coefficients)
 
@@ -69,7 +72,10 @@ def section(rounds: int = 9) -> Section:
     times = time_variants(variants, rounds)
     coefficients = {name: call() for name, call in variants.items()}
     expected = coefficients["`fit`"]
-    differences = {n: float(np.abs(c - expected).max() / np.abs(expected).max()) for n, c in coefficients.items()}
+    differences = {
+        n: float(np.abs(c - expected).max() / np.abs(expected).max())
+        for n, c in coefficients.items()
+    }
     rows = tuple(
         (
             name,
@@ -81,9 +87,14 @@ def section(rounds: int = 9) -> Section:
         for name, t in times.items()
     )
     target = Target(
-        "21 coefficients: difference between library and lmfit", max(differences.values()), 1e-8, "relative"
+        "21 coefficients: difference between library and lmfit",
+        max(differences.values()),
+        1e-8,
+        "relative",
     )
-    return Section("Static fit of 21 coefficients, library and lmfit", TEXT, HEADER, rows, (target,))
+    return Section(
+        "Static fit of 21 coefficients, library and lmfit", TEXT, HEADER, rows, (target,)
+    )
 
 
 if __name__ == "__main__":

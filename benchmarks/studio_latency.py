@@ -1,8 +1,9 @@
-"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points and with a joint; time
-of a small request while two heavy ones run.
+"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points and
+with a joint; time of a small request while two heavy ones run.
 
-Run python benchmarks/studio_latency.py with the package playwright and Chromium; prints median and 95th percentile
-[ms], and the time of the page's scripts and of its whole main thread for each key [ms], as thread CPU time.
+Run python benchmarks/studio_latency.py with the package playwright and Chromium; prints median and
+95th percentile [ms], and the time of the page's scripts and of its whole main thread for each key
+[ms], as thread CPU time.
 """
 
 from __future__ import annotations
@@ -35,7 +36,12 @@ addEventListener("keydown", (event) => {
   });
 }, true);
 """
-OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+]
 
 
 def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
@@ -44,7 +50,9 @@ def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
     def durations() -> dict[str, float]:
-        return {row["name"]: row["value"] for row in session.send("Performance.getMetrics")["metrics"]}
+        return {
+            row["name"]: row["value"] for row in session.send("Performance.getMetrics")["metrics"]
+        }
 
     control.focus()
     for i in range(20):
@@ -54,7 +62,8 @@ def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
     for i in range(KEYS):
         control.press(keys[i // 20 % 2])
         page.wait_for_timeout(20)
-    after, found = durations(), sorted(page.evaluate("latencies"))
+    after = durations()
+    found = sorted(page.evaluate("latencies"))
     script, task = (1e3 * (after[n] - before[n]) / KEYS for n in ("ScriptDuration", "TaskDuration"))
     return (
         f"median {statistics.median(found):.1f} ms, 95 % {found[int(0.95 * len(found))]:.1f} ms; "
@@ -64,11 +73,19 @@ def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
 
 ROWS = 150_000
 """Rows of each of the two files that are read meanwhile, of 4 MB (chosen)."""
-SMALL = ("tondu-lopez", "dmsp-10-250", "sarosi-dmsp-10", "hunt2017-festo-10", "reynolds2003", "chou-hannaford")
+SMALL = (
+    "tondu-lopez",
+    "dmsp-10-250",
+    "sarosi-dmsp-10",
+    "hunt2017-festo-10",
+    "reynolds2003",
+    "chou-hannaford",
+)
 """Muscles and laws, each sheet of which alone takes less than 0.2 s."""
 TEXT = (
-    "Time from the request for the sheet of a muscle, which the server has not computed before, to its answer, while "
-    f"two requests that read files of {ROWS} rows are being answered without a pause."
+    "Time from the request for the sheet of a muscle, which the server has not computed before, to"
+    f" its answer, while two requests that read files of {ROWS} rows are being answered without a"
+    " pause."
 )
 
 
@@ -97,11 +114,18 @@ def beside_heavy_requests(address: str) -> tuple[list[float], list[float]]:
             raise RuntimeError(f"{path}: {content!r}")
         return content
 
-    rows = (f"{0.01 * k:.2f},{3 + math.sin(0.001 * k):.4f},{400 + 90 * math.cos(0.001 * k):.2f}\n" for k in range(ROWS))
+    rows = (
+        f"{0.01 * k:.2f},{3 + math.sin(0.001 * k):.4f},{400 + 90 * math.cos(0.001 * k):.2f}\n"
+        for k in range(ROWS)
+    )
     file = ("time [s],pressure [bar],force [N]\n" + "".join(rows)).encode()
     send("GET", "/api/law/dmsp-20-300")  # the first worker process has started
-    sets = [json.loads(send("POST", "/api/fit/file", file, "&name=a.csv&set="))["set"] for _ in range(2)]
-    small, heavy, running = [], [], True
+    sets = [
+        json.loads(send("POST", "/api/fit/file", file, "&name=a.csv&set="))["set"] for _ in range(2)
+    ]
+    small = []
+    heavy = []
+    running = True
 
     def read(name: str) -> None:
         while running:
@@ -131,7 +155,9 @@ def section(rounds: int = 1) -> Section:
         ("reading of a file", format_time(statistics.median(heavy)), format_time(max(heavy))),
     )
     target = Target("page: a small request while two heavy ones run", max(small), 1.0, "s")
-    return Section("Page beside two heavy requests", TEXT, ("request", "median", "maximum"), rows, (target,))
+    return Section(
+        "Page beside two heavy requests", TEXT, ("request", "median", "maximum"), rows, (target,)
+    )
 
 
 def measure_keys(address: str) -> None:
@@ -149,8 +175,14 @@ def measure_keys(address: str) -> None:
         isobars.fill(PRESSURES)
         isobars.press("Enter")
         slider = page.locator("#panel-muscle input[type=range]").first
-        print("slider, ten isobars of 1000 points:", measured(page, slider, ("ArrowRight", "ArrowLeft")))
-        print("working point:", measured(page, page.locator("#panel-muscle .chart"), ("ArrowUp", "ArrowDown")))
+        print(
+            "slider, ten isobars of 1000 points:",
+            measured(page, slider, ("ArrowRight", "ArrowLeft")),
+        )
+        print(
+            "working point:",
+            measured(page, page.locator("#panel-muscle .chart"), ("ArrowUp", "ArrowDown")),
+        )
         page.get_by_role("tab", name="Joint").click()
         page.wait_for_selector("#panel-joint[data-shown]", timeout=120_000)
         gain = page.get_by_label("proportional gain, K")

@@ -1,4 +1,6 @@
-"""Figure docs/images/animation.png: still of an animation of a joint. Run python docs/make_animation_figure.py"""
+"""Figure docs/images/animation.png: still of an animation of a joint. Run python
+docs/make_animation_figure.py
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ PICTURE = Path(__file__).with_name("images") / "animation.png"
 def main() -> None:
     """Write the figure."""
     plant = am.load("joint-dmsp-20-matrix").plant
-    valves = am.Schedule({"left.fill": ((0.2, 1.0), (0.5, 0.0)), "right.discharge": ((0.2, 1.0), (0.5, 0.0))})
+    valves = am.Schedule(
+        {"left.fill": ((0.2, 1.0), (0.5, 0.0)), "right.discharge": ((0.2, 1.0), (0.5, 0.0))}
+    )
     run = am.simulate(plant, valves, duration=1.0, initial_state=plant.state_at(pressure=2.5e5))
     save(run.animate(plant).still(0.8), PICTURE)
     print(f"wrote {PICTURE}")

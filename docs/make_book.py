@@ -1,4 +1,6 @@
-"""Documentation site in build/docs/html: ./run docs, or python docs/make_book.py with the extra docs."""
+"""Documentation site in build/docs/html: ./run docs, or python docs/make_book.py with the extra
+docs.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Figure docs/images/joint.png: reachable region of a joint of the library. Run python docs/make_joint_figure.py"""
+"""Figure docs/images/joint.png: reachable region of a joint of the library. Run python
+docs/make_joint_figure.py
+"""
 
 from __future__ import annotations
 

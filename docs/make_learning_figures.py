@@ -1,4 +1,5 @@
-"""Figures docs/images/torch.png, warp.png and onnx.png of the pages on learning stacks; they need the extra `learning`.
+"""Figures docs/images/torch.png, warp.png and onnx.png of the pages on learning stacks; they need
+the extra `learning`.
 
 Run python docs/make_learning_figures.py
 """
@@ -22,7 +23,8 @@ from airmuscle.outlets import OnnxStack, TorchStack, WarpStack, write_actuator
 from airmuscle.physics import open_plant
 
 IMAGES = Path(__file__).parent / "images"
-JOINT, LIFT = "joint-dmsp-20-itv2050", "lift-dmsp-20"
+JOINT = "joint-dmsp-20-itv2050"
+LIFT = "lift-dmsp-20"
 SPREAD = ParameterUncertainty(
     ("damper.damping", "characteristic.wall_thickness"), (40.0, 4e-5), ((1.0, 0.0), (0.0, 1.0))
 )
@@ -48,17 +50,25 @@ def module_of(path: Path) -> ModuleType:
 
 
 def draw_torch() -> None:
-    """Tension of 200 muscles with parameters drawn from a covariance, behind regulators, at a length that moves."""
+    """Tension of 200 muscles with parameters drawn from a covariance, behind regulators, at a
+    length that moves.
+    """
     import torch
 
     folder, name = written(JOINT, TorchStack(), "muscle", muscle="left", uncertainty=SPREAD)
     module = module_of(folder / f"{name}.py")
-    actuator, length = module.Muscle((200,), dtype=torch.float64), 0.9 * module.RESTING_LENGTH
+    actuator = module.Muscle((200,), dtype=torch.float64)
+    length = 0.9 * module.RESTING_LENGTH
     actuator.randomise(generator=torch.Generator().manual_seed(1))
-    state, rows, times = actuator.start(1e5, length), [], np.arange(600) * DT
+    state = actuator.start(1e5, length)
+    rows = []
+    times = np.arange(600) * DT
     for time in times:
         wave = 2.5e5 + 1.5e5 * np.sin(2 * np.pi * 3.0 * time)
-        motion = 0.02 * np.sin(2 * np.pi * 3.0 * time), 0.02 * 2 * np.pi * 3.0 * np.cos(2 * np.pi * 3.0 * time)
+        motion = (
+            0.02 * np.sin(2 * np.pi * 3.0 * time),
+            0.02 * 2 * np.pi * 3.0 * np.cos(2 * np.pi * 3.0 * time),
+        )
         output = actuator.compute(state, wave, length + motion[0], motion[1], DT)
         state = output.state
         rows.append(output.tension.numpy())
@@ -79,16 +89,22 @@ def draw_warp() -> None:
 
     folder, name = written(LIFT, WarpStack(), "muscle")
     module = module_of(folder / f"{name}_warp.py")
-    count, length = 300, 0.9 * module.RESTING_LENGTH
-    actuator, commands = module.Muscle(count, device="cpu"), np.linspace(-1.0, 1.0, count)
+    count = 300
+    length = 0.9 * module.RESTING_LENGTH
+    actuator = module.Muscle(count, device="cpu")
+    commands = np.linspace(-1.0, 1.0, count)
     actuator.start(2e5, length)
-    command, at, still = (wp.array(v, dtype=module.real) for v in (commands, np.full(count, length), np.zeros(count)))
+    command, at, still = (
+        wp.array(v, dtype=module.real) for v in (commands, np.full(count, length), np.zeros(count))
+    )
     rows = []
     for _ in range(400):
         actuator.compute(command, at, still, DT)
         rows.append(actuator.pressure.numpy().copy())
     figure, axes = new_figure(width=6.4, height=3.4)
-    image = axes.imshow(np.array(rows).T / 1e5, origin="lower", aspect="auto", extent=(0.0, 0.4, -1.0, 1.0))
+    image = axes.imshow(
+        np.array(rows).T / 1e5, origin="lower", aspect="auto", extent=(0.0, 0.4, -1.0, 1.0)
+    )
     axes.set(xlabel="time [s]", ylabel="command (discharge < 0 < fill)")
     axes.grid(visible=False)
     figure.colorbar(image, ax=axes, label="pressure [bar]")
@@ -101,20 +117,39 @@ def draw_onnx() -> None:
 
     runtime.set_default_logger_severity(3)
     folder, name = written(LIFT, OnnxStack(Double()), "muscle")
-    start, step = (runtime.InferenceSession(str(folder / f"{file}.onnx")) for file in (f"{name}_start", name))
+    start, step = (
+        runtime.InferenceSession(str(folder / f"{file}.onnx")) for file in (f"{name}_start", name)
+    )
     part = open_plant(load_scenario(LIFT).plant, (0.02,))
-    length, steps = part.resting_lengths[0] - 0.02, 400
+    length = part.resting_lengths[0] - 0.02
+    steps = 400
     (state,) = start.run(["state"], {"pressure": np.full(1, 1e5), "length": np.full(1, length)})
-    commands, rows = np.where(np.arange(steps) < 150, 0.6, np.where(np.arange(steps) < 250, 0.0, -0.5)), []
+    commands = np.where(np.arange(steps) < 150, 0.6, np.where(np.arange(steps) < 250, 0.0, -0.5))
+    rows = []
     for command in commands:
-        given = {"state": state, "command": np.full(1, command), "length": np.full(1, length), "speed": np.zeros(1)}
+        given = {
+            "state": state,
+            "command": np.full(1, command),
+            "length": np.full(1, length),
+            "speed": np.zeros(1),
+        }
         tension, state = step.run(["tension", "next_state"], {**given, "dt": np.array(DT)})
         rows.append(tension[0])
-    signal = Schedule({"fill": ((0.0, 0.6), (0.15, 0.0)), "discharge": ((0.25, 0.5),), "shortening": ((0.0, 0.02),)})
+    signal = Schedule(
+        {
+            "fill": ((0.0, 0.6), (0.15, 0.0)),
+            "discharge": ((0.25, 0.5),),
+            "shortening": ((0.0, 0.02),),
+        }
+    )
     run = simulate(
-        part, signal, duration=steps * DT, initial_state=part.state_at(pressure=1e5), output_times=DT,
+        part,
+        signal,
+        duration=steps * DT,
+        initial_state=part.state_at(pressure=1e5),
+        output_times=DT,
         integrator=RungeKutta4(DT),
-    )  # fmt: skip
+    )
     times = np.arange(steps) * DT
     at_rows = np.interp(times, run["time"], run["force"])
     figure, (above, below) = new_figure(2, width=6.4, height=4.4, sharex=True)

@@ -1,4 +1,6 @@
-"""Generator of docs/nomenclature.md from the declared parameters: python docs/make_nomenclature.py"""
+"""Generator of docs/nomenclature.md from the declared parameters: python
+docs/make_nomenclature.py
+"""
 
 from __future__ import annotations
 
@@ -56,8 +58,12 @@ ARGUMENTS = {
     "mean_setpoint": "name of the set point of the mean pressure of two muscles",
     "rate": "name of the set point of the rate of a signal",
     "setpoint_names": "names of the set points of a control law",
-    "feed_forward": "control law without measurement, whose commands are added to those of the feedback",
-    "feedback": "control law with measurement, whose commands are added to those of the feed-forward",
+    "feed_forward": (
+        "control law without measurement, whose commands are added to those of the feedback"
+    ),
+    "feedback": (
+        "control law with measurement, whose commands are added to those of the feed-forward"
+    ),
     "inverse": "static inverse of a muscle",
     "law": "law that another object contains: a control law or a force law",
     "laws": "control laws side by side",
@@ -143,7 +149,9 @@ ARGUMENTS = {
     "input": "input signal or control loop of a run",
     "integrator": "numerical integrator",
     "known": "units of the known columns",
-    "muscles": "states of all muscles of a plant; air states (pressure, temperature) of those of a circuit",
+    "muscles": (
+        "states of all muscles of a plant; air states (pressure, temperature) of those of a circuit"
+    ),
     "other_inputs": "signal of the inputs that no controller commands",
     "output_times": "sample time [s] or times [s] of the recorded rows",
     "period": "period of a signal [s]",
@@ -214,7 +222,10 @@ ARGUMENTS = {
     "times": "times of the recorded rows, or time constants [s]",
     "tables": "tables of a file",
     "source": "file, files, glob pattern or folder to read",
-    "mapping": "columns, units and constants that a file does not state, or the path of a TOML file with them",
+    "mapping": (
+        "columns, units and constants that a file does not state, or the path of a TOML file with"
+        " them"
+    ),
     "delimiter": "delimiter between the cells of a text file",
     "decimal": "decimal separator of a text file",
     "sheet": "worksheet of an Excel file",
@@ -281,7 +292,9 @@ ARGUMENTS = {
     "memory": "internal state of a driver or a controller",
     "measurement": "measured values at a sampling instant",
     "measured": "controlled variable: state or output measured by a controller",
-    "commanded": "manipulated variable: input commanded by a controller, or two inputs by SplitRange",
+    "commanded": (
+        "manipulated variable: input commanded by a controller, or two inputs by SplitRange"
+    ),
     "positive": "input for positive controller outputs",
     "negative": "input for negative controller outputs",
     "excess": "integral of the radius minus its resting value along a path [m2]",
@@ -319,8 +332,8 @@ def page() -> str:
     )
     parts.append("## Parameters of the models\n")
     parts.append(
-        "The units `u`, `y` and `u/y` of a controller depend on its loop: `u` is the unit of the commanded input, `y` "
-        "that of the measured column.\n"
+        "The units `u`, `y` and `u/y` of a controller depend on its loop: `u` is the unit of the"
+        " commanded input, `y` that of the measured column.\n"
     )
     for name in model_names():
         declared = (
@@ -330,13 +343,19 @@ def page() -> str:
         )
         if declared:
             parts.append(f"### {name}\n")
-            cells = [(f"`{p.name}`", p.unit, p.symbol, p.meaning, bounds(*p.bounds)) for p in declared]
+            cells = [
+                (f"`{p.name}`", p.unit, p.symbol, p.meaning, bounds(*p.bounds)) for p in declared
+            ]
             parts.append(table(("name", "unit", "symbol", "meaning", "allowed"), cells))
     for title, words in tomllib.loads(WORDS.read_text(encoding="utf-8")).items():
         parts.append(f"## Words of the code: {title}\n")
         parts.append(table(("word", "meaning"), list(words.items())))
     parts.append("## Arguments\n")
-    parts.append(table(("name", "meaning"), [(f"`{n}`", meaning) for n, meaning in sorted(ARGUMENTS.items())]))
+    parts.append(
+        table(
+            ("name", "meaning"), [(f"`{n}`", meaning) for n, meaning in sorted(ARGUMENTS.items())]
+        )
+    )
     return "\n".join(parts)
 
 

@@ -15,7 +15,9 @@ PICTURE = Path(__file__).with_name("images") / "sizing.png"
 def main() -> None:
     """Write the figure."""
     choice = choose(
-        am.load("dmsp-20-300"), LiftRequirement(stroke="40 mm", mass="20 kg"), SizingConditions(supply="6 bar")
+        am.load("dmsp-20-300"),
+        LiftRequirement(stroke="40 mm", mass="20 kg"),
+        SizingConditions(supply="6 bar"),
     )
     save(sizing_plot(choice).figure, PICTURE)
     print(f"wrote {PICTURE}")

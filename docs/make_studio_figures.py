@@ -1,7 +1,7 @@
 """Figures docs/images/studio-*.png: the page of `airmuscle studio` in Chromium.
 
-Run python docs/make_studio_figures.py with the packages playwright and Pillow, while a server runs, and its address as
-the argument: http://127.0.0.1:8765/
+Run python docs/make_studio_figures.py with the packages playwright and Pillow, while a server runs,
+and its address as the argument: http://127.0.0.1:8765/
 """
 
 from __future__ import annotations
@@ -37,13 +37,17 @@ def opened(browser: Any, address: str, tab: str, name: str, **options: Any) -> A
 
 
 def bench_table() -> bytes:
-    """A recording that is computed: isobars of dmsp-20-300 with friction of 12 N, noise of 2 N (both chosen)."""
+    """A recording that is computed: isobars of dmsp-20-300 with friction of 12 N, noise of 2 N
+    (both chosen).
+    """
     import numpy as np
 
     import airmuscle as am
 
-    law, noise = am.load("dmsp-20-300").characteristic, np.random.default_rng(1)
-    lines, there = ["time [s],pressure [bar],contraction [%],force [N]"], np.linspace(0.0, 0.2, 25)
+    law = am.load("dmsp-20-300").characteristic
+    noise = np.random.default_rng(1)
+    lines = ["time [s],pressure [bar],contraction [%],force [N]"]
+    there = np.linspace(0.0, 0.2, 25)
     for level in range(1, 6):
         for sign, contraction in [(1, c) for c in there] + [(-1, c) for c in there[::-1]]:
             force = float(law.force(level * 1e5, contraction)) - 6.0 * sign + noise.normal(0.0, 2.0)
@@ -65,31 +69,45 @@ def save_fit(page: Any) -> None:
     page.wait_for_selector("#panel-fit[data-task=done]", timeout=1_200_000)
     page.mouse.move(0, 0)
     page.locator("#panel-fit h2", has_text="Measured rows").scroll_into_view_if_needed()
-    page.evaluate("document.querySelector('#panel-fit .chart').scrollIntoView({ block: 'start' }); scrollBy(0, -100)")
+    page.evaluate(
+        "document.querySelector('#panel-fit .chart').scrollIntoView({ block: 'start' });"
+        " scrollBy(0, -100)"
+    )
     page.wait_for_timeout(300)
     save(page, "fit")
 
 
 def episodes() -> bytes:
-    """A computed record of a joint of two muscles of the library, 60 episodes of 0.95 s as a ZIP archive of CSV files;
-    random pressures, noise of the angle 0.03 deg (both chosen)."""
+    """A computed record of a joint of two muscles of the library, 60 episodes of 0.95 s as a ZIP
+    archive of CSV files; random pressures, noise of the angle 0.03 deg (both chosen)."""
     import numpy as np
 
     import airmuscle as am
 
-    plant, rng, rows = am.load("joint-dmsp-20-matrix").plant, np.random.default_rng(0), 0.01 * np.arange(95)
-    truth, data = am.physics.PressureDriven(plant.muscles, plant.mechanism, (0.03, 0.03)), io.BytesIO()
+    plant = am.load("joint-dmsp-20-matrix").plant
+    rng = np.random.default_rng(0)
+    rows = 0.01 * np.arange(95)
+    truth = am.physics.PressureDriven(plant.muscles, plant.mechanism, (0.03, 0.03))
+    data = io.BytesIO()
     with zipfile.ZipFile(data, "w") as archive:
         for number in range(60):
             levels = rng.uniform(1e5, 4e5, (2, 12))
-            signal = {f"{p}measured_pressure": list(zip(np.linspace(0, 0.94, 12), row, strict=True))
-                      for p, row in zip(truth.prefixes, levels, strict=True)}  # fmt: skip
+            signal = {
+                f"{p}measured_pressure": list(zip(np.linspace(0, 0.94, 12), row, strict=True))
+                for p, row in zip(truth.prefixes, levels, strict=True)
+            }
             start = dict.fromkeys((s.name for s in truth.states), 0.0)
-            start |= {f"{p}pressure": level for p, level in zip(truth.prefixes, levels[:, 0], strict=True)}
+            start |= {
+                f"{p}pressure": level for p, level in zip(truth.prefixes, levels[:, 0], strict=True)
+            }
             run = am.simulate(
-                truth, am.SampledSignal(signal), duration=0.95, initial_state=start, output_times=rows,
+                truth,
+                am.SampledSignal(signal),
+                duration=0.95,
+                initial_state=start,
+                output_times=rows,
                 integrator=am.RungeKutta4(1e-3),
-            )  # fmt: skip
+            )
             at = np.searchsorted(run["time"], rows - 1e-9)
             angle = np.degrees(run["angle"][at]) + 0.03 * rng.standard_normal(95)
             columns = (angle, *(run[name][at] / 1e3 for name in signal))
@@ -116,9 +134,13 @@ def main(address: str) -> None:
 
     wide = {"viewport": {"width": 1200, "height": 800}}
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        browser = playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox"]
+        )
         page = opened(browser, address, "Muscle", "dmsp-20-300", **wide)
-        page.evaluate("document.querySelector('#panel-muscle select').value = 'sarosi-dmsp-20-400n'")
+        page.evaluate(
+            "document.querySelector('#panel-muscle select').value = 'sarosi-dmsp-20-400n'"
+        )
         page.get_by_role("button", name="Compare").click()
         page.wait_for_selector('#panel-muscle[data-shown="dmsp-20-300 sarosi-dmsp-20-400n"]')
         page.get_by_role("button", name="dmsp-20-300", exact=True).click()
@@ -133,7 +155,9 @@ def main(address: str) -> None:
         page.locator("#panel-plant").get_by_label("Instant of the run").fill("400")
         page.wait_for_timeout(300)
         save(page, "plant")
-        page = opened(browser, address, "Plant", "lift-dmsp-20", viewport={"width": 390, "height": 800})
+        page = opened(
+            browser, address, "Plant", "lift-dmsp-20", viewport={"width": 390, "height": 800}
+        )
         page.locator("#panel-plant").get_by_label("Instant of the run").fill("300")
         page.wait_for_timeout(300)
         save(page, "phone")
@@ -153,7 +177,9 @@ def draw_joint_and_sizing(browser: Any, address: str) -> None:
         page.wait_for_timeout(50)
     save(page, "joint")
     wide = {"viewport": {"width": 1280, "height": 1290}}
-    page = opened(browser, address, "Size", "20 kg (196.1 N) over 40 mm, air", color_scheme="dark", **wide)
+    page = opened(
+        browser, address, "Size", "20 kg (196.1 N) over 40 mm, air", color_scheme="dark", **wide
+    )
     page.locator("#panel-size .choices button").nth(1).click()
     page.wait_for_timeout(1000)
     save(page, "size")

@@ -1,4 +1,6 @@
-"""Figure docs/images/valves.png: flow laws and equivalent valves in series. Run python docs/make_valves_figure.py"""
+"""Figure docs/images/valves.png: flow laws and equivalent valves in series. Run python
+docs/make_valves_figure.py
+"""
 
 from __future__ import annotations
 
@@ -23,38 +25,59 @@ def flow(law: Orifice, upstream: Any, downstream: Any) -> Any:
 
 
 def exact_series_flow(first: Valve, second: Valve, downstream: float) -> float:
-    """Mass flow through two valves in series [kg/s], with the pressure between them from a root finder."""
-    middle = brentq(lambda p: flow(first, UPSTREAM, p) - flow(second, p, downstream), downstream, UPSTREAM)
+    """Mass flow through two valves in series [kg/s], with the pressure between them from a root
+    finder.
+    """
+    middle = brentq(
+        lambda p: flow(first, UPSTREAM, p) - flow(second, p, downstream), downstream, UPSTREAM
+    )
     return float(flow(first, UPSTREAM, middle))
 
 
 def draw_laws(axes: Any) -> None:
-    """Plot the fraction of the choked flow over the pressure ratio; the flow is reversed above 1."""
+    """Plot the fraction of the choked flow over the pressure ratio; the flow is reversed above
+    1.
+    """
     laws: dict[str, Orifice] = {
         "b = 0": Valve(1e-8, 0.0),
         "b = 0.3": Valve(1e-8, 0.3),
         "b = 0.3, m = 0.7": SubsonicIndexValve(1e-8, 0.3, 0.7),
         "b = 0.3, cracking pressure 0.7 bar": SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3),
-        "the same with check valve": CheckValve(SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3)),
+        "the same with check valve": CheckValve(
+            SubsonicIndexValve(1e-8, 0.3, cracking_pressure=70e3)
+        ),
     }
     choked = 1e-8 * REFERENCE_DENSITY * UPSTREAM
     for i, (label, law) in enumerate(laws.items()):
         fraction = flow(law, UPSTREAM, RATIO * UPSTREAM) / choked
         axes.plot(RATIO, fraction, color=LINES[i], linestyle=DASHES[i], label=label)
     axes.set(
-        xlabel="pressure ratio downstream/upstream", ylabel="fraction of the choked flow", title="flow laws, 7 bar"
+        xlabel="pressure ratio downstream/upstream",
+        ylabel="fraction of the choked flow",
+        title="flow laws, 7 bar",
     )
     axes.legend(loc="lower left")
 
 
 def draw_series(axes: Any) -> None:
-    """Plot the flow through two valves in both orders: equivalent valve (lines) and exact flow (markers)."""
-    wide, narrow = Valve(2e-8, 0.2), Valve(1e-8, 0.5)
+    """Plot the flow through two valves in both orders: equivalent valve (lines) and exact flow
+    (markers).
+    """
+    wide = Valve(2e-8, 0.2)
+    narrow = Valve(1e-8, 0.5)
     ratios = np.linspace(0.02, 0.995, 26)
-    for i, (label, pair) in enumerate({"narrow first": (narrow, wide), "wide first": (wide, narrow)}.items()):
+    for i, (label, pair) in enumerate(
+        {"narrow first": (narrow, wide), "wide first": (wide, narrow)}.items()
+    ):
         equivalent = in_series(*pair)
         line = flow(equivalent, UPSTREAM, RATIO[RATIO <= 1] * UPSTREAM)
-        axes.plot(RATIO[RATIO <= 1], line * 1e3, color=LINES[i], linestyle=DASHES[i], label=f"{label}, equivalent")
+        axes.plot(
+            RATIO[RATIO <= 1],
+            line * 1e3,
+            color=LINES[i],
+            linestyle=DASHES[i],
+            label=f"{label}, equivalent",
+        )
         exact = [exact_series_flow(*pair, r * UPSTREAM) * 1e3 for r in ratios]
         axes.plot(ratios, exact, "o", color=LINES[i], markersize=3, label=f"{label}, exact")
     axes.set(xlabel="pressure ratio downstream/upstream", ylabel="mass flow [g/s]")

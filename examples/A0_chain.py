@@ -17,7 +17,9 @@ braid = am.geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)
 muscle = am.Muscle(result.model, braid, damper=am.LinearDamper(200.0))
 valve = am.Valve(conductance=2.6167e-9, critical_ratio=0.433)
 plant = am.Plant(muscle, am.FillDischarge(am.Supply(5.5 * bar), valve, valve), am.HangingMass(10.0))
-run = am.simulate(plant, am.Schedule({"fill": ((1, 1), (4, 0)), "discharge": ((5, 1),)}), duration=8.0)
+run = am.simulate(
+    plant, am.Schedule({"fill": ((1, 1), (4, 0)), "discharge": ((5, 1),)}), duration=8.0
+)
 print(f"stroke with 10 kg: {run['position'].max() * 1e3:.1f} mm")
 print(*run.notes, sep="\n")
 print(*am.cite(plant), sep="\n")
@@ -32,11 +34,15 @@ for i, pressure in enumerate((600, 450, 312.5, 180)):
         color=plotting.LINES[i],
         label=f"{pressure:g}",
     )
-    left.plot(bench["contraction"][level] * 100, bench["force"][level], "o", color=plotting.LINES[i])
+    left.plot(
+        bench["contraction"][level] * 100, bench["force"][level], "o", color=plotting.LINES[i]
+    )
 left.set(xlabel="contraction [%]", ylabel="force [N]", title="measured points and fitted surface")
 left.legend(title="kPa gauge")
 right.plot(run["time"], run["pressure"] / kPa, color=plotting.LINES[0])
-right.set(xlabel="time [s]", ylabel="pressure [kPa gauge]", title="simulated filling and discharge, 10 kg")
+right.set(
+    xlabel="time [s]", ylabel="pressure [kPa gauge]", title="simulated filling and discharge, 10 kg"
+)
 right.yaxis.label.set_color(plotting.LINES[0])
 position = right.twinx()
 position.plot(run["time"], run["position"] * 1e3, color=plotting.LINES[1], linestyle="--")

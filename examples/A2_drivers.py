@@ -1,4 +1,5 @@
-"""Solenoid valve with pulse-width modulation: command, coil current and opening; mean opening over the duty ratio.
+"""Solenoid valve with pulse-width modulation: command, coil current and opening; mean opening over
+the duty ratio.
 
 python examples/A2_drivers.py        writes drivers.png to the working directory
 """
@@ -10,7 +11,9 @@ from airmuscle.core import plotting
 from airmuscle.engine import PWM, SolenoidDriver, WithDrivers
 from airmuscle.units import ms
 
-VALVE = SolenoidDriver(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen
+VALVE = SolenoidDriver(
+    opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms
+)  # chosen
 
 
 def sample_input(command, duration, rows=4000):
@@ -35,18 +38,26 @@ signal = am.SampledSignal({"fill": ((0.0, 0.05), (0.4, 0.6))})
 pwm = PWM(frequency=25.0, smallest_pulse=3 * ms)
 for command, style in (
     (signal, {"color": plotting.BLACK, "linestyle": "--", "label": "command"}),
-    (WithDrivers(signal, {"fill": pwm}), {"color": plotting.LINES[4], "linewidth": 0.9, "label": "coil current"}),
+    (
+        WithDrivers(signal, {"fill": pwm}),
+        {"color": plotting.LINES[4], "linewidth": 0.9, "label": "coil current"},
+    ),
     (WithDrivers(signal, {"fill": (pwm, VALVE)}), {"color": plotting.LINES[0], "label": "opening"}),
 ):
     times, values = sample_input(command, 0.4)
     left.plot(times / ms, values, **style)
-left.set(xlabel="time [ms]", ylabel="command, current, opening", title="PWM at 25 Hz, minimum pulse 3 ms")
+left.set(
+    xlabel="time [ms]", ylabel="command, current, opening", title="PWM at 25 Hz, minimum pulse 3 ms"
+)
 left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
 
 duties = np.linspace(0.0, 1.0, 201)
 for i, frequency in enumerate((5.0, 25.0, 50.0, 100.0)):
     right.plot(
-        duties, [mean_opening(d, PWM(frequency)) for d in duties], color=plotting.LINES[i], label=f"{frequency:g} Hz"
+        duties,
+        [mean_opening(d, PWM(frequency)) for d in duties],
+        color=plotting.LINES[i],
+        label=f"{frequency:g} Hz",
     )
 right.plot((0, 1), (0, 1), color=plotting.BLACK, linewidth=0.6)
 right.set(xlabel="duty ratio", ylabel="mean opening", title="mean opening over duty ratio")

@@ -1,9 +1,10 @@
-"""Position control of a load: PID with a proportional valve, and on/off control with two small solenoid valves.
+"""Position control of a load: PID with a proportional valve, and on/off control with two small
+solenoid valves.
 
 python examples/A4_control.py        writes control.png to the working directory
 
-The muscle is the DMSP-20-300 of Martens and Boblan; load, size and dynamics of the small valves, gains and sample times
-are chosen.
+The muscle is the DMSP-20-300 of Martens and Boblan; load, size and dynamics of the small valves,
+gains and sample times are chosen.
 """
 
 from dataclasses import replace
@@ -22,7 +23,9 @@ setpoint = am.Schedule({"position": ((0, 10 * mm), (2, 30 * mm), (4, 20 * mm))})
 proportional_valve = ProportionalValve(
     am.Supply(6 * bar), edge, edge, SecondOrderLag(frequency=80.0, damping_ratio=0.7)
 )
-pid = PID("position", "command", gain=60.0, integral_time=1.0, derivative_time=0.05, setpoint_weight=0.8)
+pid = PID(
+    "position", "command", gain=60.0, integral_time=1.0, derivative_time=0.05, setpoint_weight=0.8
+)
 pid_loop = ControlLoop(pid, sample_time=2 * ms, setpoint=setpoint)
 
 small_valve = am.Valve(conductance=3e-10, critical_ratio=0.433)
@@ -47,9 +50,20 @@ for i, (name, circuit, loop) in enumerate(cases):
     print(f"{name}: maximum error {error / mm:.2f} mm in the last second")
     left.plot(run["time"], run["position"] / mm, color=plotting.LINES[i], label=name)
     column = "command.command" if i == 0 else "command.fill"
-    right.plot(run["time"], run[column], color=plotting.LINES[i], drawstyle="steps-post", linewidth=0.9 if i else 1.4)
+    right.plot(
+        run["time"],
+        run[column],
+        color=plotting.LINES[i],
+        drawstyle="steps-post",
+        linewidth=0.9 if i else 1.4,
+    )
 left.plot(
-    run["time"], run["setpoint.position"] / mm, color=plotting.BLACK, linestyle="--", linewidth=0.9, label="setpoint"
+    run["time"],
+    run["setpoint.position"] / mm,
+    color=plotting.BLACK,
+    linestyle="--",
+    linewidth=0.9,
+    label="setpoint",
 )
 left.set_ylabel("position [mm]")
 right.set(xlabel="time [s]", ylabel="command")

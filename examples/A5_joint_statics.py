@@ -1,8 +1,11 @@
-"""Static inverse of a joint: pressures for a wanted angle and stiffness, applied by two pressure regulators.
+"""Static inverse of a joint: pressures for a wanted angle and stiffness, applied by two pressure
+regulators.
 
-python examples/A5_joint_statics.py        prints the pressures, and the angle and stiffness that the joint reaches
+python examples/A5_joint_statics.py        prints the pressures, and the angle and stiffness that
+the joint reaches
 
-The joint is a plant of the library; its dimensions are chosen, and so are the wanted angles and stiffnesses.
+The joint is a plant of the library; its dimensions are chosen, and so are the wanted angles and
+stiffnesses.
 """
 
 import numpy as np
@@ -14,14 +17,16 @@ from airmuscle.units import bar, degree
 plant = am.load("joint-dmsp-20-regulators").plant
 statics = joint_statics(plant)
 
-angles, stiffnesses = np.array([0.0, 15.0, 15.0, -15.0]) * degree, np.array([30.0, 30.0, 45.0, 45.0])
+angles = np.array([0.0, 15.0, 15.0, -15.0]) * degree
+stiffnesses = np.array([30.0, 30.0, 45.0, 45.0])
 points = statics.check_reachable(angles, stiffnesses)
 low, high = statics.stiffness_limits(angles)
 for i, angle in enumerate(angles):
     left, right = points.pressures[i, 0] / bar
     print(
-        f"{angle / degree:5.1f} degrees, {stiffnesses[i]:.0f} of {low[i]:.0f} to {high[i]:.0f} N m/rad: "
-        f"{left:.2f} and {right:.2f} bar, {points.shut_valves[i, 0]:.0f} N m/rad with closed valves"
+        f"{angle / degree:5.1f} degrees, {stiffnesses[i]:.0f} of {low[i]:.0f} to {high[i]:.0f} N"
+        f" m/rad: {left:.2f} and {right:.2f} bar, {points.shut_valves[i, 0]:.0f} N m/rad with"
+        " closed valves"
     )
 
 hold = 2.0
@@ -37,6 +42,7 @@ for time, angle in zip(times, angles, strict=True):
     row = int(np.searchsorted(run["time"], time + 0.99 * hold))
     found = round(run["angle"][row] / degree, 2) + 0.0  # without a negative zero
     print(
-        f"at {time + 0.99 * hold:.2f} s: {found:.2f} degrees (wanted {angle / degree:.0f}), "
-        f"stiffness {reached['stiffness'][row]:.1f} N m/rad, co-contraction {reached['cocontraction'][row]:.1f} N m"
+        f"at {time + 0.99 * hold:.2f} s: {found:.2f} degrees (wanted {angle / degree:.0f}),"
+        f" stiffness {reached['stiffness'][row]:.1f} N m/rad, co-contraction"
+        f" {reached['cocontraction'][row]:.1f} N m"
     )

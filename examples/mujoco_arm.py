@@ -1,6 +1,8 @@
-"""An arm with six pneumatic muscles in MuJoCo: muscles and valves are an engine plugin, MuJoCo carries the arm.
+"""An arm with six pneumatic muscles in MuJoCo: muscles and valves are an engine plugin, MuJoCo
+carries the arm.
 
-Needs mujoco>=3.17 (not 4.0.0) and a C compiler. The arm is that of mujoco_arm.xml; valves and commands are chosen.
+Needs mujoco>=3.17 (not 4.0.0) and a C compiler. The arm is that of mujoco_arm.xml; valves and
+commands are chosen.
 """
 
 import sys
@@ -35,9 +37,14 @@ with tempfile.TemporaryDirectory() as folder:
             data.actuator(name).ctrl = opening if 1000 <= step < 1500 else 0.0
         mujoco.mj_step(model, data)
         if step % 500 == 499:
-            shoulder, elbow = (57.29578 * float(data.joint(name).qpos[0]) for name in ("shoulder", "elbow"))
+            shoulder, elbow = (
+                57.29578 * float(data.joint(name).qpos[0]) for name in ("shoulder", "elbow")
+            )
             tensions = " ".join(f"{-force:4.0f}" for force in data.actuator_force)
-            print(f"{data.time:.1f} s: shoulder {shoulder:5.1f} deg, elbow {elbow:5.1f} deg, tensions {tensions} N")
+            print(
+                f"{data.time:.1f} s: shoulder {shoulder:5.1f} deg, elbow {elbow:5.1f} deg, tensions"
+                f" {tensions} N"
+            )
     picture = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     if picture:
         import matplotlib.image

@@ -1,4 +1,6 @@
-"""A user's contender of the control benchmark with the joint and the short task on which tests try it."""
+"""A user's contender of the control benchmark with the joint and the short task on which tests try
+it.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,11 @@ class AngleLaw(ControlLaw):
     initial_memory: ClassVar = {}
 
     def step(self, memory, measurement, dt):
-        return {"difference": self.gain * (measurement.setpoints["angle"] - measurement.columns["angle"])}, {}
+        return {
+            "difference": (
+                self.gain * (measurement.setpoints["angle"] - measurement.columns["angle"])
+            )
+        }, {}
 
 
 MINE = Contender("mine", AngleLaw(2e5), {"gain": (1e5, 5e5)})

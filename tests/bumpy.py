@@ -11,7 +11,9 @@ from airmuscle.physics import Coordinate, Mechanism
 
 @model
 class Bumpy(Mechanism):
-    """x'' = (x - middle)^2 - half^2, whatever the muscle does: two rests, 2 half apart, the first stable."""
+    """x'' = (x - middle)^2 - half^2, whatever the muscle does: two rests, 2 half apart, the first
+    stable.
+    """
 
     middle: float = parameter("m", "a", "place between the two")
     half: float = parameter("m", "d", "half of their distance")
@@ -24,6 +26,10 @@ class Bumpy(Mechanism):
         return tuple(q["position"] / length for length in resting_lengths)
 
     def acceleration(
-        self, q: Mapping[str, Any], v: Mapping[str, Any], pulls: Mapping[str, Any], inputs: Mapping[str, Any]
+        self,
+        q: Mapping[str, Any],
+        v: Mapping[str, Any],
+        pulls: Mapping[str, Any],
+        inputs: Mapping[str, Any],
     ) -> Mapping[str, Any]:
         return {"position": (q["position"] - self.middle) ** 2 - self.half**2}

@@ -1,4 +1,6 @@
-"""A controller that calls another one, and is therefore no control law: for runs that call it at each sample."""
+"""A controller that calls another one, and is therefore no control law: for runs that call it at
+each sample.
+"""
 
 from __future__ import annotations
 

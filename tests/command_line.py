@@ -13,13 +13,19 @@ from airmuscle.outlets.cli import app
 
 
 def airmuscle(*arguments: object, width: int = 160, **options: Any) -> Result:
-    """`airmuscle ARGUMENTS` in a terminal of this width; options are those of `CliRunner.invoke`, such as `input`.
+    """`airmuscle ARGUMENTS` in a terminal of this width; options are those of `CliRunner.invoke`,
+    such as `input`.
 
-    The keys of an answer in JSON are those that the documentation lists; `fit-live` prints a line for each step.
+    The keys of an answer in JSON are those that the documentation lists; `fit-live` prints a line
+    for each step.
     """
     environment = {"COLUMNS": str(width), **options.pop("env", {})}
-    result = CliRunner().invoke(app, [str(argument) for argument in arguments], env=environment, **options)
-    chapters = "--json" in arguments and arguments[0] != "fit-live" and result.stdout.startswith("{")
+    result = CliRunner().invoke(
+        app, [str(argument) for argument in arguments], env=environment, **options
+    )
+    chapters = (
+        "--json" in arguments and arguments[0] != "fit-live" and result.stdout.startswith("{")
+    )
     if chapters and result.exit_code == 0:
         missing = undocumented(json.loads(result.stdout))
         assert not missing, f"docs/json-keys.md lacks {missing}"

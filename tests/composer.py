@@ -1,9 +1,10 @@
-"""Plants composed at random from the declarations of the models: the registry of models, annotations and bounds.
+"""Plants composed at random from the declarations of the models: the registry of models,
+annotations and bounds.
 
-The instances that stand in the plants of tests/plants.py are the stock. A component is an instance from the stock with
-its parameters drawn anew within their declared bounds and its structural fields exchanged for other components whose
-class conforms to the annotation of the field. A model that is added by its recipe is therefore composed without a
-change here. All distributions are chosen.
+The instances that stand in the plants of tests/plants.py are the stock. A component is an instance
+from the stock with its parameters drawn anew within their declared bounds and its structural fields
+exchanged for other components whose class conforms to the annotation of the field. A model that is
+added by its recipe is therefore composed without a change here. All distributions are chosen.
 """
 
 from __future__ import annotations
@@ -21,7 +22,17 @@ from airmuscle.engine import SampledSignal, Schedule
 from airmuscle.engine.loop.inputs import CombinedSignal
 from airmuscle.errors import AirmuscleError
 from airmuscle.files.library import model_names
-from airmuscle.physics import AirSource, Ambient, Circuit, ExternalLoad, Gas, Mechanism, Muscle, Plant, SharedSupply
+from airmuscle.physics import (
+    AirSource,
+    Ambient,
+    Circuit,
+    ExternalLoad,
+    Gas,
+    Mechanism,
+    Muscle,
+    Plant,
+    SharedSupply,
+)
 from airmuscle.physics.mechanism import SHORTENING, SHORTENING_SPEED
 
 ATTEMPTS = 40
@@ -76,10 +87,16 @@ class Composer:
         """A plant of one to three muscles; an AirmuscleError is a refusal."""
         mechanism = self.component(Mechanism)
         count = mechanism.muscle_count or int(self.rng.choice([1, 1, 1, 2, 2, 3]))
-        muscles = tuple(dataclasses.replace(self.component(Muscle), name=f"muscle{k}") for k in range(count))
+        muscles = tuple(
+            dataclasses.replace(self.component(Muscle), name=f"muscle{k}") for k in range(count)
+        )
         circuit = self._circuits(count)
         return Plant(
-            muscles if count > 1 else muscles[0], circuit, mechanism, self.component(Gas), self.component(Ambient)
+            muscles if count > 1 else muscles[0],
+            circuit,
+            mechanism,
+            self.component(Gas),
+            self.component(Ambient),
         )
 
     def _circuits(self, count):
@@ -93,7 +110,9 @@ class Composer:
         return tuple(self._with_one_port() for _ in range(count))
 
     def _with_one_port(self):
-        return next(c for c in (self.component(Circuit) for _ in range(ATTEMPTS)) if c.port_count == 1)
+        return next(
+            c for c in (self.component(Circuit) for _ in range(ATTEMPTS)) if c.port_count == 1
+        )
 
     def component(self, kind):
         """An instance of one of the classes that conform to an annotation."""
@@ -104,7 +123,9 @@ class Composer:
         return self._attempted(lambda: self.varied(self.one_of(STOCK[self.one_of(classes)])))
 
     def _attempted(self, compose):
-        """What `compose` returns; where the package refuses it, another attempt, and in the end the refusal."""
+        """What `compose` returns; where the package refuses it, another attempt, and in the end the
+        refusal.
+        """
         for _ in range(ATTEMPTS):
             try:
                 return compose()
@@ -114,7 +135,8 @@ class Composer:
 
     def varied(self, model):
         """A model of the same class with parameters and components of its own."""
-        declared, hints = {p.name: p for p in parameters(model)}, type_hints(type(model))
+        declared = {p.name: p for p in parameters(model)}
+        hints = type_hints(type(model))
         changes = {}
         for field in dataclasses.fields(model):
             value = getattr(model, field.name)
@@ -130,7 +152,9 @@ class Composer:
         return self._number(declared.bounds, value)
 
     def _number(self, bounds, value):
-        """A number within the bounds: mostly near the value of the stock, sometimes far from it, at times a bound."""
+        """A number within the bounds: mostly near the value of the stock, sometimes far from it, at
+        times a bound.
+        """
         low, high = bounds
         kind = self.rng.random()
         if kind < 0.3:
@@ -140,7 +164,13 @@ class Composer:
             drawn = low if self.chance(0.5) else min(high, max(abs(value) * WIDEST, low))
         elif kind > 0.94:
             drawn = value * WIDEST ** self.rng.uniform(-1, 1)
-        elif kind > 0.9 and math.isfinite(low) and math.isfinite(high) and abs(value) <= 1.0 and high - low <= 2.0:
+        elif (
+            kind > 0.9
+            and math.isfinite(low)
+            and math.isfinite(high)
+            and abs(value) <= 1.0
+            and high - low <= 2.0
+        ):
             drawn = self.rng.uniform(low, high)
         return float(min(max(drawn, low), high))
 
@@ -151,7 +181,11 @@ class Composer:
             return self._branches(typing.get_args(hint)[0], value)
         if not dataclasses.is_dataclass(value):
             return value
-        kinds = [k for k in (typing.get_args(hint) or (hint,)) if isinstance(k, type) and conforms(value, k)]
+        kinds = [
+            k
+            for k in typing.get_args(hint) or (hint,)
+            if isinstance(k, type) and conforms(value, k)
+        ]
         if isinstance(value, SharedSupply) or (self._in_manifold and isinstance(value, AirSource)):
             return self.component(AirSource)
         if kinds and self.chance(0.6):
@@ -160,32 +194,50 @@ class Composer:
 
     def _branches(self, kind, branches):
         """As many components; the circuits of a manifold all have its supply."""
-        outer, self._in_manifold = self._in_manifold, issubclass(kind, Circuit)
+        outer = self._in_manifold
+        self._in_manifold = issubclass(kind, Circuit)
         try:
             return tuple(self.component(kind) for _ in branches)
         finally:
             self._in_manifold = outer
 
     def command(self, plant, duration):
-        """A schedule of levels within the ranges of the inputs, at random instants; shortenings are moved."""
+        """A schedule of levels within the ranges of the inputs, at random instants; shortenings are
+        moved.
+        """
         changes = {}
         for given in plant.input_variables:
-            low, high = (min(max(b, -HIGHEST_COMMAND), HIGHEST_COMMAND) for b in (given.minimum, given.maximum))
+            low, high = (
+                min(max(b, -HIGHEST_COMMAND), HIGHEST_COMMAND)
+                for b in (given.minimum, given.maximum)
+            )
             if given.unit not in ("1", "Pa") and high == HIGHEST_COMMAND:
-                low, high = -5.0, 5.0
+                low = -5.0
+                high = 5.0
             if given.name.endswith(SHORTENING):
-                low, high = 0.0, LARGEST_SHORTENING
+                low = 0.0
+                high = LARGEST_SHORTENING
             instants = np.cumsum(self.rng.uniform(0.02, duration / 5, 5))
             levels = self.rng.uniform(low, high, 5)
-            levels = np.round(levels) if high <= 1.0 and given.unit != "m" and self.chance(0.7) else levels
+            levels = (
+                np.round(levels)
+                if high <= 1.0 and given.unit != "m" and self.chance(0.7)
+                else levels
+            )
             changes[given.name] = tuple(zip(instants.tolist(), levels.tolist(), strict=True))
-        open_ports = [model for model in models_in(plant.mechanism) if isinstance(model, ExternalLoad)]
+        open_ports = [
+            model for model in models_in(plant.mechanism) if isinstance(model, ExternalLoad)
+        ]
         return _moved(changes, open_ports[0].shortenings) if open_ports else Schedule(changes)
 
     def state(self, plant):
-        """An initial state at a random pressure, its coordinates drawn anew until every muscle is within its range."""
+        """An initial state at a random pressure, its coordinates drawn anew until every muscle is
+        within its range.
+        """
         for _ in range(ATTEMPTS):
-            coordinates = {c.name: c.nominal * self.rng.uniform(-1, 3) for c in plant.mechanism.coordinates}
+            coordinates = {
+                c.name: c.nominal * self.rng.uniform(-1, 3) for c in plant.mechanism.coordinates
+            }
             at_rest = coordinates | {c.speed: 0.0 for c in plant.mechanism.coordinates}
             contractions = plant.mechanism.contractions(at_rest, plant.resting_lengths)
             ranges = [m.geometry.contraction_range for m in plant.muscles]
@@ -196,16 +248,23 @@ class Composer:
     def pressure(self, plant):
         """An initial gauge pressure [Pa], sometimes below absolute vacuum."""
         vacuum = plant.ambient.pressure
-        return float(self.one_of((0.0, self.rng.uniform(-1.02 * vacuum, 0.0), self.rng.uniform(0.0, 4e5))))
+        return float(
+            self.one_of((0.0, self.rng.uniform(-1.02 * vacuum, 0.0), self.rng.uniform(0.0, 4e5)))
+        )
 
 
 def _moved(changes, start):
-    """The signal of a schedule in which the shortenings of an open plant are linear in pieces from those at the start,
-    and their speeds the derivatives."""
-    place, held = {}, dict(changes)
-    for name, first in zip([name for name in changes if name.endswith(SHORTENING)], start, strict=True):
+    """The signal of a schedule in which the shortenings of an open plant are linear in pieces from
+    those at the start, and their speeds the derivatives."""
+    place = {}
+    held = dict(changes)
+    for name, first in zip(
+        [name for name in changes if name.endswith(SHORTENING)], start, strict=True
+    ):
         instants, levels = zip((0.0, first), *held.pop(name), strict=True)
         speeds = np.append(np.diff(levels) / np.diff(instants), 0.0)
         place[name] = tuple(zip(instants, levels, strict=True))
-        held[name.removesuffix(SHORTENING) + SHORTENING_SPEED] = tuple(zip(instants, speeds.tolist(), strict=True))
+        held[name.removesuffix(SHORTENING) + SHORTENING_SPEED] = tuple(
+            zip(instants, speeds.tolist(), strict=True)
+        )
     return CombinedSignal(SampledSignal(place), Schedule(held))

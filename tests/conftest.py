@@ -1,14 +1,16 @@
-"""Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
+"""Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn
+once.
 
-Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
-thorough` draws 300 examples in place of 10. A figure with the kinds of curves and areas alone that were drawn before
-gets the files of one of those, except in tests with the marker `drawn`, which look at the files; its image has a low
-resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
-tests of several processes state their number, and linear algebra uses one thread. A kernel that is missing in the cache
-is compiled by one worker, while others wait for it. Objects that exist after the collection of tests are no longer
-searched by the garbage collector. The configuration file of the user is not read. Where Python must not write bytecode
-beside the sources, that of the tests, whose assertions pytest rewrites, and of the processes that they start is stored
-in the cache folder of pytest.
+Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored.
+`--hypothesis-profile thorough` draws 300 examples in place of 10. A figure with the kinds of curves
+and areas alone that were drawn before gets the files of one of those, except in tests with the
+marker `drawn`, which look at the files; its image has a low resolution. A command that is called
+within a test uses one process, because the tests themselves run on all cores; tests of several
+processes state their number, and linear algebra uses one thread. A kernel that is missing in the
+cache is compiled by one worker, while others wait for it. Objects that exist after the collection
+of tests are no longer searched by the garbage collector. The configuration file of the user is not
+read. Where Python must not write bytecode beside the sources, that of the tests, whose assertions
+pytest rewrites, and of the processes that they start is stored in the cache folder of pytest.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"  # read by the first import of NumPy
+os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = (
+    "1"  # read by the first import of NumPy
+)
 
 import pytest
 from hypothesis import settings
@@ -47,7 +51,9 @@ os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
 
 
 def link_installed_bytecode(folder: Path) -> None:
-    """The bytecode of Python and of the packages, which is stored beside them, in a folder for that of all."""
+    """The bytecode of Python and of the packages, which is stored beside them, in a folder for that
+    of all.
+    """
     for path in {sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")}:
         for compiled in Path(path).rglob(f"__pycache__/*.{sys.implementation.cache_tag}.pyc"):
             link = folder.joinpath(*compiled.parts[1:-2], compiled.name)
@@ -70,10 +76,13 @@ processes.available_cores = lambda: 1
 
 
 class OneOfAKind:
-    """`plotting.rendered`, which draws a figure if it has something of a kind that was not drawn before."""
+    """`plotting.rendered`, which draws a figure if it has something of a kind that was not drawn
+    before.
+    """
 
     def __init__(self) -> None:
-        self.draw, self.draws_all = plotting.rendered, False
+        self.draw = plotting.rendered
+        self.draws_all = False
         self.drawn: dict[str, set[Any]] = {}
         self.files: dict[str, dict[str, bytes]] = {}
 
@@ -90,13 +99,19 @@ class OneOfAKind:
 
 
 def kinds_of(figure: Any) -> set[Any]:
-    """Its curves, areas and texts, each with the scales of its axes, and the titles and labels with a formula."""
+    """Its curves, areas and texts, each with the scales of its axes, and the titles and labels with
+    a formula.
+    """
     return {
         (kind, axes.get_xscale(), axes.get_yscale())
         for axes in figure.axes
         for kind in (
             *(type(child).__name__ for child in axes.get_children()),
-            *(text for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) if "$" in text),
+            *(
+                text
+                for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel())
+                if "$" in text
+            ),
         )
     }
 
@@ -106,7 +121,9 @@ plotting.rendered = ONE_OF_A_KIND
 
 
 def built_once(numba_kernel: Any, kinds: Sequence[str]) -> bytes:
-    """`jit.build`, which one worker at a time enters for a kernel; the others then find what it has stored."""
+    """`jit.build`, which one worker at a time enters for a kernel; the others then find what it has
+    stored.
+    """
     name = numba_kernel.py_func.__name__
     LOCKS.mkdir(parents=True, exist_ok=True)
     with open(LOCKS / name, "w") as file:  # closing it releases the lock
@@ -120,7 +137,9 @@ if fcntl and "PYTEST_XDIST_WORKER" in os.environ:
 
 
 def pytest_collection_finish() -> None:
-    """Modules, tests and fixtures remain until the end; fewer searches among the young suffice for what tests leave."""
+    """Modules, tests and fixtures remain until the end; fewer searches among the young suffice for
+    what tests leave.
+    """
     gc.collect()
     gc.freeze()
     gc.set_threshold(10_000, 10, 10)

@@ -1,4 +1,6 @@
-"""Files of dynamic identification that several tests use: a muscle between two valves, its runs, and noisy records."""
+"""Files of dynamic identification that several tests use: a muscle between two valves, its runs,
+and noisy records.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +29,17 @@ free = [{VALVES}, "gas.exponent"]
 
 
 def plant_table(
-    mechanism: str, *, exponent: float, conductance: float, damping: float | None = None, supply: float = 5
+    mechanism: str,
+    *,
+    exponent: float,
+    conductance: float,
+    damping: float | None = None,
+    supply: float = 5,
 ) -> str:
     """The table of a plant with two valves of one conductance [m3/(s Pa)] at a supply [bar]."""
-    damper = "" if damping is None else f'damper = {{ model = "LinearDamper", damping = {damping} }}\n'
+    damper = (
+        "" if damping is None else f'damper = {{ model = "LinearDamper", damping = {damping} }}\n'
+    )
     return f"""
 [plant]
 gas = {{ model = "Polytropic", exponent = {exponent} }}
@@ -48,13 +57,23 @@ discharge = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.
 
 def run_table(pressure: str) -> str:
     """The table of a run of 2 s from a pressure."""
-    return f'[run]\nduration = "2 s"\noutput_times = "10 ms"\ninitial_state = {{ pressure = "{pressure}" }}\n'
+    return (
+        '[run]\nduration = "2 s"\noutput_times = "10 ms"\ninitial_state = { pressure ='
+        f' "{pressure}" }}\n'
+    )
 
 
-def noisy_run(scenario: Path, rng: np.random.Generator, deviations: Mapping[str, float]) -> dict[str, Any]:
-    """Time and noisy columns of the run of a scenario; `deviations` are the standard deviations of their noise."""
+def noisy_run(
+    scenario: Path, rng: np.random.Generator, deviations: Mapping[str, float]
+) -> dict[str, Any]:
+    """Time and noisy columns of the run of a scenario; `deviations` are the standard deviations of
+    their noise.
+    """
     run = load_scenario(scenario).simulate()
-    noisy = {name: run[name] + deviation * rng.standard_normal(len(run)) for name, deviation in deviations.items()}
+    noisy = {
+        name: run[name] + deviation * rng.standard_normal(len(run))
+        for name, deviation in deviations.items()
+    }
     return {"time": run["time"], **noisy}
 
 

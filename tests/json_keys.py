@@ -17,7 +17,8 @@ OPEN = "a (?:key|column) for each"
 
 @functools.cache
 def documented() -> dict[str, dict[str, set[str] | None]]:
-    """By chapter, then by key: the columns of a table, empty for a value; None where names of the data are columns.
+    """By chapter, then by key: the columns of a table, empty for a value; None where names of the
+    data are columns.
 
     The key "" stands for further keys of the data.
     """
@@ -30,7 +31,9 @@ def documented() -> dict[str, dict[str, set[str] | None]]:
             continued = re.search(OPEN, entry)
             names = re.findall(r"`([^`]+)`", entry[: continued.start()] if continued else entry)
             if colon:
-                found[table.strip("`")] = None if continued else set(re.findall(r"`([^`]+)`", columns))
+                found[table.strip("`")] = (
+                    None if continued else set(re.findall(r"`([^`]+)`", columns))
+                )
             else:
                 found |= {name: set() for name in names} | ({"": set()} if continued else {})
     return chapters
@@ -39,15 +42,23 @@ def documented() -> dict[str, dict[str, set[str] | None]]:
 def undocumented(answer: Any) -> list[str]:
     """The keys of an answer that the page lacks, such as `fit.parameters.value`."""
     chapters = answer.items() if isinstance(answer, dict) else ()
-    return [f"{name}.{key}" for name, chapter in chapters if name != "files" and isinstance(chapter, dict)
-            for key in _missing(_listed(name), chapter)]  # fmt: skip
+    return [
+        f"{name}.{key}"
+        for name, chapter in chapters
+        if name != "files" and isinstance(chapter, dict)
+        for key in _missing(_listed(name), chapter)
+    ]
 
 
 def _listed(name: str) -> dict[str, set[str] | None] | None:
-    """What the page lists for a chapter, whose name may have a prefix of a campaign, a number, or a group."""
+    """What the page lists for a chapter, whose name may have a prefix of a campaign, a number, or a
+    group.
+    """
     plain = re.sub(r"^(fill|release)_|(_\d+|_run|_specimen)$", "", name)
     numbered = re.sub(r"_\d+$", "_N", re.sub("^(fill|release)_", "", name))
-    return next((documented()[each] for each in (name, numbered, plain) if each in documented()), None)
+    return next(
+        (documented()[each] for each in (name, numbered, plain) if each in documented()), None
+    )
 
 
 def _missing(listed: dict[str, set[str] | None] | None, chapter: dict[str, Any]) -> Iterator[str]:
@@ -59,5 +70,12 @@ def _missing(listed: dict[str, set[str] | None] | None, chapter: dict[str, Any])
             continue
         if key not in listed:
             yield key
-        elif isinstance(value, list) and value and isinstance(value[0], dict) and listed[key] is not None:
-            yield from (f"{key}.{column}" for column in value[0] if column not in (listed[key] or ()))
+        elif (
+            isinstance(value, list)
+            and value
+            and isinstance(value[0], dict)
+            and listed[key] is not None
+        ):
+            yield from (
+                f"{key}.{column}" for column in value[0] if column not in (listed[key] or ())
+            )

@@ -1,8 +1,9 @@
-"""Laboratories of the tests: measurement files of one muscle of known law, with the habits and mistakes of benches.
+"""Laboratories of the tests: measurement files of one muscle of known law, with the habits and
+mistakes of benches.
 
-The muscle is that of Tondu and Lopez (2000) with a linear elasticity of its rubber, Coulomb friction, sensor noise and
-quantisation, written here independently of the package. A laboratory is a set of tables; a variant changes what its
-files state, not the muscle.
+The muscle is that of Tondu and Lopez (2000) with a linear elasticity of its rubber, Coulomb
+friction, sensor noise and quantisation, written here independently of the package. A laboratory is
+a set of tables; a variant changes what its files state, not the muscle.
 """
 
 from __future__ import annotations
@@ -17,12 +18,17 @@ RESTING_LENGTH = 0.3
 ATMOSPHERE = 101.325
 Table = dict[str, np.ndarray]
 """Columns by heading, in the units of the headings."""
-TIME, PRESSURE, LENGTH, FORCE = "time [s]", "pressure [kPa]", "length [mm]", "force [N]"
+TIME = "time [s]"
+PRESSURE = "pressure [kPa]"
+LENGTH = "length [mm]"
+FORCE = "force [N]"
 
 
 @dataclasses.dataclass(frozen=True)
 class Muscle:
-    """True law of a laboratory: F = pi r0^2 p (a (1 - k eps)^2 - b) - elasticity eps, not below 0."""
+    """True law of a laboratory: F = pi r0^2 p (a (1 - k eps)^2 - b) - elasticity eps, not below
+    0.
+    """
 
     radius: float = 0.011
     angle: float = np.radians(25.0)
@@ -31,9 +37,12 @@ class Muscle:
     friction: float = 8.0
 
     def force(self, pressure: np.ndarray, contraction: np.ndarray) -> np.ndarray:
-        a, b = 3.0 / np.tan(self.angle) ** 2, 1.0 / np.sin(self.angle) ** 2
+        a = 3.0 / np.tan(self.angle) ** 2
+        b = 1.0 / np.sin(self.angle) ** 2
         shape = a * (1.0 - self.k * contraction) ** 2 - b
-        return np.maximum(np.pi * self.radius**2 * pressure * shape - self.elasticity * contraction, 0.0)
+        return np.maximum(
+            np.pi * self.radius**2 * pressure * shape - self.elasticity * contraction, 0.0
+        )
 
 
 MUSCLE = Muscle()
@@ -42,10 +51,19 @@ GREATEST = float(MUSCLE.force(np.array(6e5), np.array(0.0)))
 
 
 def measured(
-    time: np.ndarray, pressure: np.ndarray, contraction: np.ndarray, direction: np.ndarray, seed: int,
-    muscle: Muscle = MUSCLE, noise: float = 1.0, step: float = 0.25, delay: float = 0.0,
-) -> Table:  # fmt: skip
-    """One file: force with friction against the motion, noise and quantisation; pressures in kPa, lengths in mm."""
+    time: np.ndarray,
+    pressure: np.ndarray,
+    contraction: np.ndarray,
+    direction: np.ndarray,
+    seed: int,
+    muscle: Muscle = MUSCLE,
+    noise: float = 1.0,
+    step: float = 0.25,
+    delay: float = 0.0,
+) -> Table:
+    """One file: force with friction against the motion, noise and quantisation; pressures in kPa,
+    lengths in mm.
+    """
     rng = np.random.default_rng(seed)
     force = muscle.force(pressure, contraction)
     force = np.where(force > 0.0, np.maximum(force + muscle.friction * direction, 0.0), 0.0)
@@ -55,13 +73,19 @@ def measured(
     return {
         TIME: np.round(time, 4),
         PRESSURE: np.round(1e-3 * pressure + 0.2 * rng.standard_normal(force.size), 2),
-        LENGTH: np.round(1e3 * RESTING_LENGTH * (1.0 - contraction) + 0.01 * rng.standard_normal(force.size), 3),
+        LENGTH: np.round(
+            1e3 * RESTING_LENGTH * (1.0 - contraction) + 0.01 * rng.standard_normal(force.size), 3
+        ),
         FORCE: step * np.round(force / step),
     }
 
 
-def sweeps(muscle: Muscle = MUSCLE, count: int = 90, levels: int = 6, seed: int = 0) -> dict[str, Table]:
-    """Isobars from 100 to 600 kPa: the muscle is extended from its free contraction, then contracts."""
+def sweeps(
+    muscle: Muscle = MUSCLE, count: int = 90, levels: int = 6, seed: int = 0
+) -> dict[str, Table]:
+    """Isobars from 100 to 600 kPa: the muscle is extended from its free contraction, then
+    contracts.
+    """
     tables = {}
     for i, pressure in enumerate(np.linspace(1e5, 6e5, levels)):
         half = np.linspace(0.0, 1.0, count)
@@ -74,9 +98,13 @@ def sweeps(muscle: Muscle = MUSCLE, count: int = 90, levels: int = 6, seed: int 
 
 
 def ramps(
-    muscle: Muscle = MUSCLE, duration: float = 10.0, sample_time: float = 0.05, delay: float = 0.0, seed: int = 20,
+    muscle: Muscle = MUSCLE,
+    duration: float = 10.0,
+    sample_time: float = 0.05,
+    delay: float = 0.0,
+    seed: int = 20,
     noise: float = 1.0,
-) -> dict[str, Table]:  # fmt: skip
+) -> dict[str, Table]:
     """Isometric ramps from 0 to 600 kPa and back at seven contractions."""
     tables = {}
     for i, contraction in enumerate((0.0, 0.04, 0.08, 0.12, 0.16, 0.2, 0.24)):
@@ -91,12 +119,16 @@ def ramps(
 
 def by_hand(seed: int = 50) -> dict[str, Table]:
     """Points without time at five pressures and five lengths."""
-    pressure, contraction = (g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 5), np.linspace(0.0, 0.2, 5)))
+    pressure, contraction = (
+        g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 5), np.linspace(0.0, 0.2, 5))
+    )
     table = measured(np.arange(25.0), pressure, contraction, np.zeros(25), seed)
     return {"points": {name: table[name] for name in (PRESSURE, LENGTH, FORCE)}}
 
 
-def changed(tables: dict[str, Table], column: str, change: Callable[[np.ndarray], np.ndarray]) -> dict[str, Table]:
+def changed(
+    tables: dict[str, Table], column: str, change: Callable[[np.ndarray], np.ndarray]
+) -> dict[str, Table]:
     """The tables with one column changed in all files."""
     return {name: {**table, column: change(table[column])} for name, table in tables.items()}
 
@@ -109,17 +141,27 @@ def every_other(tables: dict[str, Table], column: str, offset: float) -> dict[st
     }
 
 
-def renamed(tables: dict[str, Table], headings: dict[str, str], factors: dict[str, float]) -> dict[str, Table]:
+def renamed(
+    tables: dict[str, Table], headings: dict[str, str], factors: dict[str, float]
+) -> dict[str, Table]:
     """The tables with other headings, their values multiplied by factors."""
     return {
-        name: {headings.get(h, h): v * factors.get(h, 1.0) for h, v in table.items()} for name, table in tables.items()
+        name: {headings.get(h, h): v * factors.get(h, 1.0) for h, v in table.items()}
+        for name, table in tables.items()
     }
 
 
-def one_file(*benches: dict[str, Table], column: str = "", values: tuple[object, ...] = ()) -> dict[str, Table]:
-    """All tables of several benches below each other in one file without time, with a column that tells them apart."""
+def one_file(
+    *benches: dict[str, Table], column: str = "", values: tuple[object, ...] = ()
+) -> dict[str, Table]:
+    """All tables of several benches below each other in one file without time, with a column that
+    tells them apart.
+    """
     parts = [list(bench.values()) for bench in benches]
-    table = {name: np.concatenate([t[name] for part in parts for t in part]) for name in (PRESSURE, LENGTH, FORCE)}
+    table = {
+        name: np.concatenate([t[name] for part in parts for t in part])
+        for name in (PRESSURE, LENGTH, FORCE)
+    }
     if column:
         rows = [sum(t[FORCE].size for t in part) for part in parts]
         table = {column: np.repeat(np.array(values, dtype=object), rows), **table}
@@ -140,7 +182,9 @@ def with_glitches(
     return result
 
 
-def with_code(tables: dict[str, Table], column: str, code: float, every: int = 15) -> dict[str, Table]:
+def with_code(
+    tables: dict[str, Table], column: str, code: float, every: int = 15
+) -> dict[str, Table]:
     """The tables with a code for a missing value in every n-th row of a column."""
     return changed(tables, column, lambda v: np.where(np.arange(v.size) % every == 7, code, v))
 
@@ -151,7 +195,11 @@ def write(tables: dict[str, Table], folder: Path, above: tuple[str, ...] = ()) -
     paths = []
     for name, table in tables.items():
         rows = zip(*(values.tolist() for values in table.values()), strict=True)
-        lines = [*above, ",".join(table), *(",".join("" if v is None else f"{v}" for v in row) for row in rows)]
+        lines = [
+            *above,
+            ",".join(table),
+            *(",".join("" if v is None else f"{v}" for v in row) for row in rows),
+        ]
         paths.append(folder / f"{name}.csv")
         paths[-1].write_text("\n".join(lines) + "\n", encoding="utf-8")
     return paths

@@ -1,9 +1,11 @@
-"""Made bench campaign: the files of a rig, computed from a muscle that differs in kind from every law of the library.
+"""Made bench campaign: the files of a rig, computed from a muscle that differs in kind from every
+law of the library.
 
-Static force: a cosine of the contraction of the active length, a threshold of the pressure of the bladder, an
-exponential tube and an exponential overshoot at rest. Friction: a power-law transition to an amplitude that depends on
-the direction, on a power of the pressure and on the logarithm of the speed. Relaxation: a stretched exponential. Valve:
-an orifice with Perry's discharge coefficient; the air exchanges heat with the wall.
+Static force: a cosine of the contraction of the active length, a threshold of the pressure of the
+bladder, an exponential tube and an exponential overshoot at rest. Friction: a power-law transition
+to an amplitude that depends on the direction, on a power of the pressure and on the logarithm of
+the speed. Relaxation: a stretched exponential. Valve: an orifice with Perry's discharge
+coefficient; the air exchanges heat with the wall.
 """
 
 from __future__ import annotations
@@ -15,9 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-BAR, AMBIENT, ROOM = 1e5, 101_325.0, 293.15
-GAS_CONSTANT, KAPPA = 287.05, 1.4
-PRESSURE_NOISE, LENGTH_NOISE, FORCE_NOISE = 400.0, 2e-5, 4.0
+BAR = 1e5
+AMBIENT = 101_325.0
+ROOM = 293.15
+GAS_CONSTANT = 287.05
+KAPPA = 1.4
+PRESSURE_NOISE = 400.0
+LENGTH_NOISE = 2e-5
+FORCE_NOISE = 4.0
 """Standard deviations of the sensors [Pa], [m], [N]."""
 
 
@@ -35,21 +42,31 @@ class TrueMuscle:
 
     def force(self, pressure: np.ndarray, contraction: np.ndarray) -> np.ndarray:
         """Static force [N]; negative values are those of a slack muscle."""
-        x, p = self.active(contraction), np.asarray(pressure)
+        x = self.active(contraction)
+        p = np.asarray(pressure)
         threshold = 0.18 * BAR
         effective = p - threshold * (1.0 - np.exp(-np.maximum(p, 0.0) / threshold))
         overshoot = 110.0 * np.tanh(np.maximum(p, 0.0) / (0.5 * BAR)) * np.exp(-x / 0.06)
-        return effective * self.area * np.cos(np.pi * x / 0.60) - 16.0 * np.expm1(x / 0.11) + overshoot
+        return (
+            effective * self.area * np.cos(np.pi * x / 0.60) - 16.0 * np.expm1(x / 0.11) + overshoot
+        )
 
     def volume(self, contraction: float) -> float:
         """Enclosed volume [m3], whose derivative is the area of the pressure in the force."""
         length = self.resting_length - self.ends
         x = contraction * self.resting_length / length
-        return math.pi * self.radius**2 * length + self.area * length * 0.60 / math.pi * math.sin(math.pi * x / 0.60)
+        return math.pi * self.radius**2 * length + self.area * length * 0.60 / math.pi * math.sin(
+            math.pi * x / 0.60
+        )
 
-    def friction(self, time: np.ndarray, pressure: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Friction force against contraction [N] along a path of the displacement [m] from a relaxed start."""
-        z, force = 0.0, np.zeros(time.size)
+    def friction(
+        self, time: np.ndarray, pressure: np.ndarray, displacement: np.ndarray
+    ) -> np.ndarray:
+        """Friction force against contraction [N] along a path of the displacement [m] from a
+        relaxed start.
+        """
+        z = 0.0
+        force = np.zeros(time.size)
         for i in range(1, time.size):
             step = displacement[i] - displacement[i - 1]
             speed = abs(step) / (time[i] - time[i - 1])
@@ -71,7 +88,11 @@ class TrueMuscle:
         return force
 
     def measured(
-        self, time: np.ndarray, pressure: np.ndarray, contraction: np.ndarray, random: np.random.Generator
+        self,
+        time: np.ndarray,
+        pressure: np.ndarray,
+        contraction: np.ndarray,
+        random: np.random.Generator,
     ) -> dict[str, np.ndarray]:
         """The columns of a record with the noise of the sensors [SI]."""
         displacement = contraction * self.resting_length
@@ -80,7 +101,9 @@ class TrueMuscle:
         return {
             "time": time,
             "pressure": pressure + random.normal(0.0, PRESSURE_NOISE, time.size),
-            "length": self.resting_length - displacement + random.normal(0.0, LENGTH_NOISE, time.size),
+            "length": (
+                self.resting_length - displacement + random.normal(0.0, LENGTH_NOISE, time.size)
+            ),
             "force": force + random.normal(0.0, FORCE_NOISE, time.size) * (force > 0.0),
         }
 
@@ -89,7 +112,9 @@ class TrueMuscle:
         grid = np.linspace(0.0, 0.29, 2001)
         return float(grid[np.argmin(np.abs(self.force(np.full(grid.size, pressure), grid)))])
 
-    def isobaric(self, bar: float, random: np.random.Generator, speed: float = 2e-3, rows: int = 700) -> dict:
+    def isobaric(
+        self, bar: float, random: np.random.Generator, speed: float = 2e-3, rows: int = 700
+    ) -> dict:
         """A triangle of the length at constant pressure, at a speed [m/s]."""
         pressure = bar * BAR
         end = 0.88 * self.free_contraction(pressure)
@@ -98,24 +123,39 @@ class TrueMuscle:
         ripple = 600.0 * np.sin(2.0 * np.pi * time / 7.0)
         return self.measured(time, pressure + ripple, contraction, random)
 
-    def isometric(self, contraction: float, random: np.random.Generator, duration: float = 80.0) -> dict:
+    def isometric(
+        self, contraction: float, random: np.random.Generator, duration: float = 80.0
+    ) -> dict:
         """A triangle of the pressure from 0.3 to 6 bar at constant length."""
         time = np.linspace(0.0, duration, 600)
         pressure = np.interp(time, [0.0, duration / 2, duration], [0.3 * BAR, 6.0 * BAR, 0.3 * BAR])
         return self.measured(time, pressure, np.full(time.size, contraction), random)
 
     def hold(self, bar: float, contraction: float, random: np.random.Generator) -> dict:
-        """A motion to a length within 0.4 s, which is then held for two minutes at constant pressure."""
+        """A motion to a length within 0.4 s, which is then held for two minutes at constant
+        pressure.
+        """
         time = np.linspace(0.0, 120.0, 1200)
         path = contraction * np.clip((time - 2.0) / 0.4, 0.0, 1.0)
         return self.measured(time, np.full(time.size, bar * BAR), path, random)
 
-    def fill(self, contraction: float, random: np.random.Generator, supply: float = 6.2, tau: float = 0.15) -> dict:
-        """A fill at constant length from 0 bar through an orifice of 1.6 mm, and the discharge after 2.5 s."""
+    def fill(
+        self,
+        contraction: float,
+        random: np.random.Generator,
+        supply: float = 6.2,
+        tau: float = 0.15,
+    ) -> dict:
+        """A fill at constant length from 0 bar through an orifice of 1.6 mm, and the discharge
+        after 2.5 s.
+        """
         time = np.arange(0.0, 5.0, 0.004)
-        volume, area = self.volume(contraction), 0.25 * math.pi * 1.6e-3**2
-        mass, pressure = AMBIENT * volume / GAS_CONSTANT / ROOM, np.empty(time.size)
-        temperature, fine = ROOM, 8
+        volume = self.volume(contraction)
+        area = 0.25 * math.pi * 1.6e-3**2
+        mass = AMBIENT * volume / GAS_CONSTANT / ROOM
+        pressure = np.empty(time.size)
+        temperature = ROOM
+        fine = 8
         for i in range(time.size):
             pressure[i] = mass * GAS_CONSTANT * temperature / volume
             for _ in range(fine):
@@ -129,16 +169,23 @@ class TrueMuscle:
                 inflow_temperature = ROOM if flow > 0 else temperature
                 heat = mass * GAS_CONSTANT / (KAPPA - 1) * (ROOM - temperature) / tau
                 energy = mass * temperature * GAS_CONSTANT / (KAPPA - 1)
-                energy += step * (flow * inflow_temperature * GAS_CONSTANT * KAPPA / (KAPPA - 1) + heat)
+                energy += step * (
+                    flow * inflow_temperature * GAS_CONSTANT * KAPPA / (KAPPA - 1) + heat
+                )
                 mass += step * flow
                 temperature = energy * (KAPPA - 1) / (mass * GAS_CONSTANT)
         return self.measured(time, pressure - AMBIENT, np.full(time.size, contraction), random)
 
     def release(self, bar: float, mass: float, random: np.random.Generator) -> dict:
-        """A mass that is held at rest length by a latch and released after 0.1 s, at a closed volume."""
-        step, time = 1e-4, np.arange(0.0, 1.5, 0.002)
+        """A mass that is held at rest length by a latch and released after 0.1 s, at a closed
+        volume.
+        """
+        step = 1e-4
+        time = np.arange(0.0, 1.5, 0.002)
         content = (bar * BAR + AMBIENT) * self.volume(0.0) ** 1.2
-        y, v, columns = 0.0, 0.0, []
+        y = 0.0
+        v = 0.0
+        columns = []
         for t in time:
             pressure = content / self.volume(y / self.resting_length) ** 1.2 - AMBIENT
             columns.append((pressure, y))
@@ -158,16 +205,28 @@ class TrueMuscle:
 def orifice_flow(high: float, low: float, temperature: float, area: float) -> float:
     """Mass flow [kg/s] of an orifice with the discharge coefficient of Perry (1949) [Pa, K, m2]."""
     ratio = min(max(low / high, 0.0), 1.0)
-    coefficient = 0.8414 - 0.1002 * ratio + 0.8415 * ratio**2 - 3.9 * ratio**3 + 4.6001 * ratio**4 - 1.6827 * ratio**5
+    coefficient = (
+        0.8414
+        - 0.1002 * ratio
+        + 0.8415 * ratio**2
+        - 3.9 * ratio**3
+        + 4.6001 * ratio**4
+        - 1.6827 * ratio**5
+    )
     critical = (2 / (KAPPA + 1)) ** (KAPPA / (KAPPA - 1))
     r = max(ratio, critical)
-    factor = math.sqrt(max(2 * KAPPA / (KAPPA - 1) * (r ** (2 / KAPPA) - r ** ((KAPPA + 1) / KAPPA)), 0.0))
+    factor = math.sqrt(
+        max(2 * KAPPA / (KAPPA - 1) * (r ** (2 / KAPPA) - r ** ((KAPPA + 1) / KAPPA)), 0.0)
+    )
     return coefficient * area * high * factor / math.sqrt(GAS_CONSTANT * temperature)
 
 
 def write_german(path: Path, columns: dict[str, np.ndarray], resting_length: float) -> None:
     """A file as a German logger writes it: bar, mm and N, semicolons and decimal commas."""
-    lines = [f"# Ruhelänge [mm] = {1e3 * resting_length:g}", "Zeit [s];Druck [bar];Länge [mm];Kraft [N]"]
+    lines = [
+        f"# Ruhelänge [mm] = {1e3 * resting_length:g}",
+        "Zeit [s];Druck [bar];Länge [mm];Kraft [N]",
+    ]
     scaled = (columns["time"], columns["pressure"] / BAR, 1e3 * columns["length"], columns["force"])
     for row in zip(*scaled, strict=True):
         lines.append(";".join(f"{value:.4f}" for value in row).replace(".", ","))
@@ -179,32 +238,57 @@ THREE_LENGTHS = (0.2, 0.3, 0.4)
 
 
 def write_campaign(folder: Path, lengths: Sequence[float] = (0.3,), seed: int = 1) -> Path:
-    """Write the files of a campaign: sweeps of every length; fills, holds and a release of the middle one."""
+    """Write the files of a campaign: sweeps of every length; fills, holds and a release of the
+    middle one.
+    """
     random = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
     for length in lengths:
-        muscle, name = TrueMuscle(length), f"{1e3 * length:.0f}"
+        muscle = TrueMuscle(length)
+        name = f"{1e3 * length:.0f}"
         for bar in PRESSURES:
             speed = 2e-3 if bar % 2 else 5e-3
-            write_german(folder / f"m{name}_isobar_{bar:g}bar.csv", muscle.isobaric(bar, random, speed), length)
+            write_german(
+                folder / f"m{name}_isobar_{bar:g}bar.csv",
+                muscle.isobaric(bar, random, speed),
+                length,
+            )
         for contraction in (0.02, 0.10):
             columns = muscle.isometric(contraction, random)
             write_german(folder / f"m{name}_isometrisch_{100 * contraction:g}.csv", columns, length)
     length = sorted(lengths)[len(lengths) // 2]
-    muscle, name = TrueMuscle(length), f"{1e3 * length:.0f}"
+    muscle = TrueMuscle(length)
+    name = f"{1e3 * length:.0f}"
     for contraction in (0.0, 0.08, 0.15):
-        write_german(folder / f"m{name}_fuellen_{100 * contraction:g}.csv", muscle.fill(contraction, random), length)
+        write_german(
+            folder / f"m{name}_fuellen_{100 * contraction:g}.csv",
+            muscle.fill(contraction, random),
+            length,
+        )
     for bar in (2.0, 5.0):
-        write_german(folder / f"m{name}_halten_{bar:g}bar.csv", muscle.hold(bar, 0.06, random), length)
+        write_german(
+            folder / f"m{name}_halten_{bar:g}bar.csv", muscle.hold(bar, 0.06, random), length
+        )
     write_german(folder / f"m{name}_freigabe.csv", muscle.release(2.0, 30.0, random), length)
     return folder
 
 
-def unseen_records(lengths: Sequence[float], seed: int = 9) -> dict[str, tuple[dict[str, np.ndarray], float]]:
-    """Records that no fit has seen, with their resting length: another pressure, length and speed."""
-    random, middle = np.random.default_rng(seed), sorted(lengths)[len(lengths) // 2]
-    records = {f"pressure {bar:g} bar": (TrueMuscle(middle).isobaric(bar, random), middle) for bar in (2.5, 3.5, 4.5)}
-    records |= {f"speed {v:g} m/s": (TrueMuscle(middle).isobaric(3.0, random, v), middle) for v in (3e-3, 4e-3)}
+def unseen_records(
+    lengths: Sequence[float], seed: int = 9
+) -> dict[str, tuple[dict[str, np.ndarray], float]]:
+    """Records that no fit has seen, with their resting length: another pressure, length and
+    speed.
+    """
+    random = np.random.default_rng(seed)
+    middle = sorted(lengths)[len(lengths) // 2]
+    records = {
+        f"pressure {bar:g} bar": (TrueMuscle(middle).isobaric(bar, random), middle)
+        for bar in (2.5, 3.5, 4.5)
+    }
+    records |= {
+        f"speed {v:g} m/s": (TrueMuscle(middle).isobaric(3.0, random, v), middle)
+        for v in (3e-3, 4e-3)
+    }
     if len(lengths) > 1:
         between = 0.5 * (sorted(lengths)[0] + middle), 0.5 * (sorted(lengths)[-1] + middle)
         records |= {

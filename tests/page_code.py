@@ -1,7 +1,8 @@
-"""Code of a documentation page, run in order as a reader does: files, Python, commands, and the output that the page shows.
+"""Code of a documentation page, run in order as a reader does: files, Python, commands, and the
+output that the page shows.
 
-A `toml` block whose first line is a comment with a file name becomes that file. A `text` block behind Python is the output
-of it, a `text` block behind commands is a part of theirs.
+A `toml` block whose first line is a comment with a file name becomes that file. A `text` block
+behind Python is the output of it, a `text` block behind commands is a part of theirs.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 class PageRun(NamedTuple):
-    """Result of the code of a page: the names that its Python leaves, and (expected, found) of each shown output."""
+    """Result of the code of a page: the names that its Python leaves, and (expected, found) of each
+    shown output.
+    """
 
     names: dict[str, Any]
     outputs: list[tuple[str, str]]
@@ -79,7 +82,9 @@ def command_lines(text: str) -> Iterator[str]:
 
 
 def run_command(line: str) -> str:
-    """Run a command; those of airmuscle in this process, others in a shell if their program is installed."""
+    """Run a command; those of airmuscle in this process, others in a shell if their program is
+    installed.
+    """
     words = shlex.split(line)
     if words[0] == "airmuscle":
         done = airmuscle(*words[1:])

@@ -1,4 +1,6 @@
-"""Plants in which every component stands that enters one, for what must hold of them all; numbers are chosen."""
+"""Plants in which every component stands that enters one, for what must hold of them all; numbers
+are chosen.
+"""
 
 from __future__ import annotations
 
@@ -79,14 +81,17 @@ from airmuscle.physics import (
 )
 from airmuscle.physics.muscle.geometry import as_polynomial
 
-VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
+VALVE = Valve(1e-8, 0.4)
+OTHER = Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)
 BRAID = geometry.Braid(0.01, 0.4363, 0.2)
 FIBRES = geometry.StraightFibre(0.2, 0.02)
 SPOOL = physics.SecondOrderLag(20.0, 0.7)
 STOP = EndStop(0.1, HuntCrossley(1e9))
 SLIPS = ((4e4, 2e4), (2e-4, 8e-4))
-SURFACE = ContractileSurface((300.0, -200.0, 40.0, 10.0, 5.0, 3.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 2)
+SURFACE = ContractileSurface(
+    (300.0, -200.0, 40.0, 10.0, 5.0, 3.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 2
+)
 
 
 def of(contractile=None, volume=BRAID, **parts):
@@ -114,7 +119,10 @@ def listed(name):
 
 EXAMPLES = {
     # characteristics
-    **{name: listed(name) for name in ("chou-hannaford", "dmsp-20-300", "reynolds2003", "serres2009", "tondu-lopez")},
+    **{
+        name: listed(name)
+        for name in ("chou-hannaford", "dmsp-20-300", "reynolds2003", "serres2009", "tondu-lopez")
+    },
     "sarosi": listed("sarosi-dmsp-20-200n"),
     "surface": of(SURFACE),
     "stand-in": of(as_force_law(VirtualWork(BRAID), ValidityRange(0.0, 6e5, 0.0, 0.25), degree=3)),
@@ -135,14 +143,18 @@ EXAMPLES = {
     "hardening spring, lopsided damper": of(
         spring=CubicSpring(3000.0, 100.0), damper=DirectionalDamper(300.0, 150.0, 1e-3, -1e-3)
     ),
-    "pressure damper, creep": of(damper=PressureDamper(50.0, 1e-3), creep=CreepElements((2e4, 1e4), (0.1, 2.0))),
+    "pressure damper, creep": of(
+        damper=PressureDamper(50.0, 1e-3), creep=CreepElements((2e4, 1e4), (0.1, 2.0))
+    ),
     "Reynolds": of(spring=Reynolds2003Spring(), damper=Reynolds2003Damper()),
     "Serres": of(spring=Serres2009Spring(), damper=Serres2009Damper()),
     "stop, lagging wall": of(stop=STOP, wall=ViscoelasticWall(2e-11, 0.05)),
     "series spring with a stop": of(
         series=SeriesSpring(1e5), stop=STOP, damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)
     ),
-    "hardening series spring": of(series=CubicSeriesSpring(5e4, 2e-3), damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)),
+    "hardening series spring": of(
+        series=CubicSeriesSpring(5e4, 2e-3), damper=DirectionalDamper(300.0, 150.0, 1e-3, 0.0)
+    ),
     "swelling wall": of(wall=SwellingWall(4e-5, 2e5, 3e4, 0.05)),
     # friction
     "Dahl": of(friction=friction.Dahl(5e4, 20.0)),
@@ -164,28 +176,47 @@ EXAMPLES = {
     "held for good": Plant(chosen_muscle(), TWO_VALVES, Isometric(0.05), EnergyBalance(0.5)),
     "check valve and cracking pressure": fed(
         FillDischarge(
-            Supply(5e5), physics.CheckValve(physics.SubsonicIndexValve(1e-8, 0.3, 0.6, 3e4)), physics.SubsonicIndexValve(1e-8, 0.5, 0.4)
+            Supply(5e5),
+            physics.CheckValve(physics.SubsonicIndexValve(1e-8, 0.3, 0.6, 3e4)),
+            physics.SubsonicIndexValve(1e-8, 0.5, 0.4),
         )
     ),
-    "three positions through a tube": fed(physics.WithTubes(physics.ThreePositionValve(Supply(5e5), VALVE, OTHER),
-                                                       physics.Tube(physics.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
-    "tube with inertia": fed(physics.WithTubes(TWO_VALVES, physics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
+    "three positions through a tube": fed(
+        physics.WithTubes(
+            physics.ThreePositionValve(Supply(5e5), VALVE, OTHER),
+            physics.Tube(physics.TubeOrifice(1.0, 3e-3), 1e-5, 2),
+        )
+    ),
+    "tube with inertia": fed(
+        physics.WithTubes(TWO_VALVES, physics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))
+    ),
     "overlap": fed(physics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
     "underlap": fed(physics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
-    "regulator, leak": fed(physics.WithLeak(physics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
+    "regulator, leak": fed(
+        physics.WithLeak(physics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)
+    ),
     "two pressure regulators on a tank": fed(
         physics.Manifold(
             physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)),
-            tuple(physics.PressureRegulator(physics.SharedSupply(), VALVE, OTHER, 8e5, 0.05, 0.2, 0.02, 1.0, 3e3, leak)
-                  for leak in (0.0, 0.05)),
+            tuple(
+                physics.PressureRegulator(
+                    physics.SharedSupply(), VALVE, OTHER, 8e5, 0.05, 0.2, 0.02, 1.0, 3e3, leak
+                )
+                for leak in (0.0, 0.05)
+            ),
             ("one", "two"),
         ),
         2,
     ),
     "manifold on tank and regulator": fed(
         physics.Manifold(
-            physics.RegulatedSupply(physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
-            (FillDischarge(physics.SharedSupply(), VALVE, OTHER), physics.ThreePositionValve(physics.SharedSupply(), VALVE, OTHER)),
+            physics.RegulatedSupply(
+                physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5
+            ),
+            (
+                FillDischarge(physics.SharedSupply(), VALVE, OTHER),
+                physics.ThreePositionValve(physics.SharedSupply(), VALVE, OTHER),
+            ),
             ("one", "two"),
         ),
         2,
@@ -198,34 +229,63 @@ EXAMPLES = {
     "lever": pulled(Lever((0.03,), 3.0, 0.2)),
     "pulley with stops": pulled(WithEndStops(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
     "joint with stops": pulled(
-        JointWithEndStops(WithOffsets(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)), -0.2, 0.2, 0.05, HuntCrossley(1e9)), 2
+        JointWithEndStops(
+            WithOffsets(AntagonisticJoint(0.03, 0.05, 0.2), (0.08, 0.08)),
+            -0.2,
+            0.2,
+            0.05,
+            HuntCrossley(1e9),
+        ),
+        2,
     ),
     "shaped joint with friction": pulled(
         JointWithFriction(
-            AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1, 1.5, -1.2, 1.2, PolynomialProfile((0.2, -0.1))), 0.3
-        ), 2
+            AntagonisticJoint(
+                0.03, 0.05, 0.2, 2.0, 0.1, 1.5, -1.2, 1.2, PolynomialProfile((0.2, -0.1))
+            ),
+            0.3,
+        ),
+        2,
     ),
-    "joint with an external torque": pulled(JointWithExternalTorque(AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1)), 2),
+    "joint with an external torque": pulled(
+        JointWithExternalTorque(AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1)), 2
+    ),
     "arm": pulled(
         PlanarArm(
-            (ArmLink(0.3, 1.5, 0.14, 0.01, 0.1, -1.3, 1.3), ArmLink(0.25, 1.0, 0.11, 0.005, 0.1, -1.3, 1.3)),
-            (MuscleRoute((1,), (0.03,), 0.1), MuscleRoute((1,), (-0.03,), 0.1),
-             MuscleRoute((1, 2), (0.02, 0.02), 0.1, (ConstantRadius(), CrankProfile(0.2))),
-             MuscleRoute((2,), (-0.02,), 0.1, (CrankProfile(-0.2),))),
+            (
+                ArmLink(0.3, 1.5, 0.14, 0.01, 0.1, -1.3, 1.3),
+                ArmLink(0.25, 1.0, 0.11, 0.005, 0.1, -1.3, 1.3),
+            ),
+            (
+                MuscleRoute((1,), (0.03,), 0.1),
+                MuscleRoute((1,), (-0.03,), 0.1),
+                MuscleRoute((1, 2), (0.02, 0.02), 0.1, (ConstantRadius(), CrankProfile(0.2))),
+                MuscleRoute((2,), (-0.02,), 0.1, (CrankProfile(-0.2),)),
+            ),
             0.5,
-        ), 4
+        ),
+        4,
     ),
     "arm in space with stick-slip": pulled(
         WithStickSlip(
             SerialArm(
-                (SpatialLink((0, 0, 1), rotor_inertia=0.02, damping=0.1),
-                 SpatialLink((0, 1, 0), (0.0, 0.0, 0.1), 1.0, (0.1, 0.0, 0.02), 0.01)),
+                (
+                    SpatialLink((0, 0, 1), rotor_inertia=0.02, damping=0.1),
+                    SpatialLink((0, 1, 0), (0.0, 0.0, 0.1), 1.0, (0.1, 0.0, 0.02), 0.01),
+                ),
                 (MuscleRoute((1,), (0.03,), 0.1), MuscleRoute((2,), (-0.03,), 0.1)),
             ),
             (StickSlip(0.5, (1e-3, 0.0)), StickSlip(0.3, (), 0.5, bearing_arms=(0.02, 0.01))),
-            GaussianResidual(("m0.pressure", "m1.pressure"), (0.5, 0.4), (1e5, 1e5), (0.1, -0.2, 2.0, 1.0, -0.3, 0.2, 3.0, 1.5),
-                             (0.6, -0.4), (0.3, -0.2, 0.1, 0.4)),
-        ), 2
+            GaussianResidual(
+                ("m0.pressure", "m1.pressure"),
+                (0.5, 0.4),
+                (1e5, 1e5),
+                (0.1, -0.2, 2.0, 1.0, -0.3, 0.2, 3.0, 1.5),
+                (0.6, -0.4),
+                (0.3, -0.2, 0.1, 0.4),
+            ),
+        ),
+        2,
     ),
     "muscles in series": pulled(MusclesInSeries(HangingMass(5.0), (0.5,), 1.0), 2),
-}  # fmt: skip
+}

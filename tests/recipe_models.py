@@ -1,4 +1,6 @@
-"""Models that are added to a copy of the project step by step, as AGENTS.md lists; numbers are chosen."""
+"""Models that are added to a copy of the project step by step, as AGENTS.md lists; numbers are
+chosen.
+"""
 
 from __future__ import annotations
 
@@ -115,7 +117,9 @@ class {name}(SisoController):
 
 @dataclass(frozen=True)
 class Recipe:
-    """A kind of model: its folder, its source text, and its example in tests/plants.py; None where it has none."""
+    """A kind of model: its folder, its source text, and its example in tests/plants.py; None where
+    it has none.
+    """
 
     folder: str
     text: str
@@ -133,12 +137,20 @@ class Recipe:
     @property
     def steps(self) -> tuple[str, ...]:
         library = ("library",) if self.folder == "physics/muscle/characteristic" else ()
-        return ("file", "export", *library, "example" if self.example else "exemption", "nomenclature")
+        return (
+            "file",
+            "export",
+            *library,
+            "example" if self.example else "exemption",
+            "nomenclature",
+        )
 
 
 RECIPES = {
     "law": Recipe("physics/muscle/characteristic", LAW, "of({name}(1e-3))"),
-    "valve": Recipe("physics/pneumatics", VALVE, "fed(FillDischarge(Supply(5e5), {name}(1e-8), OTHER))"),
+    "valve": Recipe(
+        "physics/pneumatics", VALVE, "fed(FillDischarge(Supply(5e5), {name}(1e-8), OTHER))"
+    ),
     "friction": Recipe("physics/muscle/friction", FRICTION, "of(friction={name}(5e4, 4e-4))"),
     "controller": Recipe("control/laws", CONTROLLER, None),
 }
@@ -151,18 +163,25 @@ def append(path: Path, text: str) -> None:
 
 
 def add(root: Path, kind: str, name: str, without: str = "") -> None:
-    """Add a model to a copy of the project, by all steps but one; the nomenclature is generated afterwards."""
-    recipe, module = RECIPES[kind], name.lower()
+    """Add a model to a copy of the project, by all steps but one; the nomenclature is generated
+    afterwards.
+    """
+    recipe = RECIPES[kind]
+    module = name.lower()
     source = root / "src" / "airmuscle"
     package = source / recipe.folder
     line = f"from .{module} import {name}"
     edits = {
-        "file": (package / f"{module}.py", (HEAD + recipe.text).format(name=name, root=recipe.root)),
+        "file": (
+            package / f"{module}.py",
+            (HEAD + recipe.text).format(name=name, root=recipe.root),
+        ),
         "export": (package / "__init__.pyi", f"{line} as {name}\n"),
         "library": (source / "files" / "library" / f"{module}.toml", LAW_FILE.format(name=name)),
         "example": (
             root / "tests" / "plants.py",
-            f"\nfrom airmuscle.{recipe.package}{line[5:]}\nEXAMPLES['{module}'] = {recipe.example}\n".format(name=name),
+            f"\nfrom airmuscle.{recipe.package}{line[5:]}\nEXAMPLES['{module}'] ="
+            f" {recipe.example}\n".format(name=name),
         ),
         "exemption": (
             root / "tests" / "dynamics" / "test_continuity.py",
@@ -188,4 +207,6 @@ def write_nomenclature(root: Path, omitted: tuple[str, ...] = ()) -> None:
 def run(root: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """A Python command in a copy of the project, which imports the package of the copy."""
     environment = {**os.environ, "PYTHONPATH": str(root / "src")}
-    return subprocess.run([sys.executable, *arguments], cwd=root, env=environment, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, *arguments], cwd=root, env=environment, capture_output=True, text=True
+    )

@@ -1,5 +1,5 @@
-"""Texts of muscle and scenario files that several tests use: a braid, two valves at a supply, a lift of the library;
-and files that are one of these texts with some of it replaced."""
+"""Texts of muscle and scenario files that several tests use: a braid, two valves at a supply, a
+lift of the library; and files that are one of these texts with some of it replaced."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ duration = "2 s"
 
 
 def writer_of(whole: str) -> Callable[..., Path]:
-    """`written(folder, *changes)`: a text with some of it replaced, as the file scenario.toml of the folder."""
+    """`written(folder, *changes)`: a text with some of it replaced, as the file scenario.toml of
+    the folder.
+    """
 
     def written(folder: Path, *changes: tuple[str, str], text: str = whole) -> Path:
         for was, becomes in changes:

@@ -1,4 +1,6 @@
-"""Browser for the tests of the studio: a server on a free port, and the page, which must report no error."""
+"""Browser for the tests of the studio: a server on a free port, and the page, which must report no
+error.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,21 @@ from widths import widened
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
+OPTIONS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 WAIT = 180_000
 PAGES = widened(
     [(width, scheme) for width in (360, 768, 1600) for scheme in ("light", "dark")],
     lambda width, scheme: (width == 768) == (scheme == "dark"),
 )
-"""Width and colours of a page: each width by default with one scheme, on which the layout does not depend."""
+"""Width and colours of a page: each width by default with one scheme, on which the layout does not
+depend.
+"""
 REFUSED = "status of 422"
 """Message of the browser on a text that the server refused."""
 
@@ -48,14 +58,25 @@ def browser():
 @contextlib.contextmanager
 def opened(browser, address, *, width=1280, height=900, scheme="light", offline=False):
     """The page; it must report no error and request nothing from elsewhere."""
-    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme, offline=offline)
-    page, errors = context.new_page(), []
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, color_scheme=scheme, offline=offline
+    )
+    page = context.new_page()
+    errors = []
     page.on(
-        "console", lambda m: errors.append(m.text) if m.type in ("error", "warning") and REFUSED not in m.text else None
+        "console",
+        lambda m: (
+            errors.append(m.text)
+            if m.type in ("error", "warning") and REFUSED not in m.text
+            else None
+        ),
     )
     page.on("pageerror", lambda e: errors.append(str(e)))
     origin = address.partition("?")[0]
-    page.on("request", lambda r: None if r.url.startswith((origin, "data:", "blob:")) else errors.append(r.url))
+    page.on(
+        "request",
+        lambda r: None if r.url.startswith((origin, "data:", "blob:")) else errors.append(r.url),
+    )
     page.goto(address)
     page.wait_for_selector("html[data-ready]", timeout=WAIT)
     yield page

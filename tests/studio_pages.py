@@ -22,7 +22,9 @@ class Answer:
 
     def __init__(self, messages):
         self.status = messages[0]["status"]
-        self.headers = {name.decode().lower(): value.decode() for name, value in messages[0]["headers"]}
+        self.headers = {
+            name.decode().lower(): value.decode() for name, value in messages[0]["headers"]
+        }
         self.body = b"".join(m.get("body", b"") for m in messages[1:])
 
     @property
@@ -34,17 +36,33 @@ class Answer:
 
 
 def request(app, method, path, body=b"", *, headers=None, query=b"", chunk=8192, raw=None):
-    """The answer of an ASGI application. `headers` replace the usual ones; those that are None are left out."""
-    usual = {"host": HOST, "x-airmuscle": "1" if method == "POST" or path.startswith("/api/") else None}
+    """The answer of an ASGI application. `headers` replace the usual ones; those that are None are
+    left out.
+    """
+    usual = {
+        "host": HOST,
+        "x-airmuscle": "1" if method == "POST" or path.startswith("/api/") else None,
+    }
     given = {**usual, **(headers or {})}
     scope = {
-        "type": "http", "asgi": {"version": "3.0", "spec_version": "2.4"}, "http_version": "1.1", "method": method, "scheme": "http",
-        "path": path, "raw_path": raw or path.encode(), "query_string": query, "root_path": "",
-        "server": ("127.0.0.1", 8765), "client": ("127.0.0.1", 1),
+        "type": "http",
+        "asgi": {"version": "3.0", "spec_version": "2.4"},
+        "http_version": "1.1",
+        "method": method,
+        "scheme": "http",
+        "path": path,
+        "raw_path": raw or path.encode(),
+        "query_string": query,
+        "root_path": "",
+        "server": ("127.0.0.1", 8765),
+        "client": ("127.0.0.1", 1),
         "headers": [(n.encode(), v.encode("latin-1")) for n, v in given.items() if v is not None],
-    }  # fmt: skip
+    }
     parts = [body[i : i + chunk] for i in range(0, len(body), chunk)] or [b""]
-    queue = [{"type": "http.request", "body": part, "more_body": i < len(parts) - 1} for i, part in enumerate(parts)]
+    queue = [
+        {"type": "http.request", "body": part, "more_body": i < len(parts) - 1}
+        for i, part in enumerate(parts)
+    ]
     sent = []
 
     async def receive():

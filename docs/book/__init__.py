@@ -1,1 +1,3 @@
-"""Documentation site: pages of docs/, pages generated from the declarations of the program, and their HTML."""
+"""Documentation site: pages of docs/, pages generated from the declarations of the program, and
+their HTML.
+"""

@@ -1,4 +1,6 @@
-"""Attributes that the theme leaves out: levels of captions, names of landmarks, and focus of regions that scroll."""
+"""Attributes that the theme leaves out: levels of captions, names of landmarks, and focus of
+regions that scroll.
+"""
 
 from __future__ import annotations
 

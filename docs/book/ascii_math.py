@@ -1,7 +1,8 @@
 """Formulas of docstrings and pages: plain text such as `F = p b^2/(4 pi n^2)` as LaTeX.
 
-Grammar: products by spaces, quotients by `/`, powers by `^`, indices by `_`, primes, sums and integrals with limits,
-`|x|`, Greek letters by name, differentials (`dV`), the functions of FUNCTIONS, relations. Other words are set upright.
+Grammar: products by spaces, quotients by `/`, powers by `^`, indices by `_`, primes, sums and
+integrals with limits, `|x|`, Greek letters by name, differentials (`dV`), the functions of
+FUNCTIONS, relations. Other words are set upright.
 """
 
 from __future__ import annotations
@@ -11,16 +12,38 @@ from typing import NamedTuple
 
 from .latex_symbols import index_of, symbol
 
-FUNCTIONS = frozenset(["sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "ln", "log", "max", "min"])
+FUNCTIONS = frozenset(
+    ["sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "ln", "log", "max", "min"]
+)
 WORD_FUNCTIONS = frozenset(["asinh", "atan", "clip", "clamp", "sat", "sign", "sgn", "floor", "erf"])
 SUMS = {"Sum": r"\sum", "sum": r"\sum", "Int": r"\int", "integral": r"\int"}
 SIGNS = {
-    "<=": r"\le", ">=": r"\ge", "->": r"\to", "...": r"\ldots", "..": r"\ldots", "=": "=", "<": "<", ">": ">",
-    "+": "+", "-": "-", ",": ",", ";": ";", ":": ":", "≤": r"\le", "≥": r"\ge", "≈": r"\approx", "−": "-",
-    "½": r"\tfrac12", "←": r"\leftarrow", "*": r"\cdot", "%": r"\%", "infinity": r"\infty",
-}  # fmt: skip
+    "<=": r"\le",
+    ">=": r"\ge",
+    "->": r"\to",
+    "...": r"\ldots",
+    "..": r"\ldots",
+    "=": "=",
+    "<": "<",
+    ">": ">",
+    "+": "+",
+    "-": "-",
+    ",": ",",
+    ";": ";",
+    ":": ":",
+    "≤": r"\le",
+    "≥": r"\ge",
+    "≈": r"\approx",
+    "−": "-",
+    "½": r"\tfrac12",
+    "←": r"\leftarrow",
+    "*": r"\cdot",
+    "%": r"\%",
+    "infinity": r"\infty",
+}
 RELATIONS = frozenset(["=", "<", ">", "<=", ">=", "->", "≤", "≥", "≈", "←"])
-OPENING, CLOSING = {"(": "(", "[": "[", "{": r"\{"}, {")": ")", "]": "]", "}": r"\}"}
+OPENING = {"(": "(", "[": "[", "{": r"\{"}
+CLOSING = {")": ")", "]": "]", "}": r"\}"}
 TOKEN = re.compile(
     r"(?P<gap> {2,})|(?P<space> )"
     r"|(?P<number>\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![A-Za-z_]))"
@@ -44,12 +67,15 @@ class Token(NamedTuple):
 
 def tokenise(text: str) -> list[Token]:
     """Tokens of a formula. Raises FormulaError at a character that no formula contains."""
-    tokens, end, spaced = [], 0, False
+    tokens = []
+    end = 0
+    spaced = False
     while end < len(text):
         match = TOKEN.match(text, end)
         if match is None:
             raise FormulaError(f"{text!r}: character {text[end]!r}")
-        end, kind = match.end(), str(match.lastgroup)
+        end = match.end()
+        kind = str(match.lastgroup)
         if kind != "space":
             tokens.append(Token(kind, match[0], spaced))
         spaced = kind in ("space", "gap")
@@ -57,8 +83,12 @@ def tokenise(text: str) -> list[Token]:
 
 
 def to_latex(text: str, display: bool = True) -> str:
-    """LaTeX of a formula; quotients are fractions if it is displayed. Raises FormulaError if brackets do not match."""
-    differentials = re.sub(r"\bd (\w+)/d (\w+)", r"d\1/d\2", re.sub(r"\bd\((\w+)\)/d", r"d\1/d", text.strip()))
+    """LaTeX of a formula; quotients are fractions if it is displayed. Raises FormulaError if
+    brackets do not match.
+    """
+    differentials = re.sub(
+        r"\bd (\w+)/d (\w+)", r"d\1/d\2", re.sub(r"\bd\((\w+)\)/d", r"d\1/d", text.strip())
+    )
     indices = re.sub(r"\b([A-Za-z])(\d)_(\w)", r"\1_(\2, \3)", differentials)  # L0_1
     return _Formula(tokenise(indices), display).read()
 
@@ -67,7 +97,10 @@ class _Formula:
     """Reader of the tokens of one formula."""
 
     def __init__(self, tokens: list[Token], display: bool) -> None:
-        self.tokens, self.display, self.at, self.bars = tokens, display, 0, 0
+        self.tokens = tokens
+        self.display = display
+        self.at = 0
+        self.bars = 0
 
     def peek(self, ahead: int = 0) -> Token:
         index = self.at + ahead
@@ -115,7 +148,8 @@ class _Formula:
         start = self.at
         latex = self.factor()
         while self.peek().text == "/" and self.peek(1).kind != "end":
-            bare, over = self.without_brackets(start, latex), self.at
+            bare = self.without_brackets(start, latex)
+            over = self.at
             self.next()
             below = self.at
             divisor = self.factor()
@@ -140,7 +174,9 @@ class _Formula:
         """Whether the bracket at `start` closes with the token just read."""
         depth = 0
         for index in range(start, self.at):
-            depth += (self.tokens[index].text in ("(", "[")) - (self.tokens[index].text in (")", "]"))
+            depth += (self.tokens[index].text in ("(", "[")) - (
+                self.tokens[index].text in (")", "]")
+            )
             if depth == 0:
                 return index == self.at - 1
         return False
@@ -198,7 +234,9 @@ class _Formula:
 
     def attached(self) -> str:
         """Primes, indices and powers behind a factor."""
-        primes, index, power = "", "", ""
+        primes = ""
+        index = ""
+        power = ""
         while True:
             token = self.peek()
             if token.text == "'" and not token.spaced:

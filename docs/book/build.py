@@ -23,9 +23,13 @@ LIVE = ("dmsp-20-300",)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Build the site; returns the exit code."""
     parser = argparse.ArgumentParser(prog="./run docs", description="Build the documentation site.")
-    parser.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="output folder; default: build/docs")
     parser.add_argument(
-        "--without-figures", action="store_true", help="leave out the figures that take longest, for drafts"
+        "--out", type=Path, default=OUT, metavar="DIR", help="output folder; default: build/docs"
+    )
+    parser.add_argument(
+        "--without-figures",
+        action="store_true",
+        help="leave out the figures that take longest, for drafts",
     )
     chosen = parser.parse_args(arguments)
     out: Path = chosen.out.resolve()
@@ -33,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if broken:
         print("docs: broken links: " + ", ".join(broken), file=sys.stderr)
         return 1
-    source, html = out / "source", out / "html"
+    source = out / "source"
+    html = out / "html"
     for folder in (source, html):
         shutil.rmtree(folder, ignore_errors=True)
     prepare(source, figures=not chosen.without_figures)

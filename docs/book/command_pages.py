@@ -1,4 +1,6 @@
-"""Pages of the command line, generated from the parser: usage, arguments, options and examples of each command."""
+"""Pages of the command line, generated from the parser: usage, arguments, options and examples of
+each command.
+"""
 
 from __future__ import annotations
 
@@ -29,19 +31,23 @@ def overview() -> str:
     """The index of the commands."""
     rows = [(f"[airmuscle {row.name}]({row.name}.md)", escape(row.summary)) for row in COMMANDS]
     head = (
-        "# Command line\n\nGenerated from the parser of the program; `airmuscle COMMAND --help` shows the same text. "
-        "Exit code 0: success; 1: failure, with one line on stderr that gives the reason; 2: wrong usage; 130: "
-        "interrupted.\n"
+        "# Command line\n\nGenerated from the parser of the program; `airmuscle COMMAND --help`"
+        " shows the same text. Exit code 0: success; 1: failure, with one line on stderr that gives"
+        " the reason; 2: wrong usage; 130: interrupted.\n"
     )
     tree = "\n".join(row.name for row in COMMANDS)
-    return f"{head}\n{table(('command', 'purpose'), rows)}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
+    return (
+        f"{head}\n{table(('command', 'purpose'), rows)}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
+    )
 
 
 def command_page(name: str, command: Any) -> str:
     """The page of one command."""
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
-    usage = " ".join([f"airmuscle {name}", *(["[OPTIONS]"] if options else []), *map(_metavar, arguments)])
+    usage = " ".join(
+        [f"airmuscle {name}", *(["[OPTIONS]"] if options else []), *map(_metavar, arguments)]
+    )
     parts = [f"# airmuscle {name}\n", f"```text\n{usage}\n```\n", help_text(command.help or "")]
     if arguments:
         rows = [(f"`{_metavar(p)}`", escape(getattr(p, "help", None) or "")) for p in arguments]

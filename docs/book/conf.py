@@ -1,4 +1,6 @@
-"""Configuration of Sphinx for the documentation site; run by docs/make_book.py on the generated source folder."""
+"""Configuration of Sphinx for the documentation site; run by docs/make_book.py on the generated
+source folder.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,9 @@ pygments_dark_style = "a11y-dark"
 
 
 def setup(app: Any) -> None:
-    """Register the renderer of formulas, the index of the search, and what makes pages accessible."""
+    """Register the renderer of formulas, the index of the search, and what makes pages
+    accessible.
+    """
     set_up_mathml(app)
     set_up_search(app)
     set_up_accessibility(app)

@@ -1,4 +1,6 @@
-"""Contents of the site: the parts and pages that docs/README.md lists, and the pages that are generated."""
+"""Contents of the site: the parts and pages that docs/README.md lists, and the pages that are
+generated.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,9 @@ DOCS = Path(__file__).resolve().parents[1]
 ROOT = DOCS.parent
 GENERATED = {"Reference": ("models/index", "commands/index", "functions/index")}
 """Indices of generated pages, which follow the pages that a part lists."""
-ITEM = re.compile(r"^\* \[(?P<title>[^\]]+)\]\((?P<target>[^)]+)\): (?P<text>.*(?:\n  \S.*)*)", re.MULTILINE)
+ITEM = re.compile(
+    r"^\* \[(?P<title>[^\]]+)\]\((?P<target>[^)]+)\): (?P<text>.*(?:\n  \S.*)*)", re.MULTILINE
+)
 LINK = re.compile(r"(?<!!)\[(?P<label>(?:[^\[\]]|\[[^\]]*\])*)\]\((?P<target>[^)\s]+)\)")
 IMAGE = re.compile(r"!\[[^\]]*\]\((?P<target>[^)\s]+)\)")
 FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
@@ -25,7 +29,9 @@ class Item(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part of the documentation: its heading, the heading above it if any, its introduction and its pages."""
+    """A part of the documentation: its heading, the heading above it if any, its introduction and
+    its pages.
+    """
 
     title: str
     above: str
@@ -35,11 +41,16 @@ class Part(NamedTuple):
 
 def parts(readme: Path = DOCS / "README.md") -> tuple[Part, ...]:
     """The parts of docs/README.md, one for each heading with a list."""
-    sections = re.split(r"^(#{2,3}) (.+)\n", readme.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
-    found, above = [], ""
+    sections = re.split(
+        r"^(#{2,3}) (.+)\n", readme.read_text(encoding="utf-8"), flags=re.MULTILINE
+    )[1:]
+    found = []
+    above = ""
     for level, title, body in zip(sections[::3], sections[1::3], sections[2::3], strict=True):
         above = title if level == "##" else above
-        items = tuple(Item(m["title"], m["target"], " ".join(m["text"].split())) for m in ITEM.finditer(body))
+        items = tuple(
+            Item(m["title"], m["target"], " ".join(m["text"].split())) for m in ITEM.finditer(body)
+        )
         introduction = ITEM.sub("", body).strip()
         if items:
             found.append(Part(title, above if level == "###" else "", introduction, items))
@@ -76,6 +87,8 @@ def broken_links(page: Path) -> list[str]:
         if re.match(r"[a-z]+:", target):
             continue
         file = (page.parent / target).resolve() if target else page
-        if not file.exists() or (anchor and anchor not in anchors(file.read_text(encoding="utf-8"))):
+        if not file.exists() or (
+            anchor and anchor not in anchors(file.read_text(encoding="utf-8"))
+        ):
             broken.append(f"{page.name}: {match['target']}")
     return broken

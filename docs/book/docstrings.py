@@ -16,7 +16,8 @@ HEADLINE = re.compile(r"(?P<name>[^=]*?[\w)]): (?P<formula>\S.*=.*)", re.DOTALL)
 FORMULA_FIRST = re.compile(r"[A-Za-z_^'(),0-9 -]{1,60}(?<![a-z]{4}) = ")
 """Beginning of a summary that is a formula itself, such as `u = K (r - y)`."""
 REMARK = re.compile(
-    r"[,;:.] +(?=(?P<word>[A-Za-z]+)(?![\w]* *[=(_^']))| (?=(?P<after>with|by|at|for|where|in|so|constant)\b)"
+    r"[,;:.] +(?=(?P<word>[A-Za-z]+)(?![\w]* *[=(_^']))|"
+    r" (?=(?P<after>with|by|at|for|where|in|so|constant)\b)"
 )
 """Beginning of the prose behind a formula: a word after punctuation, or a preposition."""
 ARGUMENT = re.compile(r"(?P<names>[a-z_]\w*(?:, [a-z_]\w*)*) {2,}(?P<meaning>\S.*)")
@@ -26,7 +27,9 @@ REFERENCE = re.compile(r"\s*(?:References?): .*$", re.DOTALL)
 
 
 class Parts(NamedTuple):
-    """Parts of a docstring: its first paragraph and the blocks after it, prose or indented lines."""
+    """Parts of a docstring: its first paragraph and the blocks after it, prose or indented
+    lines.
+    """
 
     summary: str
     blocks: tuple[str, ...]
@@ -88,26 +91,36 @@ def headline(summary: str, symbols: Collection[str]) -> str:
     """The summary of a law: its name, and its formula displayed below it."""
     text = " ".join(summary.split("\n"))
     match = HEADLINE.fullmatch(text)
-    name, formula = (match["name"], match["formula"]) if match else ("", text if FORMULA_FIRST.match(text) else "")
+    name, formula = (
+        (match["name"], match["formula"])
+        if match
+        else ("", text if FORMULA_FIRST.match(text) else "")
+    )
     if not formula:
         return markdown(text, symbols)
     formula, remark = split_remark(formula)
     if not formula:
         return markdown(text, symbols)
-    equations = [part for part in re.split(r"(?<=[\])\w]),?;? {2,}(?![^(]*\))", formula) if part.strip()]
+    equations = [
+        part for part in re.split(r"(?<=[\])\w]),?;? {2,}(?![^(]*\))", formula) if part.strip()
+    ]
     try:
         body = displayed(equations)
     except FormulaError:
         return markdown(text, symbols)
     end = markdown(remark, symbols) if remark else ""
-    return "\n\n".join(part for part in (markdown(name, symbols) + "." if name else "", body, end) if part)
+    return "\n\n".join(
+        part for part in (markdown(name, symbols) + "." if name else "", body, end) if part
+    )
 
 
 def split_remark(formula: str) -> tuple[str, str]:
     """A formula and the prose that follows it in the same sentence."""
     for match in REMARK.finditer(formula):
         word = match["word"] or match["after"]
-        if match["after"] or not (word in WORDS_OF_FORMULAS or (len(word) == 1 and word not in ARTICLES)):
+        if match["after"] or not (
+            word in WORDS_OF_FORMULAS or (len(word) == 1 and word not in ARTICLES)
+        ):
             return formula[: match.start()].rstrip(",;:. "), formula[match.end() :]
     return formula.rstrip("."), ""
 

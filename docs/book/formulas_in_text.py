@@ -1,7 +1,9 @@
-"""Formulas within prose: docstrings and indented blocks of pages as Markdown with rendered formulas.
+"""Formulas within prose: docstrings and indented blocks of pages as Markdown with rendered
+formulas.
 
-A formula of a docstring is a sequence of mathematical tokens that contains a relation, or a single symbol with an index
-or a Greek name. Prose between them remains, with the characters escaped that Markdown would interpret.
+A formula of a docstring is a sequence of mathematical tokens that contains a relation, or a single
+symbol with an index or a Greek name. Prose between them remains, with the characters escaped that
+Markdown would interpret.
 """
 
 from __future__ import annotations
@@ -14,7 +16,8 @@ from .latex_symbols import GREEK
 
 PIECE = re.compile(
     r"(?P<code>`[^`]+`)|(?P<space>\s+)"
-    r"|(?P<unit>(?<=\s)\[[^\]+=]{0,20}\](?=[\s.,;:)]|$)|(?<!\w)(?:N/mm|N s/m|N m/rad|rad/s|m/s|W/K|l/min)(?!\w))"
+    r"|(?P<unit>(?<=\s)\[[^\]+=]{0,20}\](?=[\s.,;:)]|$)|(?<!\w)(?:N/mm|N s/m|N"
+    r" m/rad|rad/s|m/s|W/K|l/min)(?!\w))"
     r"|(?P<equation>(?<![\w)])\(\d+[a-z]?\)(?:[-–]\(\d+\))?)"
     r"|(?P<number>\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![A-Za-z_\d]))"
     r"|(?P<name>[^\W\d_][^\W_]*(?:-[^\W\d_]{2,})*)"
@@ -22,7 +25,12 @@ PIECE = re.compile(
     r"|(?P<sign>\.\.\.|\.\.|[+*/^_'|−-])|(?P<open>[(\[{])|(?P<close>[)\]}])|(?P<stop>[,;:.])|(?P<other>.)"
 )
 ARTICLES = ("a", "A", "I")
-WORDS_OF_FORMULAS = FUNCTIONS | WORD_FUNCTIONS | GREEK | {"sqrt", "eps", "qm", "hA", "Re", *SUMS} - {"sum", "integral"}
+WORDS_OF_FORMULAS = (
+    FUNCTIONS
+    | WORD_FUNCTIONS
+    | GREEK
+    | {"sqrt", "eps", "qm", "hA", "Re", *SUMS} - {"sum", "integral"}
+)
 ESCAPED = re.compile(r"([\\*_<>\[\]|#$])")
 Pieces = list[tuple[str, str]]
 
@@ -41,7 +49,9 @@ def symbols_of(text: str) -> frozenset[str]:
 
 
 def markdown(paragraph: str, symbols: Collection[str] = ()) -> str:
-    """A paragraph with its formulas as mathematics; `symbols` are letters that are set as such also alone."""
+    """A paragraph with its formulas as mathematics; `symbols` are letters that are set as such also
+    alone.
+    """
     text = " ".join(paragraph.split()) if "  " not in paragraph else paragraph.replace("\n", " ")
     pieces: Pieces = [(str(match.lastgroup), match[0]) for match in PIECE.finditer(text)]
     result = []
@@ -55,18 +65,30 @@ def _prose(run: Pieces) -> str:
 
 
 def _rendered(run: Pieces, symbols: Collection[str]) -> str:
-    """A run of mathematical tokens, without the punctuation around it, as a formula if it is one."""
-    first, last = 0, len(run)
+    """A run of mathematical tokens, without the punctuation around it, as a formula if it is
+    one.
+    """
+    first = 0
+    last = len(run)
     while first < last and run[first][0] in ("space", "stop", "close"):
         first += 1
-    while last > first and (run[last - 1][0] in ("space", "stop", "open") or run[last - 1][1] in "+-/"):
+    while last > first and (
+        run[last - 1][0] in ("space", "stop", "open") or run[last - 1][1] in "+-/"
+    ):
         last -= 1
     while first < last and run[first][0] == "open" and not _balanced(run[first:last]):
         first += 1
-    if run[first:last] and run[first][1] == "(" and run[last - 1][1] == ")" and _is_remark(run[first + 1 : last - 1]):
-        first, last = first + 1, last - 1
+    if (
+        run[first:last]
+        and run[first][1] == "("
+        and run[last - 1][1] == ")"
+        and _is_remark(run[first + 1 : last - 1])
+    ):
+        first = first + 1
+        last = last - 1
     body = _balanced(run[first:last])
-    first_text, last_text = _prose(run[:first]), _prose(run[first + len(body) :])
+    first_text = _prose(run[:first])
+    last_text = _prose(run[first + len(body) :])
     text = "".join(piece for _, piece in body)
     if not _is_formula(body, symbols):
         return _prose(run)
@@ -83,7 +105,8 @@ def _is_remark(inside: Pieces) -> bool:
 
 def _balanced(run: Pieces) -> Pieces:
     """The longest beginning of a run whose brackets match."""
-    depth, end = 0, 0
+    depth = 0
+    end = 0
     for index, (kind, _) in enumerate(run, 1):
         depth += (kind == "open") - (kind == "close")
         if depth < 0:
@@ -106,7 +129,11 @@ def _is_formula(run: Pieces, symbols: Collection[str]) -> bool:
     indexed = "_" in texts or any(name in GREEK or name in ("eps", "qm") for name in names)
     if len(run) == 1:
         return indexed or names[0] in symbols or bool(re.fullmatch(r"[A-Za-z]\d", names[0]))
-    return indexed or any(sign in texts for sign in ("^", "/", "+", "'")) or all(name in symbols for name in names)
+    return (
+        indexed
+        or any(sign in texts for sign in ("^", "/", "+", "'"))
+        or all(name in symbols for name in names)
+    )
 
 
 def _runs(pieces: Pieces, symbols: Collection[str]) -> Iterator[tuple[bool, Pieces]]:
@@ -126,13 +153,20 @@ def _runs(pieces: Pieces, symbols: Collection[str]) -> Iterator[tuple[bool, Piec
 
 
 def _continues(run: Pieces, rest: Pieces, symbols: Collection[str]) -> bool:
-    """Whether the comma at the beginning of `rest` separates arguments within brackets of the run before it."""
+    """Whether the comma at the beginning of `rest` separates arguments within brackets of the run
+    before it.
+    """
     depth = sum((kind == "open") - (kind == "close") for kind, _ in run)
-    if rest[0][1] not in (",", ";") or len(rest) < 3 or depth <= 0 or not any(kind == "name" for kind, _ in run):
+    if (
+        rest[0][1] not in (",", ";")
+        or len(rest) < 3
+        or depth <= 0
+        or not any(kind == "name" for kind, _ in run)
+    ):
         return False
-    return _is_mathematical(rest, 2, symbols) and _is_mathematical(rest, min(3, len(rest) - 1), symbols) | (
-        rest[min(3, len(rest) - 1)][0] in ("space", "close", "stop")
-    )
+    return _is_mathematical(rest, 2, symbols) and _is_mathematical(
+        rest, min(3, len(rest) - 1), symbols
+    ) | (rest[min(3, len(rest) - 1)][0] in ("space", "close", "stop"))
 
 
 def _is_mathematical(pieces: Pieces, index: int, symbols: Collection[str]) -> bool:
@@ -143,7 +177,9 @@ def _is_mathematical(pieces: Pieces, index: int, symbols: Collection[str]) -> bo
         return False
     following = pieces[index + 1][1] if index + 1 < len(pieces) else ""
     if len(text) == 1:
-        return text not in ARTICLES or following in ("_", "^", "/", ":") or _beside_sign(pieces, index)
+        return (
+            text not in ARTICLES or following in ("_", "^", "/", ":") or _beside_sign(pieces, index)
+        )
     indexed = following == "_" and len(text) <= 2
     if following == "_" and text in FUNCTIONS:
         return False  # a name of the code, such as min_angle
@@ -156,11 +192,18 @@ def _is_mathematical(pieces: Pieces, index: int, symbols: Collection[str]) -> bo
 
 
 def _beside_sign(pieces: Pieces, index: int) -> bool:
-    """Whether a letter that is also an article stands beside a sign, a relation or the end of a bracket."""
+    """Whether a letter that is also an article stands beside a sign, a relation or the end of a
+    bracket.
+    """
     behind = [piece for piece in pieces[index + 1 : index + 3] if piece[0] != "space"][:1]
     before = [piece for piece in pieces[max(0, index - 2) : index] if piece[0] != "space"][-1:]
     signs = ("relation", "sign")
-    if behind and behind[0][0] == "name" and behind[0][1] not in WORDS_OF_FORMULAS and len(behind[0][1]) > 3:
+    if (
+        behind
+        and behind[0][0] == "name"
+        and behind[0][1] not in WORDS_OF_FORMULAS
+        and len(behind[0][1]) > 3
+    ):
         return False
     closed = bool(behind and before) and behind[0][0] == "close" and before[0][0] == "name"
     return closed or any(kind in signs for kind, _ in [*before, *behind])
@@ -168,12 +211,16 @@ def _beside_sign(pieces: Pieces, index: int) -> bool:
 
 def displayed(lines: Collection[str]) -> str:
     """Lines of formulas as displayed mathematics. Raises FormulaError if one is no formula."""
-    blocks = [f"```{{math}}\n{to_latex(line.rstrip(',. '))}\n```\n" for line in lines if line.strip()]
+    blocks = [
+        f"```{{math}}\n{to_latex(line.rstrip(',. '))}\n```\n" for line in lines if line.strip()
+    ]
     return "\n".join(blocks)
 
 
 def is_formula_block(lines: Collection[str]) -> bool:
-    """Whether an indented block of a page contains formulas only: no quotes, commands or file names."""
+    """Whether an indented block of a page contains formulas only: no quotes, commands or file
+    names.
+    """
     text = "\n".join(lines)
     if re.search(r"[\"`$#@\\]|--|\.(?:toml|py|csv|html|md)\b|^\s*\[\w+\]\s*$", text, re.MULTILINE):
         return False

@@ -1,4 +1,6 @@
-"""Pages of the Python interface: functions and classes in the faces of the packages, with signature and docstring."""
+"""Pages of the Python interface: functions and classes in the faces of the packages, with signature
+and docstring.
+"""
 
 from __future__ import annotations
 
@@ -61,13 +63,21 @@ def pages() -> Iterator[tuple[str, str]]:
 
 
 def _names(module: str) -> list[str]:
-    """The functions and classes of a face, or of a module without one, that are not models, in alphabetical order."""
+    """The functions and classes of a face, or of a module without one, that are not models, in
+    alphabetical order.
+    """
     face = importlib.import_module(module)
     models = frozenset(model_names())
-    own = [name for name, thing in vars(face).items() if getattr(thing, "__module__", "") == module and name[0] != "_"]
+    own = [
+        name
+        for name, thing in vars(face).items()
+        if getattr(thing, "__module__", "") == module and name[0] != "_"
+    ]
     things = ((name, getattr(face, name)) for name in getattr(face, "__all__", own))
     return sorted(
-        name for name, thing in things if (inspect.isfunction(thing) or inspect.isclass(thing)) and name not in models
+        name
+        for name, thing in things
+        if (inspect.isfunction(thing) or inspect.isclass(thing)) and name not in models
     )
 
 
@@ -76,8 +86,9 @@ def overview(modules: list[str]) -> str:
     lines = [f"* [{FACES[name]}]({name}.md): `{room_of(name)}`" for name in modules]
     tree = "\n".join(modules)
     head = (
-        "# Python interface\n\nFunctions and classes that users import, by package. Models, which files may name too, "
-        "have [pages of their own](../models/index.md); the [nomenclature](../nomenclature.md) explains arguments.\n"
+        "# Python interface\n\nFunctions and classes that users import, by package. Models, which"
+        " files may name too, have [pages of their own](../models/index.md); the"
+        " [nomenclature](../nomenclature.md) explains arguments.\n"
     )
     return "\n".join([head, *lines, "", f"```{{toctree}}\n:hidden:\n\n{tree}\n```", ""])
 
@@ -137,14 +148,20 @@ def arguments(args: ast.arguments) -> Iterator[str]:
 
 def annotation(node: ast.expr) -> str:
     """The text of an annotation, without the quotes of a name that is defined later."""
-    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ast.unparse(node)
+    return (
+        node.value
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        else ast.unparse(node)
+    )
 
 
 def _argument(arg: ast.arg, default: ast.expr | None) -> str:
     text = f"{arg.arg}: {annotation(arg.annotation)}" if arg.annotation else arg.arg
     if default is None:
         return text
-    return f"{text} = {ast.unparse(default)}" if arg.annotation else f"{text}={ast.unparse(default)}"
+    return (
+        f"{text} = {ast.unparse(default)}" if arg.annotation else f"{text}={ast.unparse(default)}"
+    )
 
 
 def function_section(name: str, function: Any, level: int = 2) -> str:
@@ -158,7 +175,11 @@ def class_section(name: str, cls: type[Any]) -> str:
     parts = [f"## {name}\n", to_markdown(docstring(cls))]
     for method, member in vars(cls).items():
         function = member.__func__ if isinstance(member, classmethod | staticmethod) else member
-        text = docstring(function) if inspect.isfunction(function) or isinstance(member, property) else ""
+        text = (
+            docstring(function)
+            if inspect.isfunction(function) or isinstance(member, property)
+            else ""
+        )
         if method.startswith("_") or not text:
             continue
         label = f"{name}.{method}"

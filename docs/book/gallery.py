@@ -1,4 +1,6 @@
-"""Gallery: the code blocks of docs/gallery.md, run while the site is built, with the figures that they make."""
+"""Gallery: the code blocks of docs/gallery.md, run while the site is built, with the figures that
+they make.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,10 @@ from airmuscle.core import plotting
 from .contents import DOCS
 
 PAGE = DOCS / "gallery.md"
-SECTION = re.compile(r"^## (?P<title>.+)\n(?P<text>(?:(?!## ).*\n)*?)```python\n(?P<code>[\s\S]*?)```\n", re.MULTILINE)
+SECTION = re.compile(
+    r"^## (?P<title>.+)\n(?P<text>(?:(?!## ).*\n)*?)```python\n(?P<code>[\s\S]*?)```\n",
+    re.MULTILINE,
+)
 
 
 class Example(NamedTuple):
@@ -38,7 +43,9 @@ def figure_of(example: Example) -> Any:
 
 
 def write(folder: Path) -> Iterator[str]:
-    """Add the figures to the page in the source folder of the site; yields the title of each section."""
+    """Add the figures to the page in the source folder of the site; yields the title of each
+    section.
+    """
     text = PAGE.read_text(encoding="utf-8")
     (folder / "images").mkdir(parents=True, exist_ok=True)
     with warnings.catch_warnings():
@@ -48,6 +55,7 @@ def write(folder: Path) -> Iterator[str]:
             name = f"images/gallery-{number}.svg"
             plotting.save(figure_of(example), folder / name)
             text = text.replace(
-                f"```python\n{example.code}", f"![{example.title}]({name})\n\n```python\n{example.code}"
+                f"```python\n{example.code}",
+                f"![{example.title}]({name})\n\n```python\n{example.code}",
             )
     (folder / PAGE.name).write_text(text, encoding="utf-8")

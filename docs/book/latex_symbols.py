@@ -4,16 +4,42 @@ from __future__ import annotations
 
 import re
 
-GREEK = frozenset([
-    "alpha", "beta", "gamma", "delta", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "xi", "pi", "rho",
-    "sigma", "tau", "phi", "psi", "omega", "Delta", "Gamma", "Omega", "Phi", "Theta",
-])  # fmt: skip
+GREEK = frozenset(
+    [
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "zeta",
+        "eta",
+        "theta",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "xi",
+        "pi",
+        "rho",
+        "sigma",
+        "tau",
+        "phi",
+        "psi",
+        "omega",
+        "Delta",
+        "Gamma",
+        "Omega",
+        "Phi",
+        "Theta",
+    ]
+)
 DIFFERENTIAL = re.compile(rf"d(?:[A-Z]|[a-z]|eps|{'|'.join(sorted(GREEK))})")
 """A differential such as dV; it stands beside a solidus or closes an integral."""
 
 
 def symbol(text: str) -> str:
-    """LaTeX of a name: a Greek letter, a letter with a number as index, a differential, or a word set upright."""
+    """LaTeX of a name: a Greek letter, a letter with a number as index, a differential, or a word
+    set upright.
+    """
     if text in GREEK:
         return rf"\{text} "
     if text in ("eps", "epsilon"):

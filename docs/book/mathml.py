@@ -11,7 +11,9 @@ from airmuscle.report.formatting import to_display_mathml, to_mathml
 
 def set_up_mathml(app: Any) -> None:
     """Register the renderer `mathml`."""
-    app.add_html_math_renderer("mathml", inline_renderers=(_inline, None), block_renderers=(_block, None))
+    app.add_html_math_renderer(
+        "mathml", inline_renderers=(_inline, None), block_renderers=(_block, None)
+    )
 
 
 def _inline(translator: Any, node: Any) -> None:
@@ -21,5 +23,7 @@ def _inline(translator: Any, node: Any) -> None:
 
 
 def _block(translator: Any, node: Any) -> None:
-    translator.body.append(f'<div class="formula" tabindex="0">{to_display_mathml(node.astext())}</div>\n')
+    translator.body.append(
+        f'<div class="formula" tabindex="0">{to_display_mathml(node.astext())}</div>\n'
+    )
     raise nodes.SkipNode

@@ -46,13 +46,17 @@ def rooms() -> dict[str, list[type[Any]]]:
     packages = {package.__name__.rpartition(".")[2]: package for package in PACKAGES}
     classes = [model_class(name, "documentation") for name in model_names()]
     return {
-        room: sorted((c for c in classes if c.__name__ in packages[room].__all__), key=lambda c: c.__name__)
+        room: sorted(
+            (c for c in classes if c.__name__ in packages[room].__all__), key=lambda c: c.__name__
+        )
         for room in ROOMS
     }
 
 
 def pages(pictures: Iterable[str] = ()) -> Iterator[tuple[str, str]]:
-    """(path without suffix, text) of all pages; `pictures` are the classes with a file models/images/NAME.svg."""
+    """(path without suffix, text) of all pages; `pictures` are the classes with a file
+    models/images/NAME.svg.
+    """
     drawn = frozenset(pictures)
     yield "models/index", overview()
     for room, classes in rooms().items():
@@ -65,9 +69,11 @@ def overview() -> str:
     """The index of all models."""
     lines = [
         "# Models\n",
-        "Every model that a library or scenario file may name, with its formula, parameters, bounds and references. "
-        "The pages are generated from the declarations in the code. Values are in SI units; files and the command line "
-        "also accept texts with a unit.\n",
+        (
+            "Every model that a library or scenario file may name, with its formula, parameters,"
+            " bounds and references. The pages are generated from the declarations in the code."
+            " Values are in SI units; files and the command line also accept texts with a unit.\n"
+        ),
     ]
     for room, classes in rooms().items():
         lines.append(f"* [{ROOMS[room]}]({room}/index.md): {len(classes)} models")
@@ -83,7 +89,9 @@ def first_sentence(cls: type[Any]) -> str:
 
 
 def face_of(room: str) -> str:
-    """The face from which users import the models of a package: a room, or a collection of the muscle's parts."""
+    """The face from which users import the models of a package: a room, or a collection of the
+    muscle's parts.
+    """
     if room in ("characteristic", "geometry", "friction"):
         return f"airmuscle.{room}"
     package = next(package for package in PACKAGES if package.__name__.endswith(f".{room}"))
@@ -95,7 +103,9 @@ def room_page(room: str, classes: list[type[Any]]) -> str:
     rows = [(f"[{cls.__name__}]({cls.__name__}.md)", first_sentence(cls)) for cls in classes]
     tree = "\n".join(cls.__name__ for cls in classes)
     head = f"# {ROOMS[room]}\n\nModels of `{face_of(room)}`.\n"
-    return f"{head}\n{table(('model', 'definition'), rows)}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
+    return (
+        f"{head}\n{table(('model', 'definition'), rows)}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
+    )
 
 
 def model_page(cls: type[Any], room: str, drawn: bool) -> str:
@@ -148,13 +158,20 @@ def parameter_section(declared: Iterable[Parameter]) -> str:
         return ""
     rows = [
         (
-            symbol(p.symbol), f"`{p.name}`", escape(p.unit), bounds_text(*p.bounds),
-            default_text(p.default if p.default is not dataclasses.MISSING else inspect.Parameter.empty),
+            symbol(p.symbol),
+            f"`{p.name}`",
+            escape(p.unit),
+            bounds_text(*p.bounds),
+            default_text(
+                p.default if p.default is not dataclasses.MISSING else inspect.Parameter.empty
+            ),
             escape(p.meaning) + ("" if p.fitted else " (not fitted by default)"),
         )
         for p in fields
-    ]  # fmt: skip
-    return "## Parameters\n\n" + table(("symbol", "name", "unit", "allowed", "default", "meaning"), rows)
+    ]
+    return "## Parameters\n\n" + table(
+        ("symbol", "name", "unit", "allowed", "default", "meaning"), rows
+    )
 
 
 def component_section(cls: type[Any]) -> str:
@@ -166,7 +183,11 @@ def component_section(cls: type[Any]) -> str:
     if not fields:
         return ""
     rows = [
-        (f"`{f.name}`", _linked(hints[f.name]) if f.name in hints else f"`{f.type}`", default_text(_default(f)))
+        (
+            f"`{f.name}`",
+            _linked(hints[f.name]) if f.name in hints else f"`{f.type}`",
+            default_text(_default(f)),
+        )
         for f in fields
     ]
     return "## Components and options\n\n" + table(("name", "value", "default"), rows)
@@ -180,7 +201,9 @@ def _linked(hint: Any) -> str:
     """An annotation in words, with links to the pages of models."""
     places = {cls.__name__: room for room, classes in rooms().items() for cls in classes}
     return re.sub(
-        r"\w+", lambda m: f"[{m[0]}](../{places[m[0]]}/{m[0]}.md)" if m[0] in places else m[0], escape(describe(hint))
+        r"\w+",
+        lambda m: f"[{m[0]}](../{places[m[0]]}/{m[0]}.md)" if m[0] in places else m[0],
+        escape(describe(hint)),
     )
 
 
@@ -188,14 +211,21 @@ def property_section(cls: type[Any]) -> str:
     """Solution in closed form or by search, and use in plants, of a static characteristic."""
     if not issubclass(cls, Characteristic):
         return ""
-    base = next(kind for kind in (ForceLaw, ContractionLaw, PressureLaw, Characteristic) if issubclass(cls, kind))
+    base = next(
+        kind
+        for kind in (ForceLaw, ContractionLaw, PressureLaw, Characteristic)
+        if issubclass(cls, kind)
+    )
     own = [word for method, word in DIRECTIONS.items() if _defines(cls, method, base)]
     searched = [word for word in DIRECTIONS.values() if word not in own]
     lines = [f"* Given by the model itself: {', '.join(own)}."]
     if searched:
         lines.append(f"* By a bracketed root search with exact slopes: {', '.join(searched)}.")
     if not cls.traceable:
-        lines.append("* Not in closed form: a plant uses it through `as_force_law`, which estimates its maximum error.")
+        lines.append(
+            "* Not in closed form: a plant uses it through `as_force_law`, which estimates its"
+            " maximum error."
+        )
     return "## Directions\n\n" + "\n".join(lines) + "\n"
 
 
@@ -240,8 +270,12 @@ def _validity(entry: Entry) -> str:
     limits = entry.validity_range
     if limits is None:
         return "–"
-    (low, high), (first, last) = limits.pressure, limits.contraction
-    return f"{low / 1e3:.4g} to {high / 1e3:.4g} kPa, {100 * first:.3g} to {100 * last:.3g}\N{NO-BREAK SPACE}%"
+    low, high = limits.pressure
+    first, last = limits.contraction
+    return (
+        f"{low / 1e3:.4g} to {high / 1e3:.4g} kPa, {100 * first:.3g} to"
+        f" {100 * last:.3g}\N{NO-BREAK SPACE}%"
+    )
 
 
 def _references(cls: type[Any]) -> tuple[Reference, ...]:

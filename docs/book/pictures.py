@@ -1,6 +1,8 @@
-"""Pictures of models: isobars of characteristics, loops of friction laws, outlines of geometries, flow of valves.
+"""Pictures of models: isobars of characteristics, loops of friction laws, outlines of geometries,
+flow of valves.
 
-A model that needs parameters is drawn with those of its first library entry, otherwise with the chosen ones of SAMPLES.
+A model that needs parameters is drawn with those of its first library entry, otherwise with the
+chosen ones of SAMPLES.
 """
 
 from __future__ import annotations
@@ -72,7 +74,9 @@ def draw(cls: type[Any]) -> Any:
         figure.axes[0].set_title(title, fontsize=9)
         return figure
     drawing = {Geometry: _outline, Orifice: _flow, PulleyProfile: _profile}
-    return next((draw(thing, title) for kind, draw in drawing.items() if isinstance(thing, kind)), None)
+    return next(
+        (draw(thing, title) for kind, draw in drawing.items() if isinstance(thing, kind)), None
+    )
 
 
 def _example(cls: type[Any]) -> tuple[Any, str]:
@@ -102,21 +106,30 @@ def _outline(shape: Geometry, title: str) -> Any:
     low, high = shape.contraction_range
     contractions = np.linspace(max(0.0, low), min(0.35, 0.98 * high), 4)
     figure, (left, right) = plotting.new_figure(1, 2, width=8.0, height=3.0)
-    for contraction, colour, dash in zip(contractions, plotting.LINES, plotting.DASHES, strict=False):
+    for contraction, colour, dash in zip(
+        contractions, plotting.LINES, plotting.DASHES, strict=False
+    ):
         x, radius = shape.outline(float(contraction))
-        left.plot(1e3 * x, 1e3 * radius, color=colour, linestyle=dash, label=f"{100 * contraction:.0f} %")
+        left.plot(
+            1e3 * x, 1e3 * radius, color=colour, linestyle=dash, label=f"{100 * contraction:.0f} %"
+        )
     figure.suptitle(title, fontsize=9)
     left.set(xlabel="axial position [mm]", ylabel="radius [mm]", ylim=(0.0, None))
     left.legend(title="contraction")
     grid = np.linspace(contractions[0], contractions[-1], 81)
-    right.plot(100 * grid, 1e6 * np.array([float(shape.volume(float(c))) for c in grid]), color=plotting.BLUE)
+    right.plot(
+        100 * grid,
+        1e6 * np.array([float(shape.volume(float(c))) for c in grid]),
+        color=plotting.BLUE,
+    )
     right.set(xlabel="contraction [%]", ylabel="volume [cm³]")
     return figure
 
 
 def _flow(valve: Orifice, title: str) -> Any:
     """Mass flow of a valve, fully open, over the downstream pressure."""
-    upstream, downstream = 7e5, np.linspace(1e5, 8e5, 281)
+    upstream = 7e5
+    downstream = np.linspace(1e5, 8e5, 281)
     figure, axes = plotting.new_figure(width=5.6, height=3.2)
     flow = [float(valve.mass_flow(upstream, float(p), 1.0, 293.15)) for p in downstream]
     axes.plot(downstream / 1e5, 1e3 * np.array(flow), color=plotting.BLUE)
@@ -130,8 +143,12 @@ def _profile(profile: PulleyProfile, title: str) -> Any:
     """Ratio of a pulley profile over the joint angle."""
     angles = np.linspace(-1.0, 1.0, 101)
     figure, axes = plotting.new_figure(width=5.6, height=2.8)
-    axes.plot(np.degrees(angles), [float(profile.ratio(float(a))) for a in angles], color=plotting.BLUE)
-    axes.set(xlabel="joint angle [deg]", ylabel="moment arm over radius", ylim=(0.0, None), title=title)
+    axes.plot(
+        np.degrees(angles), [float(profile.ratio(float(a))) for a in angles], color=plotting.BLUE
+    )
+    axes.set(
+        xlabel="joint angle [deg]", ylabel="moment arm over radius", ylim=(0.0, None), title=title
+    )
     return figure
 
 

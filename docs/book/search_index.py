@@ -1,6 +1,8 @@
-"""Index of the search: title, address and text of every section, as a script, which also a page from a file may load.
+"""Index of the search: title, address and text of every section, as a script, which also a page
+from a file may load.
 
-The search of Sphinx requires all words and reads the pages again for their excerpts, which a browser refuses for files.
+The search of Sphinx requires all words and reads the pages again for their excerpts, which a
+browser refuses for files.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ def set_up_search(app: Any) -> None:
 def _write_index(app: Any, error: Exception | None) -> None:
     if error is None and app.builder.name == "html":
         rows = index_rows(Path(app.outdir))
-        text = f"window.bookSections = {json.dumps(rows, ensure_ascii=False, separators=(',', ':'))};\n"
+        text = (
+            "window.bookSections ="
+            f" {json.dumps(rows, ensure_ascii=False, separators=(',', ':'))};\n"
+        )
         (Path(app.outdir) / "_static" / "search_index.js").write_text(text, encoding="utf-8")
 
 
@@ -47,7 +52,8 @@ def page_rows(name: str, article: str) -> list[list[str]]:
     ends = [match.start() for match in starts[1:]] + [len(article)]
     rows = []
     for match, end in zip(starts, ends, strict=True):
-        heading, title = plain(match[2]), plain(starts[0][2])
+        heading = plain(match[2])
+        title = plain(starts[0][2])
         address = name if match is starts[0] else f"{name}#{match[1]}"
         body = article[article.index("</a>", match.end()) + len("</a>") : end]
         rows.append([title, heading, address, plain(body)[:MAX_TEXT]])

@@ -1,4 +1,6 @@
-"""Source folder of the site: pages of docs/ with rendered formulas and links of the site, and generated pages."""
+"""Source folder of the site: pages of docs/ with rendered formulas and links of the site, and
+generated pages.
+"""
 
 from __future__ import annotations
 
@@ -23,9 +25,14 @@ COPIED = (
 )
 """Pages outside docs/ that belong to the site."""
 INDENTED = re.compile(r"(?<=\n\n)(?:    .*\n|\n(?=    ))+(?=\n|\Z)")
-KEPT = re.compile(r"(^ {4}.*?$|^```.*?^```|`[^`]*`|\]\([^)]*\)|^\[[^\]]*\]:.*?$|<[^>]+>)", re.MULTILINE | re.DOTALL)
+KEPT = re.compile(
+    r"(^ {4}.*?$|^```.*?^```|`[^`]*`|\]\([^)]*\)|^\[[^\]]*\]:.*?$|<[^>]+>)",
+    re.MULTILINE | re.DOTALL,
+)
 _GREEK = "|".join(sorted(GREEK - {"psi", "pi"} | {"eps"}, key=len, reverse=True))
-SYMBOL = re.compile(rf"(?<![\w\\/.^-])(?:(?:{_GREEK}|[A-Za-z])_[A-Za-z0-9]+|(?:{_GREEK})'?)(?![\w(/.^-]\w|\w|\()")
+SYMBOL = re.compile(
+    rf"(?<![\w\\/.^-])(?:(?:{_GREEK}|[A-Za-z])_[A-Za-z0-9]+|(?:{_GREEK})'?)(?![\w(/.^-]\w|\w|\()"
+)
 FENCED = re.compile(r"(^```.*?^```\n?)", re.MULTILINE | re.DOTALL)
 
 
@@ -37,7 +44,11 @@ def write_sources(folder: Path, pictures: tuple[str, ...]) -> None:
         text = (ROOT / name).read_text(encoding="utf-8")
         write(folder / name, site_text(text, depth=name.count("/")))
     shutil.copytree(DOCS / "images", folder / "images", dirs_exist_ok=True)
-    for path, text in (*model_pages.pages(pictures), *command_pages.pages(), *function_pages.pages()):
+    for path, text in (
+        *model_pages.pages(pictures),
+        *command_pages.pages(),
+        *function_pages.pages(),
+    ):
         write(folder / f"{path}.md", text)
     write(folder / "index.md", index(parts()))
 
@@ -49,7 +60,9 @@ def write(path: Path, text: str) -> None:
 
 
 def site_text(text: str, depth: int = 0) -> str:
-    """A page of the repository as a page of the site: indented formulas are rendered, links lead to the site."""
+    """A page of the repository as a page of the site: indented formulas are rendered, links lead to
+    the site.
+    """
     pieces = FENCED.split(text)
     for i in range(0, len(pieces), 2):
         pieces[i] = typeset_symbols(INDENTED.sub(_formula_block, pieces[i]))
@@ -58,7 +71,9 @@ def site_text(text: str, depth: int = 0) -> str:
 
 
 def typeset_symbols(prose: str) -> str:
-    """Prose with the symbols in it, such as theta_g, as mathematics; code, targets of links and blocks stay."""
+    """Prose with the symbols in it, such as theta_g, as mathematics; code, targets of links and
+    blocks stay.
+    """
     pieces = KEPT.split(prose)
     for i in range(0, len(pieces), 2):
         pieces[i] = SYMBOL.sub(_symbol, pieces[i])
@@ -80,10 +95,13 @@ def _formula_block(match: re.Match[str]) -> str:
 
 
 def _links(text: str, up: str = "") -> str:
-    """Links of the repository as links of the site, from below `up`; what is not part of it is shown without link."""
+    """Links of the repository as links of the site, from below `up`; what is not part of it is
+    shown without link.
+    """
 
     def replaced(match: re.Match[str]) -> str:
-        label, target = match[1], match[2]
+        label = match[1]
+        target = match[2]
         path, _, anchor = target.partition("#")
         name = re.sub(r"^(?:\.\./)+", "", path)
         if re.match(r"[a-z]+:", target) or target.startswith("#") or path.startswith("images/"):
@@ -106,9 +124,13 @@ def _document(target: str) -> str:
 
 
 def index(contents: tuple[Part, ...]) -> str:
-    """The first page: the four parts with their pages, and the tables of contents of the sidebar."""
+    """The first page: the four parts with their pages, and the tables of contents of the
+    sidebar.
+    """
     head = (DOCS / "book" / "index.md").read_text(encoding="utf-8")
-    lists, trees, above = [], [], ""
+    lists = []
+    trees = []
+    above = ""
     for part in contents:
         if part.above and part.above != above:
             lists.append(f"## {part.above}\n")
@@ -116,13 +138,17 @@ def index(contents: tuple[Part, ...]) -> str:
         lists.append(f"{'###' if part.above else '##'} {part.title}\n")
         if part.introduction:
             lists.append(part.introduction + "\n")
-        items = [f"* [{item.title}]({_document(item.target)}.md): {item.text}" for item in part.items]
+        items = [
+            f"* [{item.title}]({_document(item.target)}.md): {item.text}" for item in part.items
+        ]
         extra = GENERATED.get(part.title, ())
         items += [f"* {GENERATED_TEXTS[name]}" for name in extra]
         lists.append("\n".join(items) + "\n")
         pages = "\n".join([*(_document(item.target) for item in part.items), *extra])
         trees.append(f"```{{toctree}}\n:hidden:\n:caption: {part.title}\n\n{pages}\n```\n")
-    return "\n".join([head.replace("@repository@", _repository()), *(_links(text) for text in lists), *trees])
+    return "\n".join(
+        [head.replace("@repository@", _repository()), *(_links(text) for text in lists), *trees]
+    )
 
 
 def _repository() -> str:
@@ -133,7 +159,11 @@ def _repository() -> str:
 
 
 GENERATED_TEXTS = {
-    "models/index": "[Models](models/index.md): formula, parameters, bounds and references of each.",
-    "commands/index": "[Command line](commands/index.md): every command with its options and examples.",
+    "models/index": (
+        "[Models](models/index.md): formula, parameters, bounds and references of each."
+    ),
+    "commands/index": (
+        "[Command line](commands/index.md): every command with its options and examples."
+    ),
     "functions/index": "[Python interface](functions/index.md): functions and classes by package.",
 }

@@ -10,6 +10,10 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A Markdown table; vertical bars in cells are escaped once."""
 
     def line(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(re.sub(r"(?<!\\)\|", r"\\|", cell).replace("\n", " ") for cell in cells) + " |"
+        return (
+            "| "
+            + " | ".join(re.sub(r"(?<!\\)\|", r"\\|", cell).replace("\n", " ") for cell in cells)
+            + " |"
+        )
 
     return "\n".join([line(header), line(["---"] * len(header)), *map(line, rows), ""])

@@ -25,7 +25,12 @@ import static_fit
 from filling import runs
 
 from airmuscle.core import tree
-from airmuscle.design import benchmark_controllers, find_tasks, proportional_joint, standard_contenders
+from airmuscle.design import (
+    benchmark_controllers,
+    find_tasks,
+    proportional_joint,
+    standard_contenders,
+)
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule
 from airmuscle.engine.compile import compile_system
 
@@ -40,7 +45,10 @@ def test_the_page_of_the_control_benchmark_has_the_tables_of_a_result_in_their_u
         )
         text = "\n".join(control_page.part(found))
         error = found.metric("feed-forward", "step", "rmse").median
-        assert f"RMS error [deg], models only.\n\n| task | feed-forward |\n|---|---|\n| step | {error:.4g} |" in text
+        assert (
+            "RMS error [deg], models only.\n\n| task | feed-forward |\n|---|---|\n| step |"
+            f" {error:.4g} |" in text
+        )
         (searched,) = re.findall(r"\| controller \| gains .*\n.*\n(.*)", text)
         assert re.search(spread, searched)
         assert f"0 of {len(seeds)} searches converged" in control_page.convergence(found)
@@ -57,14 +65,18 @@ def test_the_hand_written_rates_are_those_of_the_plant(states):
 def test_the_hand_written_rates_are_equal_beyond_the_validity_range(pressure, position):
     """At points where the force is within its limits, so that the extrapolation is used."""
     case = runs()[3]
-    y = np.array(list(case.system.state_at(pressure=pressure, position=position, speed=0.1).values()))
+    y = np.array(
+        list(case.system.state_at(pressure=pressure, position=position, speed=0.1).values())
+    )
     rates = rodas4.hand_written_rates(case)(np.array([1.0, 0.5]))[0](0.0, y)
     np.testing.assert_allclose(rates, compile_system(case.system).rates(y, [1.0, 0.5]), rtol=1e-12)
 
 
 def test_different_equations_are_detected():
     case = runs()[3]
-    heavier = dataclasses.replace(case.system, mechanism=dataclasses.replace(case.system.mechanism, mass=5.001))
+    heavier = dataclasses.replace(
+        case.system, mechanism=dataclasses.replace(case.system.mechanism, mass=5.001)
+    )
     with pytest.raises(AssertionError, match="differ by"):
         rodas4.check_rates(case, compile_system(heavier))
 
@@ -83,11 +95,16 @@ def test_lsoda_computes_the_same_solution():
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
 @pytest.mark.slow
 def test_the_c_code_computes_the_same_steps(tmp_path):
-    """Over 0.2 s from a state beyond the validity range of the surface, with valve openings; equal to rounding."""
+    """Over 0.2 s from a state beyond the validity range of the surface, with valve openings; equal
+    to rounding.
+    """
     case = runs()[3]
     start = case.system.state_at(pressure=6.5e5, position=0.05)
-    short = dataclasses.replace(case, initial_state=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))}))
-    ready, segments = compile_system(case.system), short.command.segments(case.system.inputs, 0.0, 0.2)
+    short = dataclasses.replace(
+        case, initial_state=start, command=Schedule({"discharge": ((0.05, 1.0), (0.15, 0.0))})
+    )
+    ready = compile_system(case.system)
+    segments = short.command.segments(case.system.inputs, 0.0, 0.2)
     times = np.linspace(0.0, 0.2, 21)
     expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, short.vector, times).rows
     for library in ode8.compile_libraries(tmp_path).values():
@@ -97,7 +114,9 @@ def test_the_c_code_computes_the_same_steps(tmp_path):
 
 @pytest.mark.slow
 def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
-    """Over 0.7 s with the opening of a valve: 37 plants, a number that is not a multiple of any block size."""
+    """Over 0.7 s with the opening of a valve: 37 plants, a number that is not a multiple of any
+    block size.
+    """
     timed = batch.make_variants(tmp_path, 37, 0.7)
     assert any("C, gcc" in name for name in timed) or not ode8.compilers()
     final_states = {name: call() for name, (_, call) in timed.items()}
@@ -152,10 +171,16 @@ def test_the_section_of_controllers_has_a_row_for_each_call(monkeypatch):
 
 def test_a_section_and_its_targets_are_printed():
     case = runs()[3]
-    times = measure.time_variants({"kernel": rodas4.kernel(case, compile_system(case.system))}, rounds=2)
+    times = measure.time_variants(
+        {"kernel": rodas4.kernel(case, compile_system(case.system))}, rounds=2
+    )
     target = measure.Target("speed", 3.0, 4.0, "x", at_least=True, reason="a reason")
     section = measure.Section(
-        "title", "text", ("what", "time"), (("kernel", measure.format_time(times["kernel"].median)),), (target,)
+        "title",
+        "text",
+        ("what", "time"),
+        (("kernel", measure.format_time(times["kernel"].median)),),
+        (target,),
     )
     text = run.report([section], 1.0)
     assert "| speed | 3 x | >= 4 x | **missed** |" in text

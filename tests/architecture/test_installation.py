@@ -1,4 +1,6 @@
-"""Installation: the lock pins every requirement and contains no address; `./run` starts quickly if it is installed."""
+"""Installation: the lock pins every requirement and contains no address; `./run` starts quickly if
+it is installed.
+"""
 
 import importlib.machinery
 import importlib.resources
@@ -19,10 +21,18 @@ import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-LOCKS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("requirements.lock", "requirements-dev.lock")}
+LOCKS = {
+    name: (ROOT / name).read_text(encoding="utf-8")
+    for name in ("requirements.lock", "requirements-dev.lock")
+}
 ADDED = ("docs", "tools")
-ADDED_LOCKS = {f"requirements-{name}.lock": (ROOT / f"requirements-{name}.lock").read_text("utf-8") for name in ADDED}
-every = pytest.mark.parametrize("lock", [*LOCKS.values(), *ADDED_LOCKS.values()], ids=[*LOCKS, *ADDED_LOCKS])
+ADDED_LOCKS = {
+    f"requirements-{name}.lock": (ROOT / f"requirements-{name}.lock").read_text("utf-8")
+    for name in ADDED
+}
+every = pytest.mark.parametrize(
+    "lock", [*LOCKS.values(), *ADDED_LOCKS.values()], ids=[*LOCKS, *ADDED_LOCKS]
+)
 
 
 # The lock
@@ -36,7 +46,9 @@ def requirements(lock: str) -> list[str]:
 @every
 def test_the_lock_contains_no_address(lock: str):
     assert not re.search(r"://|^\s*-(-index|-extra|-find|-trusted|i|f)\b|@ ", lock, re.MULTILINE)
-    assert [path.name for path in ROOT.iterdir() if re.fullmatch(r"uv\.lock|pylock.*\.toml", path.name)] == []
+    assert [
+        path.name for path in ROOT.iterdir() if re.fullmatch(r"uv\.lock|pylock.*\.toml", path.name)
+    ] == []
 
 
 @every
@@ -46,7 +58,9 @@ def test_every_requirement_is_pinned_and_hashed(lock: str):
         assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry), entry
 
 
-@pytest.mark.parametrize(("lock", "extra"), [("requirements.lock", "build"), ("requirements-dev.lock", "dev")])
+@pytest.mark.parametrize(
+    ("lock", "extra"), [("requirements.lock", "build"), ("requirements-dev.lock", "dev")]
+)
 def test_the_lock_contains_all_dependencies_of_the_project(lock: str, extra: str):
     project = PROJECT["project"]
     required = project["dependencies"] + project["optional-dependencies"][extra]
@@ -57,7 +71,9 @@ def test_the_lock_contains_all_dependencies_of_the_project(lock: str, extra: str
 def test_the_program_is_installed_without_the_packages_of_the_checks():
     program, everything = (set(requirements(lock)) for lock in LOCKS.values())
     assert program < everything
-    assert not {"pytest", "mypy", "ruff", "hypothesis", "dask"} & {entry.split("==")[0] for entry in program}
+    assert not {"pytest", "mypy", "ruff", "hypothesis", "dask"} & {
+        entry.split("==")[0] for entry in program
+    }
 
 
 @pytest.mark.parametrize("added", ADDED_LOCKS.values(), ids=ADDED_LOCKS)
@@ -89,7 +105,8 @@ def recipe() -> dict[str, Any]:
 def test_the_conda_recipe_has_the_dependencies_of_the_package():
     """Its form alone: no conda-build is at hand."""
     stated = {
-        line.replace("matplotlib-base", "matplotlib").replace(" ", "") for line in recipe()["requirements"]["run"]
+        line.replace("matplotlib-base", "matplotlib").replace(" ", "")
+        for line in recipe()["requirements"]["run"]
     }
     project = PROJECT["project"]
     assert stated == {f"python{project['requires-python']}", *project["dependencies"]}
@@ -100,13 +117,16 @@ def test_the_conda_recipe_has_the_dependencies_of_the_package():
 
 def release_metadata() -> ModuleType:
     path = ROOT / "release" / "metadata.py"
-    module = importlib.util.module_from_spec(importlib.util.spec_from_file_location("metadata", path))
+    module = importlib.util.module_from_spec(
+        importlib.util.spec_from_file_location("metadata", path)
+    )
     importlib.machinery.SourceFileLoader("metadata", str(path)).exec_module(module)
     return module
 
 
 def test_links_of_the_readme_hold_outside_the_repository():
-    readme, portable = (ROOT / "README.md").read_text(encoding="utf-8"), release_metadata().portable_readme
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    portable = release_metadata().portable_readme
     relative = re.findall(r"\]\((?!https?://)([^)]+)\)", readme)
     text = portable(readme, "")
     assert len(relative) > 10
@@ -154,7 +174,9 @@ def load_run(folder: Path) -> ModuleType:
     return module
 
 
-needs_posix = pytest.mark.skipif(os.name == "nt", reason="the environment of this test is made of symbolic links")
+needs_posix = pytest.mark.skipif(
+    os.name == "nt", reason="the environment of this test is made of symbolic links"
+)
 
 
 @needs_posix
@@ -165,7 +187,12 @@ def test_a_second_start_adds_less_than_a_fifth_of_a_second(checkout: Path):
         before = os.times()
         subprocess.run([sys.executable, checkout / "run", "true"], check=True)
         after = os.times()
-        return after.children_user - before.children_user + after.children_system - before.children_system
+        return (
+            after.children_user
+            - before.children_user
+            + after.children_system
+            - before.children_system
+        )
 
     assert min(seconds() for _ in range(5)) < 0.2
 
@@ -180,7 +207,9 @@ def test_run_passes_arguments_and_exit_code(checkout: Path):
 
 @needs_posix
 def test_an_unknown_command_gives_one_line(checkout: Path):
-    done = subprocess.run([sys.executable, checkout / "run", "no-such-thing"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, checkout / "run", "no-such-thing"], capture_output=True, text=True
+    )
     assert done.returncode == 127
     assert done.stderr == "run: no command 'no-such-thing' in the environment or on the path\n"
 
@@ -190,12 +219,15 @@ def test_an_unknown_command_gives_one_line(checkout: Path):
 def test_a_changed_project_or_lock_invalidates_the_stamp(checkout: Path, changed: str):
     with (checkout / changed).open("a") as file:
         file.write("\n# changed\n")
-    assert load_run(checkout).read(str(checkout / ".venv" / "airmuscle.stamp")) != b"".join(load_run(checkout).stamp())
+    assert load_run(checkout).read(str(checkout / ".venv" / "airmuscle.stamp")) != b"".join(
+        load_run(checkout).stamp()
+    )
 
 
 @needs_posix
 def test_a_demo_and_the_program_do_not_need_the_packages_of_the_checks(checkout: Path):
-    run, stamp = load_run(checkout), checkout / ".venv" / "airmuscle.stamp"
+    run = load_run(checkout)
+    stamp = checkout / ".venv" / "airmuscle.stamp"
     stamp.write_bytes(b"".join(run.stamp()[:2]))
     assert run.installed(everything=False)
     assert not run.installed(everything=True)
@@ -208,7 +240,8 @@ def test_a_demo_and_the_program_do_not_need_the_packages_of_the_checks(checkout:
 def test_an_installation_uses_the_locks_that_the_command_needs(
     checkout: Path, monkeypatch: pytest.MonkeyPatch, everything: bool
 ):
-    run, called = load_run(checkout), []
+    run = load_run(checkout)
+    called = []
     (checkout / ".venv" / "airmuscle.stamp").write_bytes(b"old")
     monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
     assert run.install(everything) is None
@@ -223,7 +256,8 @@ def test_an_installation_uses_the_locks_that_the_command_needs(
 def test_further_packages_are_added_once_and_keep_the_stamp_of_the_program(
     checkout: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ):
-    run, called = load_run(checkout), []
+    run = load_run(checkout)
+    called = []
     monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
     assert run.install_added(name) is None
     assert run.install_added(name) is None
@@ -232,7 +266,9 @@ def test_further_packages_are_added_once_and_keep_the_stamp_of_the_program(
 
 
 @needs_posix
-def test_an_installation_that_fails_leaves_no_stamp(checkout: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_installation_that_fails_leaves_no_stamp(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+):
     run = load_run(checkout)
     (checkout / "requirements.lock").write_text("")
     monkeypatch.setattr(subprocess, "call", lambda *args, **settings: 1)

@@ -1,4 +1,6 @@
-"""Models are complete: each is exported, and each law of a paper has a library file; a missing step is named."""
+"""Models are complete: each is exported, and each law of a paper has a library file; a missing step
+is named.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,11 @@ def models_by_package():
     for package in PACKAGES:
         for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             for cls in vars(importlib.import_module(found.name)).values():
-                if inspect.isclass(cls) and cls.__module__ == found.name and cls.__dict__.get("from_file"):
+                if (
+                    inspect.isclass(cls)
+                    and cls.__module__ == found.name
+                    and cls.__dict__.get("from_file")
+                ):
                     yield package.__name__, cls
 
 
@@ -39,7 +45,11 @@ def test_every_model_is_exported():
 
 def test_every_law_of_a_paper_has_a_library_file():
     texts = "".join(path.read_text(encoding="utf-8") for path in files.LAWS.glob("*.toml"))
-    laws = [law for name in model_names() if issubclass(law := model_class(name, "test"), Characteristic)]
+    laws = [
+        law
+        for name in model_names()
+        if issubclass(law := model_class(name, "test"), Characteristic)
+    ]
     missing = [
         f"write a file in airmuscle/files/library that names {law.__name__}"
         for law in laws
@@ -52,7 +62,9 @@ def test_the_bibliography_is_sorted_and_each_of_its_references_is_used():
     package = Path(files.__file__).parents[2]
     known = json.loads((package / "core" / "references.json").read_text(encoding="utf-8"))
     used = {
-        key for path in package.rglob("*.py") for key in re.findall(r'published\("([^"]+)"', path.read_text("utf-8"))
+        key
+        for path in package.rglob("*.py")
+        for key in re.findall(r'published\("([^"]+)"', path.read_text("utf-8"))
     }
     assert list(known) == sorted(known)
     assert used == set(known)

@@ -19,22 +19,31 @@ SOURCE = DOCS.parent / "src"
 
 
 def load_generator():
-    spec = importlib.util.spec_from_file_location("make_nomenclature", DOCS / "make_nomenclature.py")
+    spec = importlib.util.spec_from_file_location(
+        "make_nomenclature", DOCS / "make_nomenclature.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 def test_the_page_is_up_to_date():
-    written, generated = (DOCS / "nomenclature.md").read_text(encoding="utf-8"), load_generator().page()
-    missing = [name for name in model_names() if f"### {name}\n" in generated and f"### {name}\n" not in written]
+    written = (DOCS / "nomenclature.md").read_text(encoding="utf-8")
+    generated = load_generator().page()
+    missing = [
+        name
+        for name in model_names()
+        if f"### {name}\n" in generated and f"### {name}\n" not in written
+    ]
     reports = [f"run docs/make_nomenclature.py: {name} is missing" for name in missing]
     assert not missing, "\n".join(reports)
     assert written == generated, "run docs/make_nomenclature.py"
 
 
 def public_arguments():
-    """(owner, argument) of every public function and method in the face of the package, and of every model."""
+    """(owner, argument) of every public function and method in the face of the package, and of
+    every model.
+    """
     classes = [model_class(name, "test") for name in model_names()]
     exported = [getattr(airmuscle, name) for name in airmuscle.__all__]
     for thing in [*exported, *classes]:
@@ -43,7 +52,10 @@ def public_arguments():
         elif inspect.isclass(thing):
             for name, member in vars(thing).items():
                 if not name.startswith("_") and inspect.isfunction(member):
-                    yield from ((f"{thing.__name__}.{name}", a) for a in inspect.signature(member).parameters)
+                    yield from (
+                        (f"{thing.__name__}.{name}", a)
+                        for a in inspect.signature(member).parameters
+                    )
             if dataclasses.is_dataclass(thing):
                 yield from ((thing.__name__, f.name) for f in dataclasses.fields(thing) if f.init)
 
@@ -56,15 +68,28 @@ def test_no_public_argument_is_missing_from_the_nomenclature():
         for p in parameters(model_class(name, ""))
     }
     known = declared | set(QUANTITIES) | set(load_generator().ARGUMENTS) | {"self", "cls"}
-    missing = sorted({f"{argument} ({where})" for where, argument in public_arguments() if argument not in known})
+    missing = sorted(
+        {f"{argument} ({where})" for where, argument in public_arguments() if argument not in known}
+    )
     assert not missing, f"add to docs/make_nomenclature.py, or use a name that is there: {missing}"
 
 
 def test_every_argument_of_the_nomenclature_exists():
     """As an argument or an annotated field somewhere in the package."""
-    nodes = [node for path in SOURCE.rglob("*.py") for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
-    fields = {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
-    assert set(load_generator().ARGUMENTS) - {n.arg for n in nodes if isinstance(n, ast.arg)} - fields == set()
+    nodes = [
+        node
+        for path in SOURCE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    fields = {
+        n.target.id
+        for n in nodes
+        if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)
+    }
+    assert (
+        set(load_generator().ARGUMENTS) - {n.arg for n in nodes if isinstance(n, ast.arg)} - fields
+        == set()
+    )
 
 
 def test_every_parameter_has_unit_symbol_meaning_and_bounds():
@@ -86,7 +111,11 @@ def test_the_model_stands_before_the_measurements():
     wrong = set()
     for room in (bench, control, design, engine, files, outlets, physics):
         for function in filter(inspect.isfunction, (getattr(room, name) for name in room.__all__)):
-            names = [p.name for p in inspect.signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
+            names = [
+                p.name
+                for p in inspect.signature(function).parameters.values()
+                if p.kind is not p.KEYWORD_ONLY
+            ]
             kinds = [name in MEASURED for name in names if name in MODELS | MEASURED]
             if kinds != sorted(kinds):
                 wrong.add(f"{function.__name__}({', '.join(names)})")

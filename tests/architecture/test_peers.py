@@ -1,4 +1,5 @@
-"""Benchmarks of other packages: they solve the same equations, and a package that is not installed is omitted.
+"""Benchmarks of other packages: they solve the same equations, and a package that is not installed
+is omitted.
 
 No times are asserted. Packages that are not installed are not tested.
 """
@@ -52,7 +53,9 @@ def test_casadi_with_gcc_computes_the_same_solution_and_leaves_no_files(tmp_path
     monkeypatch.chdir(tmp_path)
     run = runs()[3]
     call = peer_solvers.casadi_cvodes_jit(run, compile_system(run.system))(1e-8)
-    assert not list(tmp_path.iterdir())  # even while the solver exists: a process that is killed does not clean up
+    assert not list(
+        tmp_path.iterdir()
+    )  # even while the solver exists: a process that is killed does not clean up
     assert run.error(call(), reference(run)) < 1e-8
 
 
@@ -66,12 +69,16 @@ def test_diffrax_computes_the_same_solution():
 
 def test_a_peer_that_is_not_installed_is_omitted_with_a_note(monkeypatch):
     casadi = next(peer for peer in peers.PEERS if peer.name == "CasADi CVODES")
-    missing = dataclasses.replace(casadi, name="missing solver", module="not_installed", package="not-installed")
+    missing = dataclasses.replace(
+        casadi, name="missing solver", module="not_installed", package="not-installed"
+    )
     monkeypatch.setattr(peers, "PEERS", (casadi, missing))
     monkeypatch.setattr(peers, "runs", lambda: {3: runs()[3]})
     section = peers.section(rounds=1)
     assert [row[1] for row in section.rows] == ["Rodas4, kernel", "CasADi CVODES"]
-    assert section.text.endswith("not-installed is not installed and is omitted: pip install not-installed.")
+    assert section.text.endswith(
+        "not-installed is not installed and is omitted: pip install not-installed."
+    )
 
 
 def test_mujoco_is_omitted_if_it_is_not_installed(monkeypatch):
@@ -86,8 +93,13 @@ def test_the_loosest_tolerance_is_sufficient_and_so_is_the_next():
     run = runs()[3]
     solution = reference(run)
     errors = {1e-4: 0.0, 3e-5: 1.0, 1e-5: 1.0, 3e-6: 0.0, 1e-6: 0.0}
-    assert rodas4.loosest_tolerance(run, lambda rtol: solution + errors.get(rtol, 0.0), solution) == 3e-6
-    assert rodas4.loosest_tolerance(run, lambda rtol: solution * np.nan, solution) == rodas4.SERIES[-1]
+    assert (
+        rodas4.loosest_tolerance(run, lambda rtol: solution + errors.get(rtol, 0.0), solution)
+        == 3e-6
+    )
+    assert (
+        rodas4.loosest_tolerance(run, lambda rtol: solution * np.nan, solution) == rodas4.SERIES[-1]
+    )
 
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
@@ -95,21 +107,37 @@ def test_the_loosest_tolerance_is_sufficient_and_so_is_the_next():
 @pytest.mark.slow
 def test_the_c_code_for_several_muscles_computes_the_same_steps(tmp_path, muscles):
     run = lifting_run(muscles)
-    start = run.system.state_at(pressure=tuple(5e5 + 4e4 * i for i in range(muscles)), position=0.05)
-    opened = {f"{p}discharge": ((0.02 + 0.01 * i, 1.0), (0.09, 0.0)) for i, p in enumerate(run.system.prefixes)}
+    start = run.system.state_at(
+        pressure=tuple(5e5 + 4e4 * i for i in range(muscles)), position=0.05
+    )
+    opened = {
+        f"{p}discharge": ((0.02 + 0.01 * i, 1.0), (0.09, 0.0))
+        for i, p in enumerate(run.system.prefixes)
+    }
     run = dataclasses.replace(run, initial_state=start, command=Schedule(opened))
-    ready, segments = compile_system(run.system), run.command.segments(run.system.inputs, 0.0, 0.1)
-    expected = DormandPrince8(ode8.STEP).run(ready, segments, 0.0, run.vector, np.linspace(0.0, 0.1, 11)).rows
+    ready = compile_system(run.system)
+    segments = run.command.segments(run.system.inputs, 0.0, 0.1)
+    expected = (
+        DormandPrince8(ode8.STEP)
+        .run(ready, segments, 0.0, run.vector, np.linspace(0.0, 0.1, 11))
+        .rows
+    )
     for library in ode8.compile_libraries(tmp_path, muscles).values():
-        np.testing.assert_allclose(ode8.make_c_run(run, library, segments)(), expected, rtol=1e-11, atol=1e-12)
+        np.testing.assert_allclose(
+            ode8.make_c_run(run, library, segments)(), expected, rtol=1e-11, atol=1e-12
+        )
 
 
 @pytest.mark.skipif(bool(mujoco_peer.missing_note()), reason="no MuJoCo or no C compiler")
 def test_mujoco_takes_the_same_steps_of_rk4(tmp_path):
-    """At 1 ms, so that the error of a step is visible; the order of operations differs, hence 1e-9."""
+    """At 1 ms, so that the error of a step is visible; the order of operations differs, hence
+    1e-9.
+    """
     run = lifting_run(2)
     rows = mujoco_peer.make_mujoco_run(run, mujoco_peer.compile_callbacks(tmp_path, 2), 1e-3)()
-    expected = RungeKutta4(1e-3).run(compile_system(run.system), run.segments, 0.0, run.vector, run.times)
+    expected = RungeKutta4(1e-3).run(
+        compile_system(run.system), run.segments, 0.0, run.vector, run.times
+    )
     assert run.error(rows, expected.rows) < 1e-9
 
 
@@ -129,11 +157,15 @@ def test_different_rates_are_detected():
         composed.system, mechanism=dataclasses.replace(composed.system.mechanism, friction=0.201)
     )
     with pytest.raises(AssertionError, match="differ by"):
-        components.check_rates(compile_system(single.system), compile_system(stiffer), single.initial_state)
+        components.check_rates(
+            compile_system(single.system), compile_system(stiffer), single.initial_state
+        )
 
 
 def test_the_joint_with_proportional_valves_has_the_same_motion():
-    """The flow of a pulse through a second-order spool equals that of a first-order one with a delay: 0.5 degrees."""
+    """The flow of a pulse through a second-order spool equals that of a first-order one with a
+    delay: 0.5 degrees.
+    """
     (_, _), (ten, _), (twelve, _) = components.pairs()
     columns = [[s.name for s in run.system.states].index("angle") for run in (ten, twelve)]
     angles = [
@@ -155,7 +187,10 @@ def test_the_derivative_is_that_of_the_given_state():
 
 
 def test_both_plants_have_24_muscles():
-    assert [len(plant.states) for plant in (derivative.many_muscles(), derivative.chou_hannaford_muscles())] == [26, 26]
+    assert [
+        len(plant.states)
+        for plant in (derivative.many_muscles(), derivative.chou_hannaford_muscles())
+    ] == [26, 26]
 
 
 def test_pwm_pulses_have_the_commanded_width():
@@ -169,7 +204,9 @@ def test_pwm_pulses_have_the_commanded_width():
 def test_a_tighter_tolerance_needs_more_steps_and_has_a_smaller_error():
     rows = growth.measure_cases(
         [
-            growth.Case("tolerance", "p", f"{r:.0e}", lifting_run(1), lifting_run(1).segments, 25.0, r)
+            growth.Case(
+                "tolerance", "p", f"{r:.0e}", lifting_run(1), lifting_run(1).segments, 25.0, r
+            )
             for r in (1e-4, 1e-7)
         ],
         1,

@@ -1,4 +1,6 @@
-"""Every public object can be copied and sent to another process: compiled code belongs to a process, not to an object."""
+"""Every public object can be copied and sent to another process: compiled code belongs to a
+process, not to an object.
+"""
 
 from __future__ import annotations
 
@@ -82,11 +84,19 @@ MADE_BY_AN_EXPORT = {outlets.MuscleActuator}
 
 def predictive() -> Any:
     permitted = {"position": 1e-3, "speed": 0.1, "fill": 0.1, "discharge": 0.1}
-    noises = {"process_noise": {"air_mass": 1e-6, "speed": 0.1, "air_mass.disturbance": 1e-5},
-              "measurement_noise": {"position": 1e-4}}  # fmt: skip
+    noises = {
+        "process_noise": {"air_mass": 1e-6, "speed": 0.1, "air_mass.disturbance": 1e-5},
+        "measurement_noise": {"position": 1e-4},
+    }
     one = ("position",)
     return control.design_predictive(
-        linear_model(), 0.01, measured=one, controlled=one, disturbed=("air_mass",), permitted=permitted, **noises
+        linear_model(),
+        0.01,
+        measured=one,
+        controlled=one,
+        disturbed=("air_mass",),
+        permitted=permitted,
+        **noises,
     )
 
 
@@ -111,13 +121,17 @@ RESULTS: dict[str, Callable[[], Any]] = {
         design.LiftRequirement(stroke=0.04, mass=10.0), SUPPLY, [PRODUCT]
     ),
     "an environment": environment,
-    "an environment with sensors": lambda: outlets.MeasuredObservations(environment(), noise=0.01, delay=2),
+    "an environment with sensors": lambda: outlets.MeasuredObservations(
+        environment(), noise=0.01, delay=2
+    ),
     "a vector environment": vector,
     "contenders and tasks of the benchmark": lambda: (
         *design.standard_contenders(design.on_off_joint()),
         *design.STANDARD_TASKS,
     ),
-    "a loop with sensitivities": lambda: engine.differentiate_loop(LIFT, LOOP, ("controller.gain",), (2e-5,)),
+    "a loop with sensitivities": lambda: engine.differentiate_loop(
+        LIFT, LOOP, ("controller.gain",), (2e-5,)
+    ),
     "targets of an export": lambda: (outlets.C99(), outlets.JavaScript(), outlets.Octave()),
     "an inspection": lambda: bench.inspect(BENCH),
     "an unscented Kalman filter": lambda: control.UnscentedKalmanFilter(
@@ -133,7 +147,9 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "a study": lambda: design.load_study(EXAMPLE_FILES / "valve_study.toml"),
     "a learning law": lambda: control.IterativeLearning(0.01, (1.0, 0.5)),
     "a predictive law": predictive,
-    "predictive control of a file": lambda: files.load_scenario(EXAMPLE_FILES / "predictive_lift.toml").problem.input,
+    "predictive control of a file": (
+        lambda: files.load_scenario(EXAMPLE_FILES / "predictive_lift.toml").problem.input
+    ),
     "tasks of an arm and of a lift": lambda: (*arm_task(), *lift_task()),
     "a plant along measured pressures": lambda: physics.PressureDriven(
         control_plants.JOINT.muscles, control_plants.JOINT.mechanism, (0.02, 0.02)
@@ -159,7 +175,13 @@ def parts(thing: Any, seen: set[int]) -> Iterator[Any]:
         return
     seen.add(id(thing))
     yield thing
-    inner = thing.values() if isinstance(thing, dict) else thing if isinstance(thing, tuple | list) else ()
+    inner = (
+        thing.values()
+        if isinstance(thing, dict)
+        else thing
+        if isinstance(thing, tuple | list)
+        else ()
+    )
     if type(thing).__module__.startswith("airmuscle"):
         inner = [*inner, *vars(thing).values()] if hasattr(thing, "__dict__") else inner
     for each in inner:
@@ -167,23 +189,36 @@ def parts(thing: Any, seen: set[int]) -> Iterator[Any]:
 
 
 def test_every_public_class_that_stores_more_than_its_fields_is_among_the_results():
-    """A class that is no plain data, or that stores what it has computed, can fail to be copied; others cannot."""
+    """A class that is no plain data, or that stores what it has computed, can fail to be copied;
+    others cannot.
+    """
     made = [make() for make in RESULTS.values()]
-    known = {cls for thing in parts((made, *EXAMPLES.values()), set()) for cls in type(thing).__mro__}
+    known = {
+        cls for thing in parts((made, *EXAMPLES.values()), set()) for cls in type(thing).__mro__
+    }
     faces = (am, bench, control, design, engine, files, outlets, physics)
-    public = {f"{face.__name__}.{name}": getattr(face, name) for face in faces for name in face.__all__}
+    public = {
+        f"{face.__name__}.{name}": getattr(face, name) for face in faces for name in face.__all__
+    }
     missing = {
         name
         for name, cls in public.items()
-        if inspect.isclass(cls) and not inspect.isabstract(cls) and not issubclass(cls, BaseException)
+        if inspect.isclass(cls)
+        and not inspect.isabstract(cls)
+        and not issubclass(cls, BaseException)
         if cls not in known and cls not in MADE_BY_AN_EXPORT
-        if not (dataclasses.is_dataclass(cls) or issubclass(cls, tuple | enum.Enum)) or stores_results(cls)
+        if not (dataclasses.is_dataclass(cls) or issubclass(cls, tuple | enum.Enum))
+        or stores_results(cls)
     }
     assert missing == set()
 
 
 def stores_results(cls: type) -> bool:
-    return any(isinstance(each, functools.cached_property) for base in cls.__mro__ for each in vars(base).values())
+    return any(
+        isinstance(each, functools.cached_property)
+        for base in cls.__mro__
+        for each in vars(base).values()
+    )
 
 
 @pytest.mark.parametrize("way", COPIES)
@@ -207,7 +242,10 @@ def test_a_worker_process_solves_a_problem_that_was_sent_to_it():
 def test_a_copied_solution_is_continued_like_the_original():
     solution = am.solve(am.Problem(LIFT, LOOP, 0.4))
     again = COPIES["pickle"](solution)
-    assert am.solve(again.continuation(0.2)).final_state == am.solve(solution.continuation(0.2)).final_state
+    assert (
+        am.solve(again.continuation(0.2)).final_state
+        == am.solve(solution.continuation(0.2)).final_state
+    )
 
 
 @pytest.mark.parametrize("way", COPIES)
@@ -225,9 +263,12 @@ def test_a_copied_stepper_goes_on_by_itself(way):
 @pytest.mark.parametrize("way", ["pickle", "deepcopy"])
 def test_a_copied_environment_goes_on_by_itself(way):
     """With the parameters that the episode has drawn, and the same draws at its next reset."""
-    env, envs = environment(), vector()
-    action, actions = [0.2, 0.3], np.full((3, 2), -0.3)
-    again, others = COPIES[way](env), COPIES[way](envs)
+    env = environment()
+    envs = vector()
+    action = [0.2, 0.3]
+    actions = np.full((3, 2), -0.3)
+    again = COPIES[way](env)
+    others = COPIES[way](envs)
     for one, other, given in ((env, again, action), (envs, others, actions)):
         for _ in range(3):
             expected = [np.array(part) for part in one.step(given)[:3]]

@@ -1,4 +1,5 @@
-"""A model is added by the steps of AGENTS.md: with all steps it passes the contract tests, without one a test names it.
+"""A model is added by the steps of AGENTS.md: with all steps it passes the contract tests, without
+one a test names it.
 
 The models are added to a copy of the project; the tests of the copy run there.
 """
@@ -49,14 +50,19 @@ MESSAGES = {
     "export": r"export {name} in airmuscle/{folder}/__init__\.pyi",
     "library": r"write a file in airmuscle/files/library that names {name}",
     "example": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py",
-    "exemption": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py, nor in NOT_IN_A_PLANT",
+    "exemption": (
+        r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py, nor in"
+        r" NOT_IN_A_PLANT"
+    ),
     "nomenclature": r"run docs/make_nomenclature\.py: {name} is missing",
 }
 
 
 def copy_of_the_project(folder: Path) -> Path:
     for part in ("src/airmuscle", "tests", "docs", "benchmarks"):
-        shutil.copytree(ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "images"))
+        shutil.copytree(
+            ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "images")
+        )
     shutil.copy(ROOT / "pyproject.toml", folder)
     return folder
 
@@ -84,7 +90,9 @@ def failures(tmp_path_factory: pytest.TempPathFactory) -> str:
             add(root, kind, named(kind, step), without=step)
     write_nomenclature(root, omitted=tuple(named(kind, "nomenclature") for kind in RECIPES))
     wanted = ("-k", "test_models or test_names or looked_at")
-    return run(root, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *CONTRACTS[:3], *wanted).stdout
+    return run(
+        root, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *CONTRACTS[:3], *wanted
+    ).stdout
 
 
 def test_the_contract_tests_find_a_complete_model_and_pass(complete: Path):
@@ -112,7 +120,8 @@ def test_a_contract_test_names_a_missing_step(failures: str, kind: str, step: st
 
 @pytest.mark.parametrize("kind", RECIPES)
 def test_a_missing_file_is_named_by_the_import(complete: Path, kind: str):
-    name, package = named(kind), RECIPES[kind].package
+    name = named(kind)
+    package = RECIPES[kind].package
     file = complete / "src" / "airmuscle" / RECIPES[kind].folder / f"{name.lower()}.py"
     aside = file.rename(file.with_suffix(".aside"))
     done = run(complete, "-c", f"from airmuscle.{package} import {name}")

@@ -1,6 +1,7 @@
 """Start of a process: heavy modules are imported only where they are used.
 
-The target for the first result is 0.7 s (benchmarks/startup.py); the modules checked here do not depend on the machine.
+The target for the first result is 0.7 s (benchmarks/startup.py); the modules checked here do not
+depend on the machine.
 """
 
 from __future__ import annotations
@@ -21,14 +22,19 @@ for method in (am.Rodas4(), am.RungeKutta4(1e-3)):
     am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, integrator=method)
 """
 STARTS = {
-    "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.bench.identify"}),
+    "import airmuscle": (
+        "import airmuscle",
+        {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.bench.identify"},
+    ),
     "simulate": (
         SIMULATION,
         {*HEAVY, "numpy.ma", "airmuscle.bench.identify", "airmuscle.engine.compile.kernels.rodas4"},
     ),
     "airmuscle evaluate": (
-        "from airmuscle.outlets.cli import app\n"
-        "app(['evaluate', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
+        (
+            "from airmuscle.outlets.cli import app\napp(['evaluate', 'chou-hannaford',"
+            " '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)"
+        ),
         (HEAVY | {"llvmlite", "airmuscle.bench.identify"}) - {"typer", "rich"},
     ),
     "airmuscle convert": (
@@ -62,5 +68,7 @@ def test_names_that_are_imported_on_use_are_available():
     assert {"fit", "Fit"} <= set(dir(am))
     with pytest.raises(AttributeError, match="module 'airmuscle' has no attribute 'fitt'"):
         am.fitt  # noqa: B018
-    with pytest.raises(AttributeError, match=r"no attribute 'load_scenario'; it is in airmuscle\.files$"):
+    with pytest.raises(
+        AttributeError, match=r"no attribute 'load_scenario'; it is in airmuscle\.files$"
+    ):
         am.load_scenario  # noqa: B018

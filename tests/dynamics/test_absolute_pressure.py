@@ -1,4 +1,6 @@
-"""Absolute pressures in texts: absolute whatever the ambient pressure of the plant, in objects, states, files and studies."""
+"""Absolute pressures in texts: absolute whatever the ambient pressure of the plant, in objects,
+states, files and studies.
+"""
 
 from __future__ import annotations
 
@@ -82,7 +84,9 @@ def test_supplies_at_any_depth_of_a_circuit_are_converted():
 def test_a_state_and_an_equilibrium_at_an_absolute_pressure_have_it():
     made = plant()
     assert initial_pressure(made, made.state_at(pressure="3 bara")) == pytest.approx(3e5)
-    assert initial_pressure(made, am.physics.find_equilibrium(made, pressure="3 bara")) == pytest.approx(3e5)
+    assert initial_pressure(
+        made, am.physics.find_equilibrium(made, pressure="3 bara")
+    ) == pytest.approx(3e5)
     stated = quantity("3 bara", "Pa")
     assert initial_pressure(made, made.state_at(pressure=stated)) == pytest.approx(3e5)
 
@@ -102,10 +106,12 @@ def test_a_study_over_the_ambient_pressure_keeps_absolute_pressures(tmp_path: Pa
     (tmp_path / "high.toml").write_text(SCENARIO)
     study = tmp_path / "study.toml"
     study.write_text(
-        'scenario = "high.toml"\n[vary]\n"ambient.pressure" = ["70 kPa(a)", "100 kPa(a)"]\n'
-        '[design]\nmodel = "Grid"\n[metrics]\nhighest = { model = "Maximum", column = "pressure" }\n'
+        'scenario = "high.toml"\n[vary]\n"ambient.pressure" = ["70 kPa(a)", "100'
+        ' kPa(a)"]\n[design]\nmodel = "Grid"\n[metrics]\nhighest = { model = "Maximum", column ='
+        ' "pressure" }\n'
     )
-    template, parameters = load_study(study).template, load_study(study).parameters
+    template = load_study(study).template
+    parameters = load_study(study).parameters
     for ambient in (7e4, 1e5):
         scenario = template.with_values(parameters, [ambient])
         assert scenario.plant.circuit.supply.pressure + ambient == pytest.approx(7e5)  # type: ignore[union-attr]
@@ -118,14 +124,16 @@ def test_a_range_of_a_study_is_converted_with_the_ambient_pressure_of_the_scenar
     (tmp_path / "high.toml").write_text(SCENARIO)
     study = tmp_path / "study.toml"
     study.write_text(
-        'scenario = "high.toml"\n[vary]\n"circuit.supply.pressure" = ["5 bara", "6 bara"]\n'
-        '[design]\nmodel = "Grid"\n[metrics]\nhighest = { model = "Maximum", column = "pressure" }\n'
+        'scenario = "high.toml"\n[vary]\n"circuit.supply.pressure" = ["5 bara", "6'
+        ' bara"]\n[design]\nmodel = "Grid"\n[metrics]\nhighest = { model = "Maximum", column ='
+        ' "pressure" }\n'
     )
     assert load_study(study).values.ravel() == pytest.approx([4.2e5, 5.2e5])
 
 
 def test_a_batch_over_the_ambient_pressure_keeps_the_absolute_supply():
-    made, ambients = plant(), np.array([7e4, 9e4])
+    made = plant()
+    ambients = np.array([7e4, 9e4])
     filling = am.Schedule({"fill": ((0.0, 1.0),)})
     batch = am.simulate_batch(made, {"ambient.pressure": ambients}, filling, duration=2.0)
     assert batch["pressure"][:, -1] + ambients == pytest.approx([7e5, 7e5], rel=1e-3)

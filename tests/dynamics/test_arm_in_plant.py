@@ -1,4 +1,5 @@
-"""An arm of two joints with six muscles in a plant: its energy book closes, its equilibria balance every joint.
+"""An arm of two joints with six muscles in a plant: its energy book closes, its equilibria balance
+every joint.
 
 d(T + V)/dt = power of the tensions - power lost in the joints
 """
@@ -34,7 +35,10 @@ from airmuscle.physics import (
 
 NAMES = ("s_flex", "s_ext", "e_flex", "e_ext", "bi_flex", "bi_ext")
 ARM = PlanarArm(
-    (ArmLink(0.3, 1.5, 0.14, 0.012, 0.3, -0.9, 0.9), ArmLink(0.25, 1.1, 0.11, 0.006, 0.2, -0.9, 0.9)),
+    (
+        ArmLink(0.3, 1.5, 0.14, 0.012, 0.3, -0.9, 0.9),
+        ArmLink(0.25, 1.1, 0.11, 0.006, 0.2, -0.9, 0.9),
+    ),
     (
         MuscleRoute((1,), (0.03,), 0.1),
         MuscleRoute((1,), (-0.03,), 0.1),
@@ -46,7 +50,12 @@ ARM = PlanarArm(
     0.7,
 )
 RUBBING = JointWithEndStops(
-    JointWithFriction(ARM, 0.2, coordinate="joint2.angle"), -0.15, 0.15, 0.05, HuntCrossley(1e7), "joint1.angle"
+    JointWithFriction(ARM, 0.2, coordinate="joint2.angle"),
+    -0.15,
+    0.15,
+    0.05,
+    HuntCrossley(1e7),
+    "joint1.angle",
 )
 VALVE = Valve(2.6e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(6e5), VALVE, VALVE)
@@ -65,10 +74,14 @@ def arm(mechanism=ARM):
 def test_the_energy_book_of_an_arm_with_six_muscles_closes(mechanism):
     plant = WithEnergyMeters(arm(mechanism))
     start = plant.extend_state(find_equilibrium(plant.plant, pressure=2e5))
-    command = Schedule({
-        "s_flex.fill": ((0.05, 1.0), (0.2, 0.0)), "bi_ext.discharge": ((0.1, 1.0), (0.2, 0.0)),
-        "e_ext.fill": ((0.3, 1.0), (0.45, 0.0)), "bi_flex.fill": ((0.5, 1.0), (0.6, 0.0)),
-    })  # fmt: skip
+    command = Schedule(
+        {
+            "s_flex.fill": ((0.05, 1.0), (0.2, 0.0)),
+            "bi_ext.discharge": ((0.1, 1.0), (0.2, 0.0)),
+            "e_ext.fill": ((0.3, 1.0), (0.45, 0.0)),
+            "bi_flex.fill": ((0.5, 1.0), (0.6, 0.0)),
+        }
+    )
     run = simulate(plant, command, duration=0.9, initial_state=start, integrator=Rodas4(1e-9))
     mechanical = run["kinetic_energy"] + run["potential_energy"]
     book = run["work_of_tension"] - run["mechanism_loss"]
@@ -89,14 +102,18 @@ def test_an_arm_at_rest_balances_the_weight_at_every_joint():
     forces = ARM.generalised_forces(state, [m.tension for m in muscles], plant.resting_lengths)
     step = 1e-6
     for name, force in forces.items():
-        above, below = (ARM.potential_energy({**state, name: state[name] + s}) for s in (step, -step))
+        above, below = (
+            ARM.potential_energy({**state, name: state[name] + s}) for s in (step, -step)
+        )
         assert float(force) == pytest.approx((above - below) / (2 * step), abs=1e-5)
     assert state["joint1.angle"] > 0.02
 
 
 def test_a_biarticular_muscle_stiffens_both_joints():
     plant = arm()
-    soft, stiff = (find_equilibrium(plant, pressure=(2e5, 2e5, 2e5, 2e5, bi, bi)) for bi in (1.5e5, 3.5e5))
+    soft, stiff = (
+        find_equilibrium(plant, pressure=(2e5, 2e5, 2e5, 2e5, bi, bi)) for bi in (1.5e5, 3.5e5)
+    )
     for name in ("joint1.angle", "joint2.angle"):
         low, high = (stiffness(plant, state).coordinates[name] for state in (soft, stiff))
         assert high.constant_pressure > low.constant_pressure

@@ -1,5 +1,7 @@
-"""Many plants at once: each is computed as it would be alone, whatever its neighbours, its place in the batch, the number
-of threads and where the columns are kept; what is wrong with one is said of that one, and does not stop the others."""
+"""Many plants at once: each is computed as it would be alone, whatever its neighbours, its place in
+the batch, the number of threads and where the columns are kept; what is wrong with one is said of
+that one, and does not stop the others.
+"""
 
 from __future__ import annotations
 
@@ -37,10 +39,20 @@ from airmuscle.engine.run.batch import job, variations
 from airmuscle.errors import ColumnError, FileError, GeometryLimitError, ParameterError
 from airmuscle.papers.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.papers.hosovsky_plant import plant as third_paper
-from airmuscle.physics import FillDischarge, HangingMass, Isothermal, Plant, Polytropic, Supply, Valve
+from airmuscle.physics import (
+    FillDischarge,
+    HangingMass,
+    Isothermal,
+    Plant,
+    Polytropic,
+    Supply,
+    Valve,
+)
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
-JOINT_PULSE = Schedule({"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))})
+JOINT_PULSE = Schedule(
+    {"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))}
+)
 FAST = RungeKutta4(1e-3)
 
 
@@ -50,7 +62,12 @@ def paper():
 
 def plain():
     valve = Valve(5e-9, 0.433)
-    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0), Polytropic(1.2))
+    return Plant(
+        chosen_muscle(),
+        FillDischarge(Supply(6e5), valve, valve),
+        HangingMass(10.0),
+        Polytropic(1.2),
+    )
 
 
 def around(values, count, seed=1, share=0.05):
@@ -62,29 +79,55 @@ def around(values, count, seed=1, share=0.05):
 def pulses(count):
     """Commands whose instants differ from plant to plant, one of them without any, one moving."""
     commands = [
-        Schedule({"fill": ((0.02 + 0.00371 * i, 1), (0.2 + 0.001 * i, 0)), "discharge": ((0.3, 1),)})
+        Schedule(
+            {"fill": ((0.02 + 0.00371 * i, 1), (0.2 + 0.001 * i, 0)), "discharge": ((0.3, 1),)}
+        )
         for i in range(count)
     ]
-    return [ZERO_INPUT, SampledSignal({"fill": ((0.05, 0), (0.1, 1), (0.2003, 0))}), *commands][:count]
+    return [ZERO_INPUT, SampledSignal({"fill": ((0.05, 0), (0.1, 1), (0.2003, 0))}), *commands][
+        :count
+    ]
 
 
 CASES = {
-    "third paper": (paper(), {"mechanism.mass": 10.0, "circuit.fill.conductance": 2.6e-9, "muscle.spring.stiffness": 1e3},
-                    paper().state_at(pressure=1e5, position=0.01), PULSE),
-    "six states": (joint(), {"inertia": 0.05, "load": 2.0, "tube_volume": 2e-5}, joint_start(joint()), JOINT_PULSE),
-    "ten states": (joint(heat=True), {"inertia": 0.05, "heat_transfer": 1.0}, joint_start(joint(heat=True)), JOINT_PULSE),
-}  # fmt: skip
+    "third paper": (
+        paper(),
+        {
+            "mechanism.mass": 10.0,
+            "circuit.fill.conductance": 2.6e-9,
+            "muscle.spring.stiffness": 1e3,
+        },
+        paper().state_at(pressure=1e5, position=0.01),
+        PULSE,
+    ),
+    "six states": (
+        joint(),
+        {"inertia": 0.05, "load": 2.0, "tube_volume": 2e-5},
+        joint_start(joint()),
+        JOINT_PULSE,
+    ),
+    "ten states": (
+        joint(heat=True),
+        {"inertia": 0.05, "heat_transfer": 1.0},
+        joint_start(joint(heat=True)),
+        JOINT_PULSE,
+    ),
+}
 
 
 def greatest_difference(found: BatchSolution, index, run):
-    """Between a batch's plant and a run of it alone, in sizes of the states and of the other columns."""
+    """Between a batch's plant and a run of it alone, in sizes of the states and of the other
+    columns.
+    """
     rows = [int(np.argmin(np.abs(run["time"] - t))) for t in found.time]
     assert np.abs(run["time"][rows] - found.time).max() < 1e-12
     sizes = {s.name: s.nominal for s in found.plant(index).states}
     worst = 0.0
     for name, column in found.columns.items():
         size = max(sizes.get(name, 0.0), np.abs(run[name]).max(), 1e-300)
-        worst = np.maximum(worst, np.abs(column[index] - run[name][rows]).max() / size)  # not a number stays one
+        worst = np.maximum(
+            worst, np.abs(column[index] - run[name][rows]).max() / size
+        )  # not a number stays one
     return worst
 
 
@@ -101,17 +144,30 @@ METHODS = {"RK4": RungeKutta4(1e-4), "ode8": DormandPrince8(5e-5)}
     ],
 )
 def test_a_lane_agrees_with_the_plant_alone(name, method):
-    """To 1e-12 of the size of each column after thousands of steps, in 19 lanes, which is not a multiple of a block."""
+    """To 1e-12 of the size of each column after thousands of steps, in 19 lanes, which is not a
+    multiple of a block.
+    """
     plant, varied, start, command = CASES[name]
     method = METHODS[method]
     found = simulate_batch(
-        plant, around(varied, 19), command, duration=0.5, initial_states=start, integrator=method, output_times=0.0037
+        plant,
+        around(varied, 19),
+        command,
+        duration=0.5,
+        initial_states=start,
+        integrator=method,
+        output_times=0.0037,
     )
     assert not found.failed.size
     assert len(found) == 19
     for index in (0, 7, 15, 16, 18):
         run = simulate(
-            found.plant(index), command, duration=0.5, initial_state=start, integrator=method, output_times=0.0037
+            found.plant(index),
+            command,
+            duration=0.5,
+            initial_state=start,
+            integrator=method,
+            output_times=0.0037,
         )
         assert list(found.columns) == [n for n in run if n != "time"]
         assert greatest_difference(found, index, run) < 1e-12
@@ -122,16 +178,31 @@ def test_a_lane_agrees_with_the_plant_alone(name, method):
 def test_plants_with_commands_of_their_own_meet_their_own_instants(method):
     plant, start, count = plain(), plain().state_at(pressure=1e5, position=0.002), 20
     found = simulate_batch(
-        plant, {}, pulses(count), duration=0.4, initial_states=start, integrator=method, output_times=0.0033
+        plant,
+        {},
+        pulses(count),
+        duration=0.4,
+        initial_states=start,
+        integrator=method,
+        output_times=0.0033,
     )
     for index, command in enumerate(pulses(count)):
-        run = simulate(plant, command, duration=0.4, initial_state=start, integrator=method, output_times=0.0033)
+        run = simulate(
+            plant,
+            command,
+            duration=0.4,
+            initial_state=start,
+            integrator=method,
+            output_times=0.0033,
+        )
         assert greatest_difference(found, index, run) < (1e-12 if method is FAST else 1e-300)
 
 
 def test_an_adaptive_batch_is_simulate_itself():
     """Bit for bit, with the plant's own nominal sizes, and its own equilibrium as the start."""
-    varied = around({"mechanism.mass": 5.0, "muscle.geometry.radius": 0.01, "ambient.pressure": 1e5}, 5)
+    varied = around(
+        {"mechanism.mass": 5.0, "muscle.geometry.radius": 0.01, "ambient.pressure": 1e5}, 5
+    )
     found = simulate_batch(plain(), varied, PULSE, duration=0.5, output_times=0.01)
     for index in range(5):
         run = simulate(found.plant(index), PULSE, duration=0.5, output_times=0.01)
@@ -142,24 +213,43 @@ def test_an_adaptive_batch_is_simulate_itself():
 
 
 def test_a_result_depends_neither_on_threads_nor_on_neighbours():
-    start, varied = plain().state_at(pressure=1e5), around({"mechanism.mass": 10.0, "mechanism.gravity": 9.8}, 70)
+    start = plain().state_at(pressure=1e5)
+    varied = around({"mechanism.mass": 10.0, "mechanism.gravity": 9.8}, 70)
     for method in (FAST, Rodas4(1e-5)):
         runs = [
-            simulate_batch(plain(), varied, PULSE, duration=0.3, initial_states=start, integrator=method, cores=cores)
+            simulate_batch(
+                plain(),
+                varied,
+                PULSE,
+                duration=0.3,
+                initial_states=start,
+                integrator=method,
+                cores=cores,
+            )
             for cores in (1, 2, 5)
         ]
         for name, column in runs[0].columns.items():
             assert all(np.array_equal(column, other[name]) for other in runs[1:])
         backwards = {path: column[::-1] for path, column in varied.items()}
-        other = simulate_batch(plain(), backwards, PULSE, duration=0.3, initial_states=start, integrator=method)
+        other = simulate_batch(
+            plain(), backwards, PULSE, duration=0.3, initial_states=start, integrator=method
+        )
         np.testing.assert_array_equal(other["pressure"][::-1], runs[0]["pressure"])
 
 
 def test_rows_do_not_change_the_solution():
-    start, varied = plain().state_at(pressure=1e5), around({"mechanism.mass": 10.0}, 3)
+    start = plain().state_at(pressure=1e5)
+    varied = around({"mechanism.mass": 10.0}, 3)
     ends = [
         simulate_batch(
-            plain(), varied, PULSE, duration=0.4, initial_states=start, integrator=FAST, output_times=output, keep=keep
+            plain(),
+            varied,
+            PULSE,
+            duration=0.4,
+            initial_states=start,
+            integrator=FAST,
+            output_times=output,
+            keep=keep,
         )
         for output, keep in ((0.4, None), (0.00077, ("pressure",)), (0.01, ()))
     ]
@@ -173,17 +263,27 @@ def test_rows_do_not_change_the_solution():
 def test_one_plant_is_a_batch_too():
     start = plain().state_at(pressure=1e5)
     found = simulate_batch(
-        plain(), {"mechanism.mass": [8.0]}, PULSE, duration=0.3, initial_states=start, integrator=FAST
+        plain(),
+        {"mechanism.mass": [8.0]},
+        PULSE,
+        duration=0.3,
+        initial_states=start,
+        integrator=FAST,
     )
     run = simulate(found.plant(0), PULSE, duration=0.3, initial_state=start, integrator=FAST)
     assert greatest_difference(found, 0, run) < 1e-12
 
 
 def test_single_precision_keeps_four_digits_and_says_so():
-    """The weight's speed is small and its rounding adds up: all columns are held to their greatest value."""
-    start, varied = plain().state_at(pressure=1e5, position=0.002), around({"mechanism.mass": 10.0}, 33)
+    """The weight's speed is small and its rounding adds up: all columns are held to their greatest
+    value.
+    """
+    start = plain().state_at(pressure=1e5, position=0.002)
+    varied = around({"mechanism.mass": 10.0}, 33)
     double, single = (
-        simulate_batch(plain(), varied, PULSE, duration=0.4, initial_states=start, integrator=FAST, **more)
+        simulate_batch(
+            plain(), varied, PULSE, duration=0.4, initial_states=start, integrator=FAST, **more
+        )
         for more in ({}, {"precision": Single()})
     )
     assert "expect about four correct digits" in single.notes[-1]
@@ -194,12 +294,16 @@ def test_single_precision_keeps_four_digits_and_says_so():
         assert error < 1e-4, name
     assert np.abs(single["pressure"] - double["pressure"]).max() > 0
     with pytest.raises(ParameterError, match="Rodas4 chooses its steps in double precision"):
-        simulate_batch(plain(), varied, PULSE, duration=0.4, initial_states=start, precision=Single())
+        simulate_batch(
+            plain(), varied, PULSE, duration=0.4, initial_states=start, precision=Single()
+        )
 
 
 @model
 class Functions(System):
-    """Every function of ops that has a form of its own in lanes, or is taken lane by lane, in a system."""
+    """Every function of ops that has a form of its own in lanes, or is taken lane by lane, in a
+    system.
+    """
 
     power: float = parameter("1", "m", "exponent", default=0.7)
     inputs = ("push",)
@@ -209,9 +313,24 @@ class Functions(System):
         return StateVariable("x", "1", 1.0), StateVariable("y", "1", 1.0)
 
     def rates(self, state, inputs):
-        x, y = state["x"], state["y"]
-        first = ops.exp(-(x**2)) - ops.log(1.5 + y * y) + (1 + x * x) ** self.power + ops.sinh(x / 4) - 2 * x
-        second = ops.sin(3 * x) + ops.cos(y) + ops.tan(y / 4) + ops.arctan(x) + ops.arcsinh(y) + inputs["push"] - 3 * y
+        x = state["x"]
+        y = state["y"]
+        first = (
+            ops.exp(-(x**2))
+            - ops.log(1.5 + y * y)
+            + (1 + x * x) ** self.power
+            + ops.sinh(x / 4)
+            - 2 * x
+        )
+        second = (
+            ops.sin(3 * x)
+            + ops.cos(y)
+            + ops.tan(y / 4)
+            + ops.arctan(x)
+            + ops.arcsinh(y)
+            + inputs["push"]
+            - 3 * y
+        )
         return {"x": first, "y": second}
 
     def outputs(self, state, inputs):
@@ -232,34 +351,59 @@ def test_a_system_of_ones_own_with_every_function():
     )
     for index in range(0, 21, 4):
         one = {"x": start["x"][index], "y": 0.3}
-        run = simulate(found.plant(index), push, duration=1.0, initial_state=one, integrator=FAST, output_times=0.0137)
+        run = simulate(
+            found.plant(index),
+            push,
+            duration=1.0,
+            initial_state=one,
+            integrator=FAST,
+            output_times=0.0137,
+        )
         assert greatest_difference(found, index, run) < 1e-12
 
 
 @pytest.mark.parametrize("method", [FAST, Rodas4(1e-8)], ids=["RK4", "Rodas4"])
 def test_sensitivities_come_in_the_same_pass(method):
     """The derivative of each plant is the difference of two plants of a batch."""
-    path, count, step = "mechanism.mass", 18, 1e-3
+    path = "mechanism.mass"
+    count = 18
+    step = 1e-3
     system = WithSensitivities(plain(), ((path,),), (10.0,))
     masses = np.linspace(8.0, 12.0, count)
     start = plain().state_at(pressure=1e5, position=0.002)
     still = {**start, **{sensitivity(s.name, 0): 0.0 for s in plain().states}}
     found = simulate_batch(
-        system, {f"inner.{path}": masses}, PULSE, duration=0.3, initial_states=still, integrator=method, keep=()
+        system,
+        {f"inner.{path}": masses},
+        PULSE,
+        duration=0.3,
+        initial_states=still,
+        integrator=method,
+        keep=(),
     )
     beside = [
         simulate_batch(
-            plain(), {path: masses + d}, PULSE, duration=0.3, initial_states=start, integrator=method, keep=()
+            plain(),
+            {path: masses + d},
+            PULSE,
+            duration=0.3,
+            initial_states=start,
+            integrator=method,
+            keep=(),
         )
         for d in (-step, step)
     ]
     by_difference = (beside[1].final["position"] - beside[0].final["position"]) / (2 * step)
     size = np.abs(by_difference).max()
-    np.testing.assert_allclose(found.final[sensitivity("position", 0)], by_difference, rtol=0, atol=2e-4 * size)
+    np.testing.assert_allclose(
+        found.final[sensitivity("position", 0)], by_difference, rtol=0, atol=2e-4 * size
+    )
 
 
 def thick_and_thin(count, thin):
-    """Muscles of which some are so thin that a step fills them several times over: those runs are not finite soon."""
+    """Muscles of which some are so thin that a step fills them several times over: those runs are
+    not finite soon.
+    """
     radius = np.full(count, 0.01)
     radius[list(thin)] = 1e-3
     return {"muscle.geometry.radius": radius}
@@ -272,7 +416,9 @@ class WithoutHint(Functions):
 
 def test_a_batch_asks_for_no_remedy():
     start = {"x": [1.0, np.finfo(float).max], "y": 0.0}
-    found = simulate_batch(WithoutHint(), {"power": [0.5, 0.5]}, ZERO_INPUT, duration=0.1, initial_states=start)
+    found = simulate_batch(
+        WithoutHint(), {"power": [0.5, 0.5]}, ZERO_INPUT, duration=0.1, initial_states=start
+    )
     assert found.failed.tolist() == [1]
     assert found.reason(1).startswith("the run ended at 0 of 0.1 s because")
 
@@ -280,14 +426,21 @@ def test_a_batch_asks_for_no_remedy():
 def test_a_plant_that_fails_does_not_stop_the_others():
     start = plain().state_at(pressure=1e5, position=0.002, speed=0.1)
     found = simulate_batch(
-        plain(), thick_and_thin(20, {3, 17}), PULSE, duration=0.3, initial_states=start, integrator=FAST
+        plain(),
+        thick_and_thin(20, {3, 17}),
+        PULSE,
+        duration=0.3,
+        initial_states=start,
+        integrator=FAST,
     )
     assert list(found.failed) == [3, 17]
     assert found.status[3] == 3
     assert "because a rate or an output is not finite" in found.reason(17)
     assert found.reason(4) == "it is complete"
     assert np.isfinite(found["pressure"][4]).all()
-    alone = simulate(found.plant(3), PULSE, duration=0.3, initial_state=start, integrator=FAST, complete=False)
+    alone = simulate(
+        found.plant(3), PULSE, duration=0.3, initial_state=start, integrator=FAST, complete=False
+    )
     part = found.recording(3)
     assert 0 < len(part) < found.time.size
     np.testing.assert_array_equal(part["position"], alone["position"])
@@ -297,7 +450,9 @@ def test_a_plant_that_fails_does_not_stop_the_others():
 
 @pytest.mark.parametrize("keep", [None, ("position",)], ids=["all", "not the air"])
 def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
-    """A pulse of a valve far too large for the step takes more air than there is; by the end it has come back."""
+    """A pulse of a valve far too large for the step takes more air than there is; by the end it has
+    come back.
+    """
     isothermal = dataclasses.replace(plain(), gas=Isothermal())
     start = isothermal.state_at(pressure=5e5, position=0.002)
     pulse = Schedule({"discharge": ((0.02, 1), (0.022, 0)), "fill": ((0.03, 1),)})
@@ -314,27 +469,45 @@ def test_air_below_none_on_the_way_is_seen_in_a_lane_as_alone(keep):
     for index in (1, 2):
         alone = simulate(found.plant(index), pulse, complete=False, initial_state=start, **given)
         assert "ended at 0.021 of 0.3 s because an air mass became negative" in found.reason(index)
-        assert re.search(r"ended at 0\.020\d+ of 0\.3 s because an air mass became negative", alone.notes[-1])
+        assert re.search(
+            r"ended at 0\.020\d+ of 0\.3 s because an air mass became negative", alone.notes[-1]
+        )
         assert found.reached[index] == len(alone)
         assert np.isnan(found["position"][index, len(alone) :]).all()
     assert keep is None or tuple(found.columns) == keep
 
 
 def test_a_plant_without_an_equilibrium_is_reported():
-    found = simulate_batch(plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, ZERO_INPUT, duration=0.1, integrator=FAST)
+    found = simulate_batch(
+        plain(), {"mechanism.mass": [4.0, 1e5, 5.0]}, ZERO_INPUT, duration=0.1, integrator=FAST
+    )
     assert list(found.failed) == [1]
-    assert "it has no equilibrium to start from: HangingMass has no stable equilibrium" in found.reason(1)
+    assert (
+        "it has no equilibrium to start from: HangingMass has no stable equilibrium"
+        in found.reason(1)
+    )
     assert np.isnan(found["pressure"][1]).all()
-    np.testing.assert_allclose(found["position"][[0, 2]], found["position"][[0, 2], :1] * np.ones(found.time.size))
+    np.testing.assert_allclose(
+        found["position"][[0, 2]], found["position"][[0, 2], :1] * np.ones(found.time.size)
+    )
 
 
 def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(monkeypatch):
-    asked, search = [], Plant.default_states
-    monkeypatch.setattr(Plant, "default_states", lambda plant, rows: asked.append(len(rows)) or search(plant, rows))
+    asked = []
+    search = Plant.default_states
+    monkeypatch.setattr(
+        Plant, "default_states", lambda plant, rows: asked.append(len(rows)) or search(plant, rows)
+    )
     varied = around({"circuit.fill.conductance": 5e-9}, 6)
     simulate_batch(plain(), varied, ZERO_INPUT, duration=0.1, integrator=FAST)
     assert asked == [1]
-    simulate_batch(plain(), {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]}, ZERO_INPUT, duration=0.1, integrator=FAST)
+    simulate_batch(
+        plain(),
+        {**varied, "mechanism.mass": [4, 5, 4, 4, 6, 5]},
+        ZERO_INPUT,
+        duration=0.1,
+        integrator=FAST,
+    )
     assert asked == [1, 3]
 
 
@@ -342,17 +515,29 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
     ("varied", "message"),
     [
         ({"mass": [1.0]}, r"Plant has no parameter 'mass'; .* Did you mean 'mechanism.mass'\?"),
-        ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'; .* Did you mean 'mechanism.mass'\?"),
+        (
+            {"mechanism.mas": [1.0]},
+            r"Plant has no parameter 'mechanism.mas'; .* Did you mean 'mechanism.mass'\?",
+        ),
         (
             {"mechanism.mass": [5.0, np.nan]},
             r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed range:",
         ),
-        ({"mechanism.mass": [5.0, 5.0, -2.0, -3.0]}, r"row 2: .* is -2 kg; allowed range: 0.* \(1 further rows too\)"),
+        (
+            {"mechanism.mass": [5.0, 5.0, -2.0, -3.0]},
+            r"row 2: .* is -2 kg; allowed range: 0.* \(1 further rows too\)",
+        ),
         ({"mechanism.mass": []}, "there are no plants; give at least one row"),
-        ({"mechanism.mass": [[1.0]]}, r"must be a column \(N,\), one value per plant; its shape is \(1, 1\)"),
+        (
+            {"mechanism.mass": [[1.0]]},
+            r"must be a column \(N,\), one value per plant; its shape is \(1, 1\)",
+        ),
         ({"mechanism.mass": 5.0}, r"must be a column \(N,\)"),
         ({"mechanism.mass": ["heavy"]}, "must be numbers, one for each plant"),
-        ({"mechanism.mass": [1.0, 2.0], "mechanism.gravity": [9.8]}, "every column needs one value per plant"),
+        (
+            {"mechanism.mass": [1.0, 2.0], "mechanism.gravity": [9.8]},
+            "every column needs one value per plant",
+        ),
         ({}, "nothing varies; give variations, initial states or inputs, or use simulate"),
     ],
 )
@@ -376,7 +561,9 @@ def test_so_do_those_of_a_model_whose_numbers_stand_in_a_list():
 
         def check(self):
             if not self.weights[0] < self.weights[1]:
-                raise ParameterError(f"Rising: {self.weights[0]:g} is not below {self.weights[1]:g}.")
+                raise ParameterError(
+                    f"Rising: {self.weights[0]:g} is not below {self.weights[1]:g}."
+                )
 
     with pytest.raises(ParameterError, match=r"variations, row 1: Rising: 3 is not below 2"):
         simulate_batch(
@@ -417,22 +604,38 @@ def test_a_check_whose_answer_differs_from_row_to_row_is_asked_row_by_row():
     given = {"duration": 0.1, "initial_states": {"x": 1.0}, "integrator": FAST}
     with pytest.raises(ParameterError, match=r"variations, row 1: Growing: 2.0 is above 1.0"):
         simulate_batch(Growing(), {"low": [0.0, 2.0, 0.0]}, ZERO_INPUT, **given)
-    assert not simulate_batch(Growing(), {"low": [0.0, 2.0], "high": [1.0, 3.0]}, ZERO_INPUT, **given).failed.size
+    assert not simulate_batch(
+        Growing(), {"low": [0.0, 2.0], "high": [1.0, 3.0]}, ZERO_INPUT, **given
+    ).failed.size
 
 
 def test_a_number_too_large_for_single_precision_is_reported():
     start = {"x": [1.0, 3e38]}
     found = simulate_batch(
-        Growing(), {}, ZERO_INPUT, duration=1.0, initial_states=start, integrator=FAST, precision=Single()
+        Growing(),
+        {},
+        ZERO_INPUT,
+        duration=1.0,
+        initial_states=start,
+        integrator=FAST,
+        precision=Single(),
     )
     assert list(found.failed) == [1]
-    assert found.reason(1) == "a rate or an output is not finite in single precision, but not in double"
+    assert (
+        found.reason(1)
+        == "a rate or an output is not finite in single precision, but not in double"
+    )
     assert np.isnan(found["x"][1]).all()
 
 
 def refused(message, error=ParameterError, **arguments):
-    given = {"variations": {"mechanism.mass": [9.0, 10.0]}, "input": PULSE, "duration": 0.1, "integrator": FAST,
-             "initial_states": plain().state_at(pressure=0.0)}  # fmt: skip
+    given = {
+        "variations": {"mechanism.mass": [9.0, 10.0]},
+        "input": PULSE,
+        "duration": 0.1,
+        "integrator": FAST,
+        "initial_states": plain().state_at(pressure=0.0),
+    }
     with pytest.raises(error, match=message):
         simulate_batch(plain(), **{**given, **arguments})
 
@@ -446,14 +649,20 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
         initial_states={**start, "speed": [0.0, 0.1]},
     )
     refused("one value per plant; .* and initial states or inputs for 3", input=[ZERO_INPUT] * 3)
-    refused("inputs, row 1: the plant has no input 'fil'", input=[ZERO_INPUT, Schedule({"fil": ((0, 1),)})])
+    refused(
+        "inputs, row 1: the plant has no input 'fil'",
+        input=[ZERO_INPUT, Schedule({"fil": ((0, 1),)})],
+    )
     refused("inputs, row 1 is None; give a Schedule", input=[ZERO_INPUT, None])
     refused("the input 'fill' is 2 before", input=Schedule({"fill": ((0.05, 2.0),)}))
     refused(
-        "initial_states, row 1: 'speed' is nan; it must be finite", initial_states={**start, "speed": [0.0, np.nan]}
+        "initial_states, row 1: 'speed' is nan; it must be finite",
+        initial_states={**start, "speed": [0.0, np.nan]},
     )
     refused("the plant has no state 'sped'", initial_states={**start, "sped": 0.0})
-    refused("initial_states lack speed", initial_states={k: v for k, v in start.items() if k != "speed"})
+    refused(
+        "initial_states lack speed", initial_states={k: v for k, v in start.items() if k != "speed"}
+    )
     refused("duration is -1 s", duration=-1)
     refused(r"1e\+06 s in steps of 0.001 s are 1e\+09 steps .* the limit is 5e\+07", duration=1e6)
     refused(
@@ -487,20 +696,31 @@ def test_everything_else_that_cannot_be_is_refused(tmp_path):
     refused("there: it exists already", FileError, into=tmp_path / "there")
     (tmp_path / "file").write_text("")
     refused("cannot be written", FileError, into=tmp_path / "file" / "inside")
-    with pytest.raises(ParameterError, match="give the initial_states of Functions, a value for each state"):
+    with pytest.raises(
+        ParameterError, match="give the initial_states of Functions, a value for each state"
+    ):
         simulate_batch(Functions(), {"power": [0.5]}, ZERO_INPUT, duration=0.1)
 
 
 def test_columns_that_do_not_fit_the_memory_are_refused():
     many = {"mechanism.mass": np.full(1_000_000, 10.0)}
-    refused(r"columns of 1000000 plants at \d+ output times take .* GB of memory; the limit is 4 GB", variations=many)
+    refused(
+        r"columns of 1000000 plants at \d+ output times take .* GB of memory; the limit is 4 GB",
+        variations=many,
+    )
 
 
 @pytest.mark.parametrize("method", [FAST, Rodas4()], ids=["RK4", "Rodas4"])
 def test_on_disk_is_what_was_in_memory(tmp_path, method):
-    start, varied = plain().state_at(pressure=1e5), thick_and_thin(18, {2} if method is FAST else ())
+    start = plain().state_at(pressure=1e5)
+    varied = thick_and_thin(18, {2} if method is FAST else ())
     varied |= around({"mechanism.mass": 10.0}, 18)
-    given = {"duration": 0.2, "initial_states": start, "integrator": method, "keep": ("pressure", "position", "fill")}
+    given = {
+        "duration": 0.2,
+        "initial_states": start,
+        "integrator": method,
+        "keep": ("pressure", "position", "fill"),
+    }
     memory = simulate_batch(plain(), varied, PULSE, **given)
     disk = simulate_batch(plain(), varied, PULSE, into=tmp_path / "study" / "run", **given)
     folder = tmp_path / "study" / "run"
@@ -536,15 +756,23 @@ def test_a_column_of_a_strange_name_has_a_file(tmp_path):
     assert found[name].shape == (2, found.time.size)
 
 
-@pytest.mark.parametrize("place", ["numpy.lib.format.open_memmap", "os.posix_fallocate", "numpy.save"])
+@pytest.mark.parametrize(
+    "place", ["numpy.lib.format.open_memmap", "os.posix_fallocate", "numpy.save"]
+)
 def test_a_full_disk_is_named_and_leaves_nothing_behind(tmp_path, monkeypatch, place):
-    """Room for the columns is reserved before the run: in it, a disk that is full would end the process."""
+    """Room for the columns is reserved before the run: in it, a disk that is full would end the
+    process.
+    """
 
     def fails(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(place, fails, raising=False)
-    refused(r"out: cannot be written to: No space left on device. Free space", FileError, into=tmp_path / "out")
+    refused(
+        r"out: cannot be written to: No space left on device. Free space",
+        FileError,
+        into=tmp_path / "out",
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -557,26 +785,35 @@ def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.setattr(BatchJob, "run_single", fails)
     with pytest.raises(ZeroDivisionError):
         simulate_batch(
-            plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.1, initial_states=plain().state_at(pressure=0.0),
+            plain(),
+            {"mechanism.mass": [9.0, 10.0]},
+            PULSE,
+            duration=0.1,
+            initial_states=plain().state_at(pressure=0.0),
             into=tmp_path / "out",
-        )  # fmt: skip
+        )
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("method", [RungeKutta4(2e-6), Rodas4(1e-12)], ids=["RK4", "Rodas4"])
 @pytest.mark.parametrize("where", ["memory", "disk"])
 def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where):
-    """The user stops as soon as the first plants are done; the rest says so, and what is there is right."""
+    """The user stops as soon as the first plants are done; the rest says so, and what is there is
+    right.
+    """
     take, once = job.Queue._take, threading.Lock()
 
     def interrupting(self):
-        if self.done >= (1 if isinstance(method, ExplicitRungeKutta) else 20) and once.acquire(blocking=False):
+        if self.done >= (1 if isinstance(method, ExplicitRungeKutta) else 20) and once.acquire(
+            blocking=False
+        ):
             _thread.interrupt_main()
             while not self.stop[0]:
                 time.sleep(0.01)
         return take(self)
 
-    count, start = 64, plain().state_at(pressure=1e5)
+    count = 64
+    start = plain().state_at(pressure=1e5)
     given = {
         "duration": 0.05,
         "initial_states": start,
@@ -609,7 +846,8 @@ def test_an_interruption_while_threads_start_keeps_what_is_done(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(ThreadPoolExecutor, "submit", interrupted)
-    varied, start = around({"mechanism.mass": 10.0}, 64), plain().state_at(pressure=1e5)
+    varied = around({"mechanism.mass": 10.0}, 64)
+    start = plain().state_at(pressure=1e5)
     try:
         found = simulate_batch(plain(), varied, PULSE, duration=0.1, initial_states=start, cores=2)
     except KeyboardInterrupt:
@@ -620,7 +858,9 @@ def test_an_interruption_while_threads_start_keeps_what_is_done(monkeypatch):
 
 def test_the_recording_of_one_is_that_of_simulate():
     start = plain().state_at(pressure=1e5)
-    found = simulate_batch(plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.2, initial_states=start)
+    found = simulate_batch(
+        plain(), {"mechanism.mass": [9.0, 10.0]}, PULSE, duration=0.2, initial_states=start
+    )
     run = simulate(found.plant(1), PULSE, duration=0.2, initial_state=start)
     one = found.recording(1)
     assert list(one) == list(run)
@@ -629,7 +869,9 @@ def test_the_recording_of_one_is_that_of_simulate():
     assert found.recording(-1).notes[0] == "plant 1 of a batch"
     with pytest.raises(ColumnError, match="there is no plant 2; there are 0 to 1"):
         found.recording(2)
-    with pytest.raises(ColumnError, match=r"no column 'presure'; kept are .* Did you mean 'pressure'"):
+    with pytest.raises(
+        ColumnError, match=r"no column 'presure'; kept are .* Did you mean 'pressure'"
+    ):
         found["presure"]
 
 
@@ -658,26 +900,45 @@ def test_a_bar_is_drawn_on_a_terminal_once_it_takes_long(monkeypatch, capsys):
 
 
 def test_rows_that_go_together_are_checked_at_once(monkeypatch):
-    """No row is checked by itself, which for 10 000 plants would take longer than their simulation."""
+    """No row is checked by itself, which for 10 000 plants would take longer than their
+    simulation.
+    """
     plant = paper()
     paths = [leaf.path for leaf in tree.leaves(plant) if leaf.value != 0.0]
-    columns = {leaf.path: leaf.value * np.linspace(0.98, 0.99, 4) for leaf in tree.leaves(plant) if leaf.path in paths}
-    check, checked = variations.check_together, []
-    monkeypatch.setattr(variations, "check_together", lambda part: (checked.append(part), check(part)))
+    columns = {
+        leaf.path: leaf.value * np.linspace(0.98, 0.99, 4)
+        for leaf in tree.leaves(plant)
+        if leaf.path in paths
+    }
+    check = variations.check_together
+    checked = []
+    monkeypatch.setattr(
+        variations, "check_together", lambda part: (checked.append(part), check(part))
+    )
     assert variations.variations_of(plant, columns, None).values.shape == (4, len(paths))
-    assert [type(part) for part in checked] == [type(part) for _, part in variations.parts_of(plant)]
+    assert [type(part) for part in checked] == [
+        type(part) for _, part in variations.parts_of(plant)
+    ]
 
 
 def test_a_limit_of_the_validity_range_beyond_its_bounds_names_the_row():
-    with pytest.raises(ParameterError, match=r"row 2.*min_pressure.*allowed range: -101325 to 1e\+08 Pa"):
-        variations.variations_of(paper(), {"muscle.contractile.min_pressure": [0.0, 0.0, -2e5]}, None)
+    with pytest.raises(
+        ParameterError, match=r"row 2.*min_pressure.*allowed range: -101325 to 1e\+08 Pa"
+    ):
+        variations.variations_of(
+            paper(), {"muscle.contractile.min_pressure": [0.0, 0.0, -2e5]}, None
+        )
 
 
 def test_variations_and_input_in_exchanged_places_are_named():
-    with pytest.raises(ParameterError, match="The order of the arguments is: plant, variations, input"):
+    with pytest.raises(
+        ParameterError, match="The order of the arguments is: plant, variations, input"
+    ):
         simulate_batch(plain(), PULSE, {"mechanism.mass": [5.0, 6.0]}, duration=0.1)
 
 
 def test_the_times_of_a_batch_are_read_by_name_as_its_columns_are():
-    batch = simulate_batch(plain(), {"mechanism.mass": [5.0, 6.0]}, PULSE, duration=0.05, output_times=0.01)
+    batch = simulate_batch(
+        plain(), {"mechanism.mass": [5.0, 6.0]}, PULSE, duration=0.05, output_times=0.01
+    )
     np.testing.assert_array_equal(batch["time"], batch.time)

@@ -1,7 +1,9 @@
-"""Contenders of the control benchmark that are called from Python, and gains that are commissioned on a truth.
+"""Contenders of the control benchmark that are called from Python, and gains that are commissioned
+on a truth.
 
-A controller that is no control law meets the same sensors and the same actuation as one that is compiled. Gains are
-sought by runs of a motion on the truth, judged by the encoder alone, with the same number of runs for all.
+A controller that is no control law meets the same sensors and the same actuation as one that is
+compiled. Gains are sought by runs of a motion on the truth, judged by the encoder alone, with the
+same number of runs for all.
 """
 
 from __future__ import annotations
@@ -28,14 +30,22 @@ from airmuscle.design import (
     on_off_joint,
     standard_contenders,
 )
-from airmuscle.design.control_benchmark import PassedSignals, alike, complete, run_task, tracking_errors
+from airmuscle.design.control_benchmark import (
+    PassedSignals,
+    alike,
+    complete,
+    run_task,
+    tracking_errors,
+)
 from airmuscle.design.tuning import with_gains
 from airmuscle.engine import Measurement
 from airmuscle.errors import ParameterError
 
 
 def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuation():
-    """The same law, called from Python at each sample: the same run, also with a valve that sticks."""
+    """The same law, called from Python at each sample: the same run, also with a valve that
+    sticks.
+    """
     called = Contender("called", Called(MINE.law))
     again = benchmark_controllers(JOINT, [called], [SHORT], sets_per_gain=10, commissioning_runs=0)
     assert again.results[0].tuning is None
@@ -43,18 +53,24 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
     mine = benchmark_controllers(JOINT, [MINE], [SHORT], sets_per_gain=0, commissioning_runs=0)
     assert found == pytest.approx(mine.metric("mine", "short sine", "rmse").median, rel=1e-3)
     stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
-    (result,) = benchmark_controllers(JOINT, [called], [stuck], sets_per_gain=0, commissioning_runs=0).results
+    (result,) = benchmark_controllers(
+        JOINT, [called], [stuck], sets_per_gain=0, commissioning_runs=0
+    ).results
     record = result.runs[RunKey(Group.MODELS, JOINT.truths[0].name, "stuck")].recording
     assert np.unique(record["left.discharge"][record["time"] > 0.401]) == pytest.approx([0.1])
     with pytest.raises(
-        ParameterError, match=r"Called has no declared parameter 'gain' to be tuned; there are inner\.gain"
+        ParameterError,
+        match=r"Called has no declared parameter 'gain' to be tuned; there are inner\.gain",
     ):
         replace(called, bounds={"gain": (1e5, 5e5)})
     with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
         complete(JOINT, Contender("wrong", Called(PassedSignals(("angle",)))))
     with pytest.raises(
         ParameterError,
-        match=r"measures 'left\.force'; the joint has sensors of .* airmuscle tune FILE.toml, whose table",
+        match=(
+            r"measures 'left\.force'; the joint has sensors of .* airmuscle tune FILE.toml, whose"
+            r" table"
+        ),
     ):
         complete(JOINT, Contender("wrong", Called(PassedSignals(("left.force",)))))
 
@@ -62,10 +78,15 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
 @pytest.mark.parametrize(("late", "samples"), [(3.0, 3), (3.2, 4), (3.5, 4)])
 def test_a_valve_sticks_at_the_first_sample_at_or_after_its_time(late, samples):
     """Also behind a called controller; `late` is the time in samples."""
-    law, dt = complete(JOINT, Contender("called", Called(MINE.law))).law, JOINT.sample_time
-    stuck = replace(law, actuation=WithStuckValve(law.actuation, "left.discharge", late * dt, 0.123))
+    law = complete(JOINT, Contender("called", Called(MINE.law))).law
+    dt = JOINT.sample_time
+    stuck = replace(
+        law, actuation=WithStuckValve(law.actuation, "left.discharge", late * dt, 0.123)
+    )
     zeros = [dict.fromkeys(names, 0.0) for names in (stuck.measured_columns, stuck.setpoints)]
-    measurement, memory, found = Measurement(*zeros, dict.fromkeys(stuck.inputs, (0.0, 1.0))), stuck.init(), []
+    measurement = Measurement(*zeros, dict.fromkeys(stuck.inputs, (0.0, 1.0)))
+    memory = stuck.init()
+    found = []
     for _ in range(6):
         commands, memory = stuck.step(memory, measurement, dt)
         found.append(commands["left.discharge"] == 0.123)
@@ -73,13 +94,20 @@ def test_a_valve_sticks_at_the_first_sample_at_or_after_its_time(late, samples):
 
 
 def test_commissioned_gains_follow_the_truth_better_than_those_before_and_the_ends_of_their_ranges():
-    contender = next(each for each in standard_contenders(JOINT) if each.name == "feed-forward + PID")
-    completed, truth = complete(JOINT, contender), JOINT.truths[0]
+    contender = next(
+        each for each in standard_contenders(JOINT) if each.name == "feed-forward + PID"
+    )
+    completed = complete(JOINT, contender)
+    truth = JOINT.truths[0]
     task = replace(SHORT, begin=0.0, duration=1.2)
     found = commission(JOINT, truth, completed.law, completed.commissioned, [task], runs=25)
     assert [path.rpartition(".")[2] for path in found.gains] == [
-        "lead_time", "amplitude", "position_gain", "speed_gain", "acceleration_gain",
-    ]  # fmt: skip
+        "lead_time",
+        "amplitude",
+        "position_gain",
+        "speed_gain",
+        "acceleration_gain",
+    ]
     assert found.runs <= 25
     assert found.after < 0.5 * found.before
 
@@ -94,8 +122,11 @@ def test_commissioned_gains_follow_the_truth_better_than_those_before_and_the_en
 
 
 def test_a_commissioning_counts_the_strokes_of_the_valves_as_the_tuning_does():
-    """As one more error, so that the mean square of all is that of the error and of the weighted strokes together."""
-    completed, truth = complete(JOINT, MINE), JOINT.truths[0]
+    """As one more error, so that the mean square of all is that of the error and of the weighted
+    strokes together.
+    """
+    completed = complete(JOINT, MINE)
+    truth = JOINT.truths[0]
     task = replace(SHORT, begin=0.7)  # from which on a commissioning judges
     errors = tracking_errors(JOINT, truth, completed.law, task)
     strokes = run_task(JOINT, truth, completed.law, task).metrics.strokes
@@ -103,9 +134,13 @@ def test_a_commissioning_counts_the_strokes_of_the_valves_as_the_tuning_does():
     assert strokes > 1.0
     assert errors[-1] == pytest.approx(weighted * np.sqrt(errors.size - 1), rel=1e-3)
     careless = replace(JOINT, objective=replace(JOINT.objective, travel_weight=0.0))
-    np.testing.assert_array_equal(tracking_errors(careless, truth, completed.law, task), [*errors[:-1], 0.0])
+    np.testing.assert_array_equal(
+        tracking_errors(careless, truth, completed.law, task), [*errors[:-1], 0.0]
+    )
     switched = on_off_joint((11,))
-    law = complete(switched, next(each for each in standard_contenders(switched) if each.name == "PID")).law
+    law = complete(
+        switched, next(each for each in standard_contenders(switched) if each.name == "PID")
+    ).law
     assert tracking_errors(switched, switched.truths[0], law, task)[-1] == 0.0
 
 
@@ -114,16 +149,20 @@ def test_a_commissioning_has_no_more_runs_than_it_is_given():
     completed = complete(JOINT, contender)
     task = replace(SHORT, begin=0.0, duration=0.9)
     for runs in (1, 3, 7):
-        found = commission(JOINT, JOINT.truths[0], completed.law, completed.commissioned, [task], runs=runs)
+        found = commission(
+            JOINT, JOINT.truths[0], completed.law, completed.commissioned, [task], runs=runs
+        )
         assert found.runs == runs
         assert found.after <= found.before
 
 
 def test_a_contender_takes_the_gains_of_another_one_by_the_ends_of_their_paths():
     by_name = {each.name: complete(JOINT, each).law for each in standard_contenders(JOINT)}
-    lqg, mpc = by_name["feed-forward + LQG"], by_name["feed-forward + MPC"]
+    lqg = by_name["feed-forward + LQG"]
+    mpc = by_name["feed-forward + MPC"]
     tuned = complete(
-        JOINT, next(each for each in standard_contenders(JOINT) if each.name == "feed-forward + LQG")
+        JOINT,
+        next(each for each in standard_contenders(JOINT) if each.name == "feed-forward + LQG"),
     ).bounds
     paths = dict(zip(tuned, alike(mpc, dict.fromkeys(tuned, 1.0)), strict=True))
     assert {path.rpartition(".")[2]: other for path, other in paths.items()} == {
@@ -135,7 +174,7 @@ def test_a_contender_takes_the_gains_of_another_one_by_the_ends_of_their_paths()
         "pressure_time": "controller.design.pressure_time",
         "speed_deviation": "controller.design.speed_deviation",
         "gain": "actuation.inner.gain",
-    }  # fmt: skip
+    }
     assert {leaf.path for leaf in leaves(lqg)} >= set(tuned)
 
 
@@ -149,28 +188,43 @@ def test_super_twisting_follows_with_the_limit_of_the_flow():
 
 
 def test_a_commissioning_corrects_its_derivatives_by_its_steps(monkeypatch):
-    """A quadratic error of five gains: with 10 runs, five of which are the first derivatives, 0.02 % of it are left.
+    """A quadratic error of five gains: with 10 runs, five of which are the first derivatives, 0.02
+    % of it are left.
 
     With derivatives measured anew after each step there would be one step, and 9 % would be left.
     """
-    completed = complete(JOINT, next(each for each in standard_contenders(JOINT) if each.name == "feed-forward"))
+    completed = complete(
+        JOINT, next(each for each in standard_contenders(JOINT) if each.name == "feed-forward")
+    )
     paths, rng = list(completed.commissioned), np.random.default_rng(4)
-    matrix, ends = rng.normal(size=(40, 5)), [completed.commissioned[path] for path in paths]
+    matrix = rng.normal(size=(40, 5))
+    ends = [completed.commissioned[path] for path in paths]
 
     def errors(joint, truth, law, task):
         known = {leaf.path: leaf.value for leaf in leaves(law)}
-        x = np.array([(known[path] - low) / (high - low) - 0.6 for path, (low, high) in zip(paths, ends, strict=True)])
+        x = np.array(
+            [
+                (known[path] - low) / (high - low) - 0.6
+                for path, (low, high) in zip(paths, ends, strict=True)
+            ]
+        )
         return matrix @ (x + 0.3 * x**2)
 
     monkeypatch.setattr("airmuscle.design.control_benchmark.commissioning.tracking_errors", errors)
-    found = commission(JOINT, JOINT.truths[0], completed.law, completed.commissioned, [SHORT], runs=10)
+    found = commission(
+        JOINT, JOINT.truths[0], completed.law, completed.commissioned, [SHORT], runs=10
+    )
     assert found.after < 1e-3 * found.before
 
 
 def test_a_commissioning_covers_the_frequencies_that_are_judged_and_no_gain_is_misused_against_its_torque():
-    """The torque is not in the task of the motions, and its mean over the judged time of the other one, from 0.7 s on, is 0."""
+    """The torque is not in the task of the motions, and its mean over the judged time of the other
+    one, from 0.7 s on, is 0.
+    """
     motions, step = JOINT.commissioning_tasks
-    judged = {task.motion.frequency for task in STANDARD_TASKS if isinstance(task.motion, SineMotion)}
+    judged = {
+        task.motion.frequency for task in STANDARD_TASKS if isinstance(task.motion, SineMotion)
+    }
     sines = {part.frequency for part in motions.motion.parts if isinstance(part, SineMotion)}
     assert max(sines) > max(judged)
     assert not sines & judged

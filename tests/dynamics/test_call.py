@@ -1,5 +1,5 @@
-"""Claims about the way from a call to its kernel: what is quick for few numbers gives, to the last bit, what the way
-for many gives; what is kept with a plant is checked again where it changes."""
+"""Claims about the way from a call to its kernel: what is quick for few numbers gives, to the last
+bit, what the way for many gives; what is kept with a plant is checked again where it changes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,12 @@ TICKS = st.integers(0, 400).map(lambda i: i / 64)
 
 def lifting() -> Plant:
     valve = Valve(5e-9, 0.433)
-    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0), Polytropic(1.2))
+    return Plant(
+        chosen_muscle(),
+        FillDischarge(Supply(6e5), valve, valve),
+        HangingMass(10.0),
+        Polytropic(1.2),
+    )
 
 
 # Rows
@@ -51,7 +56,8 @@ def lifting() -> Plant:
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 5, 7, 8, 250])
 def test_the_range_of_a_column_with_limits_is_its_smallest_and_largest_number(count):
     plant = lifting()
-    compiled, rng = compile_system(plant), np.random.default_rng(count)
+    compiled = compile_system(plant)
+    rng = np.random.default_rng(count)
     start = np.array([plant.state_at(pressure=1e5)[s.name] for s in plant.states])
     states = start * (1 + 1e-3 * rng.standard_normal((count, start.size)))
     states[count // 2 :: 90, 1] = np.nan
@@ -62,8 +68,14 @@ def test_the_range_of_a_column_with_limits_is_its_smallest_and_largest_number(co
     assert np.array_equal(table.inputs, segments.inputs_at(times, 0.0))
     known = compiled.description
     names = (*known.state_names, *known.output_names)
-    assert set(known.ranged_names) == {"air_mass", "volume", *(limit.column for limit in plant.column_limits)}
-    columns = np.hstack([states, table.outputs])[:, [names.index(name) for name in known.ranged_names]]
+    assert set(known.ranged_names) == {
+        "air_mass",
+        "volume",
+        *(limit.column for limit in plant.column_limits),
+    }
+    columns = np.hstack([states, table.outputs])[
+        :, [names.index(name) for name in known.ranged_names]
+    ]
     assert table.lower == np.fmin.reduce(columns, axis=0, initial=np.inf).tolist()
     assert table.upper == np.fmax.reduce(columns, axis=0, initial=-np.inf).tolist()
     unfit = np.flatnonzero(~np.isfinite(table.outputs).all(axis=1))
@@ -74,7 +86,8 @@ def test_the_range_of_a_column_with_limits_is_its_smallest_and_largest_number(co
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan])
 def test_an_output_that_is_not_finite_is_found_in_its_row(value):
     compiled = compile_system(lifting())
-    recorder, states = RowRecorder(compiled), np.zeros((9, 3))
+    recorder = RowRecorder(compiled)
+    states = np.zeros((9, 3))
     segments = PiecewiseLinear(np.ones(1), np.zeros((1, 2)), np.zeros((1, 2)))
     states[:] = list(lifting().state_at(pressure=1e5).values())
     assert recorder.evaluate(states, np.linspace(0, 1, 9), segments, 0.0).first_invalid == 9
@@ -83,8 +96,10 @@ def test_an_output_that_is_not_finite_is_found_in_its_row(value):
 
 
 def test_a_kept_recorder_gives_what_a_new_one_gives(monkeypatch):
-    plant, signal = lifting(), Schedule({"fill": ((0.1, 1.0), (0.3, 0.0))})
-    start, bound = plant.state_at(pressure=1e5), []
+    plant = lifting()
+    signal = Schedule({"fill": ((0.1, 1.0), (0.3, 0.0))})
+    start = plant.state_at(pressure=1e5)
+    bound = []
     bind = record.bind
     monkeypatch.setattr(record, "bind", lambda *given: bound.append(1) or bind(*given))
     long = simulate(plant, signal, duration=1.0, initial_state=start)
@@ -118,11 +133,25 @@ class Lag(System):
 
 def test_a_command_that_was_used_before_gives_the_runs_of_a_new_one():
     changes = {"fill": ((0.1, 1.0), (0.3, 0.0))}
-    signal, plant, start = Schedule(changes), lifting(), lifting().state_at(pressure=1e5)
-    asked = [(1.0, 0.0, None)] * 2 + [(1.0, 0.05, None), (0.5, 0.0, 0.05), (1.0, 0.0, 0.05), (1.0, 0.0, None)]
+    signal = Schedule(changes)
+    plant = lifting()
+    start = lifting().state_at(pressure=1e5)
+    asked = [(1.0, 0.0, None)] * 2 + [
+        (1.0, 0.05, None),
+        (0.5, 0.0, 0.05),
+        (1.0, 0.0, 0.05),
+        (1.0, 0.0, None),
+    ]
     for duration, begin, times in asked:
         again, new = (
-            simulate(plant, s, duration=duration, initial_state=start, start_time=begin, output_times=times)
+            simulate(
+                plant,
+                s,
+                duration=duration,
+                initial_state=start,
+                start_time=begin,
+                output_times=times,
+            )
             for s in (signal, Schedule(changes))
         )
         assert all(np.array_equal(again[name], new[name]) for name in new)
@@ -132,15 +161,23 @@ def test_a_command_that_was_used_before_gives_the_runs_of_a_new_one():
 
 
 def test_what_is_kept_of_a_run_for_the_next_one_cannot_be_written_to():
-    problem = Problem(lifting(), Schedule({"fill": ((0.1, 1.0),)}), 1.0, lifting().state_at(pressure=1e5))
-    for kept in (problem.segments.ends, problem.segments.values, problem.segments.slopes, problem.times):
+    problem = Problem(
+        lifting(), Schedule({"fill": ((0.1, 1.0),)}), 1.0, lifting().state_at(pressure=1e5)
+    )
+    for kept in (
+        problem.segments.ends,
+        problem.segments.values,
+        problem.segments.slopes,
+        problem.times,
+    ):
         with pytest.raises(ValueError, match="read-only"):
             kept[0] = 9.0
 
 
 @pytest.mark.parametrize("writeable", ["values", "slopes"])
 def test_segments_that_somebody_can_write_to_are_checked_again(writeable):
-    plant, state = lifting(), lifting().state_at(pressure=1e5)
+    plant = lifting()
+    state = lifting().state_at(pressure=1e5)
     segments = PiecewiseLinear(np.array([0.01]), np.full((1, 2), 0.5), np.zeros((1, 2)))
     for name in {"ends", "values", "slopes"} - {writeable}:
         getattr(segments, name).setflags(write=False)
@@ -161,9 +198,14 @@ def test_a_command_that_one_system_takes_is_refused_by_another_of_a_smaller_rang
 # Times
 
 
-@given(st.lists(TICKS, unique=True, max_size=30), st.lists(TICKS, min_size=1, max_size=8), st.sampled_from([0, 1e-12]))
+@given(
+    st.lists(TICKS, unique=True, max_size=30),
+    st.lists(TICKS, min_size=1, max_size=8),
+    st.sampled_from([0, 1e-12]),
+)
 def test_few_rows_and_instants_are_merged_as_many_are(grid, instants, shift):
-    grid, instants = np.sort(np.array(grid, dtype=float)), np.sort(instants) + shift
+    grid = np.sort(np.array(grid, dtype=float))
+    instants = np.sort(instants) + shift
     given_few = problem.FEW_INSTANTS
     problem.FEW_INSTANTS = 0
     try:
@@ -179,9 +221,12 @@ def test_few_rows_and_instants_are_merged_as_many_are(grid, instants, shift):
 @given(st.integers(1, 60), st.integers(0, 2**32 - 1))
 def test_an_input_beyond_its_range_is_found_among_few_and_many_numbers(count, seed):
     rng = np.random.default_rng(seed)
-    at, name, value = int(rng.integers(count)), str(rng.choice(["fill", "discharge"])), float(rng.choice([-0.1, 1.1]))
+    at = int(rng.integers(count))
+    name = str(rng.choice(["fill", "discharge"]))
+    value = float(rng.choice([-0.1, 1.1]))
     levels = {n: rng.random(count).tolist() for n in ("fill", "discharge")}
-    plant, start = lifting(), lifting().state_at(pressure=1e5)
+    plant = lifting()
+    start = lifting().state_at(pressure=1e5)
     Problem(plant, Schedule({n: tuple(enumerate(v)) for n, v in levels.items()}), count, start)
     levels[name][at] = value
     message = rf"the input '{name}' is {value:g} before {at + 1:g} s; allowed range: 0 to 1 "
@@ -192,7 +237,9 @@ def test_an_input_beyond_its_range_is_found_among_few_and_many_numbers(count, se
 @pytest.mark.parametrize("count", [2, 4 * arrays.FEW])
 @pytest.mark.parametrize("spoil", ["end", "value", "slope", "order"])
 def test_segments_that_a_kernel_cannot_take_are_refused_among_few_and_many(count, spoil):
-    ends, values, slopes = np.arange(1.0, count + 1), np.zeros((count, 1)), np.zeros((count, 1))
+    ends = np.arange(1.0, count + 1)
+    values = np.zeros((count, 1))
+    slopes = np.zeros((count, 1))
     PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0, count)
     if spoil == "order":
         ends[-1] = ends[-2]
@@ -203,7 +250,9 @@ def test_segments_that_a_kernel_cannot_take_are_refused_among_few_and_many(count
 
 
 class Steps(InputSignal):
-    """A user's signal in integers and by columns: the valve opens after two seconds and closes after three."""
+    """A user's signal in integers and by columns: the valve opens after two seconds and closes
+    after three.
+    """
 
     def segments(self, inputs, start, duration):
         values = np.zeros((3, len(inputs)), dtype=np.int64, order="F")
@@ -213,8 +262,10 @@ class Steps(InputSignal):
 
 @pytest.mark.parametrize("loop", [False, True], ids=["open loop", "control loop"])
 def test_a_signal_in_integers_is_the_signal_in_floats(loop):
-    plant, start = lifting(), lifting().state_at(pressure=1e5)
-    controller, pressure = PID("pressure", "discharge", gain=-1e-6), Schedule({"pressure": ((0.0, 1e5),)})
+    plant = lifting()
+    start = lifting().state_at(pressure=1e5)
+    controller = PID("pressure", "discharge", gain=-1e-6)
+    pressure = Schedule({"pressure": ((0.0, 1e5),)})
     own, usual = (
         simulate(
             plant,
@@ -229,11 +280,16 @@ def test_a_signal_in_integers_is_the_signal_in_floats(loop):
 
 
 def test_a_batch_and_a_single_step_take_integers_as_floats():
-    plant, signals = lifting(), (Steps(), Schedule({"fill": ((2.0, 1.0), (3.0, 0.0))}))
+    plant = lifting()
+    signals = (Steps(), Schedule({"fill": ((2.0, 1.0), (3.0, 0.0))}))
     start = plant.state_at(pressure=1e5)
-    own, usual = (simulate_batch(plant, {}, [each], duration=4.0, initial_states=start) for each in signals)
+    own, usual = (
+        simulate_batch(plant, {}, [each], duration=4.0, initial_states=start) for each in signals
+    )
     assert all(np.array_equal(own[name], usual[name]) for name in usual.columns)
-    own, usual = (advance(plant, start, each.segments(plant.inputs, 0.0, 4.0), 4.0) for each in signals)
+    own, usual = (
+        advance(plant, start, each.segments(plant.inputs, 0.0, 4.0), 4.0) for each in signals
+    )
     assert own == usual
 
 
@@ -256,10 +312,18 @@ def test_an_initial_state_is_checked_again_where_it_differs_from_the_last_one():
 # Drivers
 
 
-@given(st.integers(0, 64), st.integers(1, 40), st.floats(0, 1), st.one_of(st.just(-np.inf), st.just(np.inf), TICKS))
+@given(
+    st.integers(0, 64),
+    st.integers(1, 40),
+    st.floats(0, 1),
+    st.one_of(st.just(-np.inf), st.just(np.inf), TICKS),
+)
 def test_an_interval_without_a_new_period_continues_the_pulse(start, length, duty, pulse_end):
-    """The rest of a pulse in one interval is what a longer interval, in which a period begins, has up to there."""
-    begin, driver = start / 64, PWM(0.5)
+    """The rest of a pulse in one interval is what a longer interval, in which a period begins, has
+    up to there.
+    """
+    begin = start / 64
+    driver = PWM(0.5)
     state = PwmState(0.0, 1.0, pulse_end)
     end = min(begin + length / 64, 2.0)
     short, later = driver.step(state, [(end, duty, 0.0)], begin)
@@ -277,10 +341,13 @@ def level_at(segments, time):
 def test_single_segments_are_merged_as_several_are():
     rng = np.random.default_rng(3)
     for _ in range(50):
-        end, values, slopes = 1.0 + rng.random(), rng.standard_normal(3), rng.standard_normal(3)
+        end = 1.0 + rng.random()
+        values = rng.standard_normal(3)
+        slopes = rng.standard_normal(3)
         columns = [[(end, v, s)] for v, s in zip(values.tolist(), slopes.tolist(), strict=True)]
         split = [[(0.5, v, s), (end, v + 0.5 * s, s)] for [(_, v, s)] in columns]
-        one, both = merge_columns(columns, 0.0), merge_columns([*columns[:2], split[2]], 0.0)
+        one = merge_columns(columns, 0.0)
+        both = merge_columns([*columns[:2], split[2]], 0.0)
         assert one.ends.tolist() == [end]
         assert one.values.tolist() == both.values[:1].tolist()
         assert one.slopes.tolist() == both.slopes[:1].tolist()
@@ -296,7 +363,9 @@ class Unchanged(Driver):
         return list(command), state
 
 
-@pytest.mark.parametrize("other", [Schedule({}), SampledSignal({"discharge": ((0.1, 0.0), (0.5, 0.3))})])
+@pytest.mark.parametrize(
+    "other", [Schedule({}), SampledSignal({"discharge": ((0.1, 0.0), (0.5, 0.3))})]
+)
 def test_a_loop_whose_drivers_change_nothing_is_the_loop_without_drivers(other):
     controller = Called(PID("pressure", "fill", gain=1.5e-5, integral_time=0.4))
     setpoint = Schedule({"pressure": ((0.0, 1e5), (0.51, 3e5), (0.75, 5e4))})
@@ -307,8 +376,13 @@ def test_a_loop_whose_drivers_change_nothing_is_the_loop_without_drivers(other):
         for drivers in ({}, {"fill": Unchanged()})
     )
     assert held.recording["fill"].max() > 0.0
-    assert all(np.array_equal(held.recording[name], driven.recording[name]) for name in held.recording)
-    assert (held.final_state, held.control_state[1:7]) == (driven.final_state, driven.control_state[1:7])
+    assert all(
+        np.array_equal(held.recording[name], driven.recording[name]) for name in held.recording
+    )
+    assert (held.final_state, held.control_state[1:7]) == (
+        driven.final_state,
+        driven.control_state[1:7],
+    )
 
 
 def test_an_input_that_varies_after_the_run_only_is_named():
@@ -317,7 +391,10 @@ def test_an_input_that_varies_after_the_run_only_is_named():
     signal = SampledSignal({"fill": tuple((t, 8.0 * (t - stamps[0])) for t in stamps.tolist())})
     plant = lifting()
     given = {"duration": 0.2, "initial_state": plant.state_at(pressure=2e5)}
-    with pytest.warns(AirmuscleWarning, match=r"input 'fill' begin at 1.7e\+09 s, after the end of the run at 0.2 s"):
+    with pytest.warns(
+        AirmuscleWarning,
+        match=r"input 'fill' begin at 1.7e\+09 s, after the end of the run at 0.2 s",
+    ):
         simulate(plant, signal, **given)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -1,8 +1,10 @@
-"""A controller looks at a plant at t_0 + k h, each instant met exactly, and its command is held between two.
+"""A controller looks at a plant at t_0 + k h, each instant met exactly, and its command is held
+between two.
 
-So a loop at a linear system is its discretisation by zero-order hold, to the tolerance of the method, and for small
-steps a loop at a plant is that of its linearisation. Rows do not change the solution, nor does cutting a run; a loop
-that fails or is interrupted returns what it has, and can be taken up where it stood.
+So a loop at a linear system is its discretisation by zero-order hold, to the tolerance of the
+method, and for small steps a loop at a plant is that of its linearisation. Rows do not change the
+solution, nor does cutting a run; a loop that fails or is interrupted returns what it has, and can
+be taken up where it stood.
 """
 
 from __future__ import annotations
@@ -94,21 +96,37 @@ def solution(plant, loop, *, duration, complete=True, **problem):
 
 
 def lifting(circuit=None, mass=5.0):
-    return Plant(chosen_muscle(), circuit or FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(mass))
+    return Plant(
+        chosen_muscle(), circuit or FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(mass)
+    )
 
 
 PRESSURE = Schedule({"pressure": ((0.0, 1e5), (0.3, 3e5), (0.7, 1.5e5))})
-VALVES = PID("pressure", SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4, derivative_time=0.02)
+VALVES = PID(
+    "pressure",
+    SplitRange("fill", "discharge"),
+    gain=1.5e-5,
+    integral_time=0.4,
+    derivative_time=0.02,
+)
 
 
 # What a loop is
 
 
 def test_a_loop_at_a_linear_system_is_its_discretisation():
-    """x_(k+1) = a x_k + (1 - a) u_k with a = exp(-h/tau), u = K (b r - x) + I, I_(k+1) = I + K h/T_i (r - x)."""
-    h, a, k = 0.05, np.exp(-0.05 / 0.3), 1.5
-    run = simulate(Lag(), ControlLoop(LAG_PI, h, STEP), duration=3.0, initial_state={"x": 0.2}, integrator=FINE)
-    x, integral, expected = 0.2, k * 0.2, []
+    """x_(k+1) = a x_k + (1 - a) u_k with a = exp(-h/tau), u = K (b r - x) + I, I_(k+1) = I + K
+    h/T_i (r - x).
+    """
+    h = 0.05
+    a = np.exp(-0.05 / 0.3)
+    k = 1.5
+    run = simulate(
+        Lag(), ControlLoop(LAG_PI, h, STEP), duration=3.0, initial_state={"x": 0.2}, integrator=FINE
+    )
+    x = 0.2
+    integral = k * 0.2
+    expected = []
     for i in range(60):
         r = 1.0 if i >= 10 else 0.0
         expected.append(x)
@@ -120,12 +138,19 @@ def test_a_loop_at_a_linear_system_is_its_discretisation():
 
 
 def test_between_samples_a_held_command_meets_a_driven_disturbance():
-    """With w linear in time x follows the exact solution of x' = (u + w - x)/tau over every period."""
-    h, tau = 0.05, 0.3
-    disturbed = ControlLoop(LAG_PI, h, STEP, other_inputs=SampledSignal({"w": ((0.0, 0.0), (0.5, 0.0), (1.5, 2.0))}))
+    """With w linear in time x follows the exact solution of x' = (u + w - x)/tau over every
+    period.
+    """
+    h = 0.05
+    tau = 0.3
+    disturbed = ControlLoop(
+        LAG_PI, h, STEP, other_inputs=SampledSignal({"w": ((0.0, 0.0), (0.5, 0.0), (1.5, 2.0))})
+    )
     run = simulate(Lag(), disturbed, duration=1.5, initial_state={"x": 0.0}, integrator=FINE)
     at = np.searchsorted(run["time"], h * np.arange(31) - 1e-9)
-    whole = np.array([[-1 / tau, 1 / tau, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])  # of x, u + w, its slope
+    whole = np.array(
+        [[-1 / tau, 1 / tau, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]
+    )  # of x, u + w, its slope
     for begin, end in itertools.pairwise(at):
         slope = 2.0 if run["time"][begin] > 0.5 - 1e-9 else 0.0
         known = [run["x"][begin], run["command.u"][begin] + run["w"][begin], slope]
@@ -138,25 +163,37 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
 
     valve = ProportionalValve(Supply(5e5), VALVE, VALVE, SecondOrderLag(20.0, 0.7), overlap=-0.3)
     plant = Plant(chosen_muscle(), valve, Isometric(0.05), Isothermal())
-    rest = solution(plant, ControlLoop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})), duration=20.0,
-                    initial_state=plant.state_at(pressure=1e5), integrator=FINE).final_state  # fmt: skip
+    rest = solution(
+        plant,
+        ControlLoop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})),
+        duration=20.0,
+        initial_state=plant.state_at(pressure=1e5),
+        integrator=FINE,
+    ).final_state
     linear = linearise(plant, rest, {"command": 0.0})
     middle = float(plant.outputs(rest, {"command": 0.0})["pressure"])
     row = linear.outputs.index("pressure")
-    h, k, t_i = 0.02, 4e-6, 0.15
+    h = 0.02
+    k = 4e-6
+    t_i = 0.15
     a, b, *_ = cont2discrete((linear.A, linear.B, linear.C[[row]], linear.D[[row]]), h)
     left = []
     for step in (4000.0, 2000.0):
         loop = ControlLoop(
-            PID("pressure", "command", k, t_i), h, Schedule({"pressure": ((0.0, middle), (h / 2, middle + step))})
+            PID("pressure", "command", k, t_i),
+            h,
+            Schedule({"pressure": ((0.0, middle), (h / 2, middle + step))}),
         )
         run = simulate(plant, loop, duration=50 * h, initial_state=rest, integrator=FINE)
-        x, integral, expected = np.zeros(len(linear.states)), 0.0, []
+        x = np.zeros(len(linear.states))
+        integral = 0.0
+        expected = []
         for i in range(50):
             y = float(linear.C[row] @ x)
             e = (step if i else 0.0) - y
             expected.append(y)
-            x, integral = a @ x + b[:, 0] * (k * e + integral), integral + k * h / t_i * e
+            x = a @ x + b[:, 0] * (k * e + integral)
+            integral = integral + k * h / t_i * e
         found = run["pressure"][np.searchsorted(run["time"], h * np.arange(50) - 1e-9)] - middle
         assert found.max() > 0.9 * step, "the step is followed"
         left.append(np.abs(found - expected).max())
@@ -166,13 +203,20 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
 
 @pytest.mark.parametrize("method", [Rodas4(), RungeKutta4(1e-3), DormandPrince8(1e-3)])
 def test_every_sampling_instant_is_met_exactly(method):
-    """No row is missing, what was measured is what the column held then, and the command changes nowhere else.
+    """No row is missing, what was measured is what the column held then, and the command changes
+    nowhere else.
 
-    Rows are computed several at once, so that they may differ from what was measured by the rounding of the ambient
-    pressure.
+    Rows are computed several at once, so that they may differ from what was measured by the
+    rounding of the ambient pressure.
     """
     h = 0.03
-    run = simulate(lifting(), ControlLoop(VALVES, h, PRESSURE), duration=1.0, integrator=method, output_times=0.007)
+    run = simulate(
+        lifting(),
+        ControlLoop(VALVES, h, PRESSURE),
+        duration=1.0,
+        integrator=method,
+        output_times=0.007,
+    )
     instants = h * np.arange(34)
     assert np.isin(instants, run["time"]).all()
     at = np.searchsorted(run["time"], instants)
@@ -185,8 +229,11 @@ def test_every_sampling_instant_is_met_exactly(method):
 
 
 def test_rows_do_not_change_the_solution():
-    loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": (PWM(30.0), SolenoidDriver(3e-3, 2e-3))})
-    plant, found = lifting(), []
+    loop = ControlLoop(
+        VALVES, TICK, PRESSURE, drivers={"fill": (PWM(30.0), SolenoidDriver(3e-3, 2e-3))}
+    )
+    plant = lifting()
+    found = []
     for output in (None, 0.5, 1e-3, [0.1, 0.15]):
         run = solution(plant, loop, duration=1.0, output_times=output)
         at = np.isin(run.recording["time"], TICK * np.arange(64))
@@ -212,7 +259,9 @@ def test_what_jumps_with_its_input_is_measured_before_it_jumps():
     """u_k = K (r - y_k), y_k = 2 x_k + u_(k-1): the controller has not commanded u_k yet."""
     loop = ControlLoop(PID("y", "u", 0.5), 0.1, Schedule({"y": ((0.0, 1.0),)}))
     run = simulate(Lag(), loop, duration=1.0, initial_state={"x": 0.0}, integrator=FINE)
-    a, x, u = np.exp(-0.1 / 0.3), 0.0, 0.0
+    a = np.exp(-0.1 / 0.3)
+    x = 0.0
+    u = 0.0
     for i in np.searchsorted(run["time"], 0.1 * np.arange(10) - 1e-9):
         assert run["measured.y"][i] == pytest.approx(2 * x + u, abs=1e-9)
         u = 0.5 * (1.0 - (2 * x + u))
@@ -221,14 +270,19 @@ def test_what_jumps_with_its_input_is_measured_before_it_jumps():
 
 @pytest.mark.parametrize(("period", "places"), [(0.1, 1), (0.07, 2), (0.019, 3)])
 def test_a_set_point_that_changes_at_a_sampling_instant_is_seen_there(period, places):
-    """3 x 0.1 is more than 0.3, and 6 x 0.019 less than 0.114: rounding must not cost a period, either way."""
+    """3 x 0.1 is more than 0.3, and 6 x 0.019 less than 0.114: rounding must not cost a period,
+    either way.
+    """
     off = set()
     for k in range(1, 60):
         at = round(k * period, places)
         off.add(float(np.sign(k * period - at)))
-        wanted, beside = Schedule({"x": ((at, 1.0),)}), Schedule({"w": ((at, 1.0),)})
+        wanted = Schedule({"x": ((at, 1.0),)})
+        beside = Schedule({"w": ((at, 1.0),)})
         loop = ControlLoop(PID("x", "u", 1.0), period, wanted, beside)
-        run = simulate(Lag(), loop, duration=60 * period, initial_state={"x": 0.0}, output_times=60 * period)
+        run = simulate(
+            Lag(), loop, duration=60 * period, initial_state={"x": 0.0}, output_times=60 * period
+        )
         first = int(np.flatnonzero(run["command.u"])[0])
         assert run["time"][first] == pytest.approx(at, abs=1e-9)
         assert (run["w"][first - 1], run["w"][first], run["setpoint.x"][first]) == (0.0, 1.0, 1.0)
@@ -249,7 +303,8 @@ def test_a_command_is_cut_off_at_the_range_of_its_input():
         (valve, "command", (-1.0, 1.0), {}),
         (valve, "command", (0.0, 1.0), {"command": PWM(100.0)}),  # what a driver takes
     ):
-        loop, plant = ControlLoop(PID("pressure", name, 1e3), TICK, PRESSURE, drivers=drivers), lifting(circuit)
+        loop = ControlLoop(PID("pressure", name, 1e3), TICK, PRESSURE, drivers=drivers)
+        plant = lifting(circuit)
         run = simulate(plant, loop, duration=1.0, initial_state=plant.state_at(pressure=2e5))
         assert set(run[f"command.{name}"]) == set(range_of_it)
 
@@ -261,7 +316,8 @@ class Wild(Controller):
     inputs = ("fill",)
 
     def __init__(self, after: int, given: Any) -> None:
-        self.after, self.given = after, given
+        self.after = after
+        self.given = given
 
     def init(self) -> int:
         return 0
@@ -280,8 +336,12 @@ def test_a_controller_that_knows_no_range_is_cut_off_too():
 
 
 def test_pulses_in_step_with_the_samples_are_as_wide_as_commanded():
-    """A carrier's period that begins with a sample has that sample's command, however k/50 and k x 0.02 are rounded."""
-    loop = ControlLoop(VALVES, 0.02, Periodic(PRESSURE, 1.0), drivers={"fill": PWM(50.0), "discharge": PWM(50.0)})
+    """A carrier's period that begins with a sample has that sample's command, however k/50 and k x
+    0.02 are rounded.
+    """
+    loop = ControlLoop(
+        VALVES, 0.02, Periodic(PRESSURE, 1.0), drivers={"fill": PWM(50.0), "discharge": PWM(50.0)}
+    )
     run = simulate(lifting(), loop, duration=20.0, output_times=20.0)
     edges = 0.02 * np.arange(1001)
     edges[-1] = 20.0
@@ -293,7 +353,9 @@ def test_pulses_in_step_with_the_samples_are_as_wide_as_commanded():
 
 def test_two_point_control_swings_about_its_set_point_by_more_than_its_hysteresis():
     loop = ControlLoop(
-        OnOffController("pressure", SplitRange("fill", "discharge"), 2e4), 2e-3, Schedule({"pressure": ((0.0, 2e5),)})
+        OnOffController("pressure", SplitRange("fill", "discharge"), 2e4),
+        2e-3,
+        Schedule({"pressure": ((0.0, 2e5),)}),
     )
     run = simulate(lifting(), loop, duration=2.0)
     late = run["pressure"][run["time"] > 1.0]
@@ -303,20 +365,30 @@ def test_two_point_control_swings_about_its_set_point_by_more_than_its_hysteresi
 
 
 def test_pid_follows_with_every_kind_of_valve():
-    """With integral action nothing is left of the error, whatever stands between the controller and the air."""
-    lag, single = SecondOrderLag(20.0, 0.7), Schedule({"pressure": ((0.0, 2e5),)})
+    """With integral action nothing is left of the error, whatever stands between the controller and
+    the air.
+    """
+    lag = SecondOrderLag(20.0, 0.7)
+    single = Schedule({"pressure": ((0.0, 2e5),)})
     for circuit, commanded, gain, drivers in (
-        (FillDischarge(Supply(5e5), VALVE, VALVE), SplitRange("fill", "discharge"), 1e-5, {"fill": PWM(200.0), "discharge": PWM(200.0)}),
+        (
+            FillDischarge(Supply(5e5), VALVE, VALVE),
+            SplitRange("fill", "discharge"),
+            1e-5,
+            {"fill": PWM(200.0), "discharge": PWM(200.0)},
+        ),
         (ProportionalValve(Supply(5e5), VALVE, VALVE, lag), "command", 1e-5, {}),
         (ProportionalRegulator(Supply(5e5), VALVE, VALVE, lag, 2e5), "setpoint", 0.5, {}),
-    ):  # fmt: skip
+    ):
         loop = ControlLoop(PID("pressure", commanded, gain, 0.3), 5e-3, single, drivers=drivers)
         run = simulate(lifting(circuit), loop, duration=6.0)
         assert run["pressure"][-1] == pytest.approx(2e5, rel=5e-3), type(circuit).__name__
 
 
 def test_position_is_followed_and_what_is_beside_goes_on():
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0)))
+    plant = Plant(
+        chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0))
+    )
     pid = PID("position", SplitRange("fill", "discharge"), 15.0, 0.5, 0.08)
     loop = ControlLoop(
         pid,
@@ -337,19 +409,36 @@ def test_position_is_followed_and_what_is_beside_goes_on():
 
 @pytest.mark.parametrize("cuts", [(32, 16), (1, 2, 60), tuple(range(1, 64))])
 def test_a_run_cut_at_its_samples_is_the_run_in_one_to_the_last_bit(cuts):
-    drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3)), "discharge": SolenoidDriver(20e-3, 20e-3)}
-    loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers=drivers), lifting()
+    drivers = {
+        "fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3)),
+        "discharge": SolenoidDriver(20e-3, 20e-3),
+    }
+    loop = ControlLoop(VALVES, TICK, PRESSURE, drivers=drivers)
+    plant = lifting()
     whole = solution(plant, loop, duration=1.0, initial_state=plant.state_at(pressure=1e5))
-    state, memory, time = plant.state_at(pressure=1e5), None, 0.0
+    state = plant.state_at(pressure=1e5)
+    memory = None
+    time = 0.0
     for cut in [TICK * n for n in sorted({*cuts, 64})]:
-        part = solution(plant, loop, duration=cut - time, initial_state=state, start_time=time, control_state=memory)
-        state, memory, time = part.final_state, part.control_state, part.final_time
+        part = solution(
+            plant,
+            loop,
+            duration=cut - time,
+            initial_state=state,
+            start_time=time,
+            control_state=memory,
+        )
+        state = part.final_state
+        memory = part.control_state
+        time = part.final_time
     assert (state, memory) == (whole.final_state, whole.control_state)
 
 
 @pytest.mark.parametrize("cut", [0.001, 0.5 - TICK / 3, 0.5 + TICK / 3])
 def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
-    loop, plant, start = ControlLoop(VALVES, TICK, PRESSURE), lifting(), lifting().state_at(pressure=1e5)
+    loop = ControlLoop(VALVES, TICK, PRESSURE)
+    plant = lifting()
+    start = lifting().state_at(pressure=1e5)
     whole = solution(plant, loop, duration=1.0, initial_state=start, integrator=FINE)
     if cut < TICK:
         with pytest.raises(ParameterError, match=r"longer than the run of 0\.001 s"):
@@ -365,8 +454,15 @@ def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
         control_state=first.control_state,
         integrator=FINE,
     )
-    second = solution(plant, loop, duration=1.0 - short.final_time, initial_state=short.final_state, start_time=short.final_time,
-                      control_state=short.control_state, integrator=FINE)  # fmt: skip
+    second = solution(
+        plant,
+        loop,
+        duration=1.0 - short.final_time,
+        initial_state=short.final_state,
+        start_time=short.final_time,
+        control_state=short.control_state,
+        integrator=FINE,
+    )
     assert second.recording["command.fill"][0] == first.recording["command.fill"][-1]
     assert second.recording["measured.pressure"][0] == first.recording["measured.pressure"][-1]
     assert second.control_state.sample_count == whole.control_state.sample_count == 64
@@ -375,12 +471,19 @@ def test_a_run_cut_between_two_samples_goes_on_with_what_was_commanded(cut):
 
 def test_what_was_commanded_gives_the_same_run_without_a_controller():
     drivers = {"fill": (PWM(30.0), SolenoidDriver(9e-3, 7e-3, 4e-3, 2e-3))}
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0)))
+    plant = Plant(
+        chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), WithLatch(HangingMass(10.0))
+    )
     loop = ControlLoop(VALVES, TICK, PRESSURE, Schedule({"latched": ((0, 1), (0.1, 0))}), drivers)
     start = plant.state_at(pressure=1e5)
     run = simulate(plant, loop, duration=1.0, initial_state=start, integrator=FINE)
     again = simulate(
-        plant, loop.as_open_loop(run), duration=1.0, initial_state=start, integrator=FINE, output_times=run["time"]
+        plant,
+        loop.as_open_loop(run),
+        duration=1.0,
+        initial_state=start,
+        integrator=FINE,
+        output_times=run["time"],
     )
     at = np.isin(again["time"], run["time"])
     assert at.sum() == len(run)
@@ -395,15 +498,22 @@ HUGE = FillDischarge(Supply(5e5), Valve(9e-6, 0.3), Valve(9e-6, 0.3))
 
 
 @pytest.mark.parametrize(
-    ("gas", "reason"), [(Polytropic(1.2), "not finite"), (Isothermal(), "an air mass became negative")]
+    ("gas", "reason"),
+    [(Polytropic(1.2), "not finite"), (Isothermal(), "an air mass became negative")],
 )
 def test_a_loop_that_fails_returns_what_it_has(gas, reason):
     """Huge valves empty the muscle within one step of a fixed method."""
     plant = Plant(chosen_muscle(), HUGE, HangingMass(10.0), gas)
     falling = Schedule({"pressure": ((0.0, 3e5), (0.1, 0.0))})
     loop = ControlLoop(PID("pressure", SplitRange("fill", "discharge"), 1.0), 0.02, falling)
-    told = {"duration": 1.0, "initial_state": plant.state_at(pressure=3e5), "integrator": RungeKutta4(0.01)}
-    with pytest.raises(SimulationError, match=rf"ended at .* because .*{reason}.*at air_mass") as caught:
+    told = {
+        "duration": 1.0,
+        "initial_state": plant.state_at(pressure=3e5),
+        "integrator": RungeKutta4(0.01),
+    }
+    with pytest.raises(
+        SimulationError, match=rf"ended at .* because .*{reason}.*at air_mass"
+    ) as caught:
         solution(plant, loop, **told)
     run = caught.value.recording
     assert 3 <= len(run) < 101
@@ -418,7 +528,8 @@ def test_a_loop_that_fails_returns_what_it_has(gas, reason):
 @pytest.mark.parametrize("given", [{"fill": np.nan}, {"fill": np.inf - np.inf}])
 def test_a_command_that_is_no_number_ends_the_run_there(given):
     with pytest.raises(
-        SimulationError, match=r"ended at 0.1 of 1 s because the controller gave a command that is not"
+        SimulationError,
+        match=r"ended at 0.1 of 1 s because the controller gave a command that is not",
     ) as caught:
         simulate(lifting(), ControlLoop(Wild(5, given), 0.02, PRESSURE), duration=1.0)
     assert caught.value.recording["time"][-1] == 0.1
@@ -426,7 +537,9 @@ def test_a_command_that_is_no_number_ends_the_run_there(given):
 
 
 def test_a_loop_that_fails_at_its_first_sample_has_no_rows_and_a_reason():
-    with pytest.raises(SimulationError, match=r"ended at 0 of 1 s because the controller gave a command") as caught:
+    with pytest.raises(
+        SimulationError, match=r"ended at 0 of 1 s because the controller gave a command"
+    ) as caught:
         simulate(lifting(), ControlLoop(Wild(0, {"fill": np.nan}), 0.02, PRESSURE), duration=1.0)
     assert len(caught.value.recording) == 0
     assert "command.fill" in caught.value.recording
@@ -434,12 +547,15 @@ def test_a_loop_that_fails_at_its_first_sample_has_no_rows_and_a_reason():
 
 @pytest.mark.parametrize("given", [{}, {"fil": 1.0}, {"fill": "open"}, None])
 def test_a_controller_that_gives_no_command_is_named(given):
-    with pytest.raises(ParameterError, match=r"Wild commands .*; it must give a number for each of fill"):
+    with pytest.raises(
+        ParameterError, match=r"Wild commands .*; it must give a number for each of fill"
+    ):
         simulate(lifting(), ControlLoop(Wild(5, given), 0.02, PRESSURE), duration=1.0)
 
 
 def test_a_loop_that_is_interrupted_can_be_taken_up():
-    loop, plant = ControlLoop(Wild(30, KeyboardInterrupt), TICK, PRESSURE), lifting()
+    loop = ControlLoop(Wild(30, KeyboardInterrupt), TICK, PRESSURE)
+    plant = lifting()
     with pytest.raises(SimulationError, match="because it was interrupted") as caught:
         simulate(plant, loop, duration=1.0)
     assert caught.value.interrupted
@@ -460,7 +576,8 @@ def test_a_loop_that_is_interrupted_can_be_taken_up():
 
 def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_before(monkeypatch):
     integrate, run = BoundIntegrator.run_part, iter(range(100))
-    loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(200.0)}), lifting()
+    loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(200.0)})
+    plant = lifting()
     monkeypatch.setattr(compiled_loop, "are_called", lambda prepared: True)
     monkeypatch.setattr(BoundIntegrator, "entry_address", property(lambda self: None))
     whole = solution(plant, loop, duration=1.0)
@@ -473,7 +590,11 @@ def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_befor
         patch.setattr(BoundIntegrator, "run_part", interrupted)
         part = solution(plant, loop, duration=1.0, complete=False)
     assert "interrupted" in part.recording.notes[-1]
-    assert (part.final_time, part.control_state.time, part.control_state.sample_count) == (20 * TICK, 20 * TICK, 20)
+    assert (part.final_time, part.control_state.time, part.control_state.sample_count) == (
+        20 * TICK,
+        20 * TICK,
+        20,
+    )
     rest = solution(
         plant,
         loop,
@@ -489,7 +610,9 @@ def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_befor
 
 
 def test_what_does_not_change_is_made_once(monkeypatch):
-    """A run binds its integrator once, however long it is; a plant is described once for all its runs."""
+    """A run binds its integrator once, however long it is; a plant is described once for all its
+    runs.
+    """
     counted: dict[str, int] = {}
 
     def counting(name, function):
@@ -501,7 +624,8 @@ def test_what_does_not_change_is_made_once(monkeypatch):
 
     monkeypatch.setattr(Rodas4, "binding", counting("binding", Rodas4.binding))
     monkeypatch.setattr(Description, "__init__", counting("description", Description.__init__))
-    plant, start = lifting(), lifting().state_at(pressure=1e5)
+    plant = lifting()
+    start = lifting().state_at(pressure=1e5)
     loop = ControlLoop(VALVES, TICK, PRESSURE)
     simulate(plant, loop, duration=0.1, initial_state=start)
     assert counted["binding"] == 1
@@ -518,14 +642,20 @@ def test_what_does_not_change_is_made_once(monkeypatch):
 def test_the_recording_says_who_commanded_what():
     loop = ControlLoop(VALVES, TICK, PRESSURE)
     run = simulate(lifting(), loop, duration=0.5)
-    assert run.notes[0].startswith("controlled by PID(measured='pressure', commanded=SplitRange(positive='fill'")
+    assert run.notes[0].startswith(
+        "controlled by PID(measured='pressure', commanded=SplitRange(positive='fill'"
+    )
     assert run.notes[0].endswith(
-        "sample time 15.62 ms, measured pressure [Pa], commanded fill, discharge; compiled with the plant"
+        "sample time 15.62 ms, measured pressure [Pa], commanded fill, discharge; compiled with the"
+        " plant"
     )
     heads = list(run.to_pandas())
-    assert {"setpoint.pressure [Pa]", "measured.pressure [Pa]", "command.fill [1]", "command.discharge [1]"} <= set(
-        heads
-    )
+    assert {
+        "setpoint.pressure [Pa]",
+        "measured.pressure [Pa]",
+        "command.fill [1]",
+        "command.discharge [1]",
+    } <= set(heads)
     assert [r.key for r in cite(loop)] == ["astrom-hagglund-1995"]
     assert np.array_equal(run["setpoint.pressure"], np.where(run["time"] < 0.3, 1e5, 3e5))
 
@@ -538,8 +668,12 @@ def test_the_recording_says_who_commanded_what():
         (RungeKutta4(1e-3), "kutta-1901"),
     ],
 )
-def test_a_problem_its_solution_and_its_recording_cite_plant_integrator_and_controller(integrator, key):
-    problem = Problem(lifting(), ControlLoop(VALVES, TICK, PRESSURE), duration=0.05, integrator=integrator)
+def test_a_problem_its_solution_and_its_recording_cite_plant_integrator_and_controller(
+    integrator, key
+):
+    problem = Problem(
+        lifting(), ControlLoop(VALVES, TICK, PRESSURE), duration=0.05, integrator=integrator
+    )
     sources = {r.key for r in cite(problem)}
     assert sources >= {key, "astrom-hagglund-1995", *(r.key for r in cite(problem.system))}
     solution = solve(problem)
@@ -553,7 +687,9 @@ def test_a_problem_its_solution_and_its_recording_cite_plant_integrator_and_cont
 
 @pytest.mark.parametrize("period", [0.0, -0.1, np.nan, np.inf, True])
 def test_a_period_that_cannot_be_is_refused(period):
-    with pytest.raises(ParameterError, match=r"ControlLoop.sample_time is .*; it must be positive and finite"):
+    with pytest.raises(
+        ParameterError, match=r"ControlLoop.sample_time is .*; it must be positive and finite"
+    ):
         ControlLoop(VALVES, period, PRESSURE)
 
 
@@ -566,11 +702,20 @@ def test_a_period_that_cannot_be_is_refused(period):
             {"setpoint": Schedule({"presure": ()})},
             "ControlLoop.setpoint names presure; the set points of PID are pressure",
         ),
-        ({"setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; the set points of PID are pressure"),
+        (
+            {"setpoint": Schedule({})},
+            "ControlLoop.setpoint names nothing; the set points of PID are pressure",
+        ),
         ({"setpoint": Periodic(Schedule({"force": ()}), 1.0)}, "ControlLoop.setpoint names force"),
-        ({"other_inputs": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller and by other_inputs"),
+        (
+            {"other_inputs": Schedule({"fill": ((0, 1),)})},
+            "'fill' is commanded by the controller and by other_inputs",
+        ),
         ({"drivers": {"fill": 3}}, "the driver of 'fill' is 3"),
-        ({"controller": PID("", "fill", 1.0), "setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; the set"),
+        (
+            {"controller": PID("", "fill", 1.0), "setpoint": Schedule({})},
+            "ControlLoop.setpoint names nothing; the set",
+        ),
     ],
 )
 def test_a_loop_that_cannot_be_is_refused(changed, message):
@@ -581,16 +726,42 @@ def test_a_loop_that_cannot_be_is_refused(changed, message):
 @pytest.mark.parametrize(
     ("loop", "message"),
     [
-        (ControlLoop(PID("presure", "fill", 1.0), 0.01, Schedule({"presure": ()})), "measures 'presure'.*Did you mean 'pressure'"),
-        (ControlLoop(PID("fill", "fill", 1.0), 0.01, Schedule({"fill": ()})), "measures 'fill', which the plant does not have"),
-        (ControlLoop(PID("pressure", "fil", 1.0), 0.01, PRESSURE), "no input 'fil'; .*Did you mean 'fill'"),
-        (ControlLoop(VALVES, 0.01, PRESSURE, drivers={"vent": PWM(50.0)}), "no input 'vent'; there are fill, discharge"),
+        (
+            ControlLoop(PID("presure", "fill", 1.0), 0.01, Schedule({"presure": ()})),
+            "measures 'presure'.*Did you mean 'pressure'",
+        ),
+        (
+            ControlLoop(PID("fill", "fill", 1.0), 0.01, Schedule({"fill": ()})),
+            "measures 'fill', which the plant does not have",
+        ),
+        (
+            ControlLoop(PID("pressure", "fil", 1.0), 0.01, PRESSURE),
+            "no input 'fil'; .*Did you mean 'fill'",
+        ),
+        (
+            ControlLoop(VALVES, 0.01, PRESSURE, drivers={"vent": PWM(50.0)}),
+            "no input 'vent'; there are fill, discharge",
+        ),
         (ControlLoop(VALVES, 0.01, PRESSURE, Schedule({"vent": ()})), "no input 'vent'"),
-        (ControlLoop(PID("pressure", "fill", 1.0), 0.01, PRESSURE, Schedule({"discharge": ((0.05, 2.0),)})), "'discharge' is 2 before"),
-        (ControlLoop(VALVES, 1.5, PRESSURE), r"sample time of the controller is 1.5 s, longer than the run of 1 s"),
-        (ControlLoop(VALVES, 1e-8, PRESSURE), r"a sample time of 1e-08 s makes 1e\+08 samples; 10000000 are allowed"),
+        (
+            ControlLoop(
+                PID("pressure", "fill", 1.0),
+                0.01,
+                PRESSURE,
+                Schedule({"discharge": ((0.05, 2.0),)}),
+            ),
+            "'discharge' is 2 before",
+        ),
+        (
+            ControlLoop(VALVES, 1.5, PRESSURE),
+            r"sample time of the controller is 1.5 s, longer than the run of 1 s",
+        ),
+        (
+            ControlLoop(VALVES, 1e-8, PRESSURE),
+            r"a sample time of 1e-08 s makes 1e\+08 samples; 10000000 are allowed",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_loop_that_does_not_fit_its_plant_is_refused(loop, message):
     with pytest.raises(ParameterError, match=message):
         simulate(lifting(), loop, duration=1.0)
@@ -598,10 +769,12 @@ def test_a_loop_that_does_not_fit_its_plant_is_refused(loop, message):
 
 @pytest.mark.parametrize("start_time", [0.0, 0.9, 1.2])
 def test_a_memory_belongs_to_its_instant(start_time):
-    loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
+    loop = ControlLoop(VALVES, 0.1, PRESSURE)
+    plant = lifting()
     run = solution(plant, loop, duration=1.0)
     with pytest.raises(
-        ParameterError, match=r"the control_state is that of 1 s, and the run begins at .* Give the time"
+        ParameterError,
+        match=r"the control_state is that of 1 s, and the run begins at .* Give the time",
     ):
         solution(
             plant,
@@ -625,10 +798,19 @@ def test_a_memory_belongs_to_its_instant(start_time):
     ],
 )
 def test_a_run_goes_on_with_the_state_of_its_own_loop(change, other):
-    plant, loop = lifting(), ControlLoop(VALVES, 0.1, PRESSURE)
+    plant = lifting()
+    loop = ControlLoop(VALVES, 0.1, PRESSURE)
     state = solution(plant, loop, duration=1.0).control_state._replace(**other)
-    with pytest.raises(ParameterError, match=r"the control_state is not that of this loop of a .*; give one that"):
-        solution(plant, dataclasses.replace(loop, **change), duration=1.0, start_time=1.0, control_state=state)
+    with pytest.raises(
+        ParameterError, match=r"the control_state is not that of this loop of a .*; give one that"
+    ):
+        solution(
+            plant,
+            dataclasses.replace(loop, **change),
+            duration=1.0,
+            start_time=1.0,
+            control_state=state,
+        )
 
 
 def test_a_run_with_an_input_that_has_no_driver_in_its_list_goes_on():
@@ -641,10 +823,11 @@ def test_a_run_with_an_input_that_has_no_driver_in_its_list_goes_on():
 def test_an_experiment_takes_the_commands_of_a_loop():
     from airmuscle.bench import Experiment, InitialConditions
 
-    loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
+    loop = ControlLoop(VALVES, 0.1, PRESSURE)
+    plant = lifting()
     run = simulate(plant, loop, duration=0.2)
     with pytest.raises(ParameterError, match="the input is ControlLoop"):
         Experiment(run, loop, InitialConditions.at_rest(plant, 0.0))
-    assert Experiment(run, loop.as_open_loop(run), InitialConditions.at_rest(plant, 0.0)).command == loop.as_open_loop(
-        run
-    )
+    assert Experiment(
+        run, loop.as_open_loop(run), InitialConditions.at_rest(plant, 0.0)
+    ).command == loop.as_open_loop(run)

@@ -1,6 +1,7 @@
-"""A loop of a control law is one program, and it is the loop that calls the law at each sample: bit by bit where the law
-does not round (on-off control, held and pulsed inputs, delays, ramps), and to rounding errors for a PID controller. The
-drivers of the kernel are those of Python, whichever way the controller is called.
+"""A loop of a control law is one program, and it is the loop that calls the law at each sample: bit
+by bit where the law does not round (on-off control, held and pulsed inputs, delays, ramps), and to
+rounding errors for a PID controller. The drivers of the kernel are those of Python, whichever way
+the controller is called.
 
 A controller that is no control law is called from Python; the notes say which of the two it was.
 """
@@ -52,21 +53,31 @@ DRIVERS = {
 
 
 def both(problem: Problem):
-    """The solutions of a problem by one program, and by calls of the controller; with drivers called from Python too,
-    the second is the same to the last bit."""
+    """The solutions of a problem by one program, and by calls of the controller; with drivers
+    called from Python too, the second is the same to the last bit."""
     loop = problem.input
-    called = dataclasses.replace(problem, input=dataclasses.replace(loop, controller=Called(loop.controller)))
-    by_program, by_calls = solve(problem), solve(called)
+    called = dataclasses.replace(
+        problem, input=dataclasses.replace(loop, controller=Called(loop.controller))
+    )
+    by_program = solve(problem)
+    by_calls = solve(called)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compiled_loop, "are_called", lambda prepared: True)
         assert_identical(by_calls, solve(called))
-    texts = [d.text for s in (by_program, by_calls) for d in s.diagnostics if d.code == DiagnosticCode.CONTROLLER]
+    texts = [
+        d.text
+        for s in (by_program, by_calls)
+        for d in s.diagnostics
+        if d.code == DiagnosticCode.CONTROLLER
+    ]
     assert ["compiled" in text for text in texts] == [True, False], texts
     return by_program, by_calls
 
 
 @pytest.mark.parametrize(
-    "integrator", [Rodas4(), RungeKutta4(1e-3), DormandPrince8(2e-3)], ids=lambda i: type(i).__name__
+    "integrator",
+    [Rodas4(), RungeKutta4(1e-3), DormandPrince8(2e-3)],
+    ids=lambda i: type(i).__name__,
 )
 @pytest.mark.parametrize("drivers", DRIVERS.values(), ids=DRIVERS)
 def test_an_on_off_loop_is_the_same_to_the_last_bit(drivers, integrator):
@@ -82,7 +93,9 @@ def test_a_pid_loop_is_the_same_to_rounding_errors(drivers):
     times = np.intersect1d(one.recording["time"], other.recording["time"])
     assert times.size > 140
     for name in ("pressure", "position", "command.fill", "measured.pressure"):
-        a, b = (s.recording[name][np.searchsorted(s.recording["time"], times)] for s in (one, other))
+        a, b = (
+            s.recording[name][np.searchsorted(s.recording["time"], times)] for s in (one, other)
+        )
         assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max(), name
 
 
@@ -92,11 +105,18 @@ def test_a_run_in_two_parts_is_the_run_in_one():
     for middle in (0.625, 0.63):  # at a sampling instant, and between two
         first = solve(Problem(LIFT, loop, middle))
         problem = Problem(
-            LIFT, loop, 1.25 - middle, first.final_state, first.final_time, control_state=first.control_state
+            LIFT,
+            loop,
+            1.25 - middle,
+            first.final_state,
+            first.final_time,
+            control_state=first.control_state,
         )
         second, called = both(problem)
         assert_identical(second, called)
-        assert second.final_state["position"] == pytest.approx(whole.final_state["position"], rel=1e-6)
+        assert second.final_state["position"] == pytest.approx(
+            whole.final_state["position"], rel=1e-6
+        )
         assert second.control_state.sample_count == whole.control_state.sample_count == 100
 
 
@@ -111,12 +131,16 @@ def test_other_inputs_with_ramps_pass_through_drivers():
 def test_a_measured_output_is_measured_before_the_command():
     on = OnOffController("force", SPLIT, hysteresis=5.0)
     loop = ControlLoop(on, 0.01, Schedule({"force": ((0, 20.0), (0.5, 60.0))}))
-    assert_identical(*both(Problem(dataclasses.replace(LIFT, mechanism=Isometric(0.02)), loop, 1.0)))
+    assert_identical(
+        *both(Problem(dataclasses.replace(LIFT, mechanism=Isometric(0.02)), loop, 1.0))
+    )
 
 
 drivers = st.one_of(
     st.builds(PWM, st.floats(5.0, 300.0), st.floats(0.0, 1e-3)),
-    st.builds(SolenoidDriver, *[st.sampled_from([0.0, 1e-3, 2e-3, 1e-2]) | st.floats(0.0, 0.03)] * 4),
+    st.builds(
+        SolenoidDriver, *[st.sampled_from([0.0, 1e-3, 2e-3, 1e-2]) | st.floats(0.0, 0.03)] * 4
+    ),
 )
 
 
@@ -128,7 +152,9 @@ drivers = st.one_of(
 def test_any_driver_is_the_same_to_the_last_bit(chain, commands, sample_time):
     """The set point is the command: what drivers make of it does not depend on the plant."""
     knots = tuple((i * 3 * sample_time, value) for i, value in enumerate(commands))
-    loop = ControlLoop(Direct(), sample_time, Schedule({"fill": knots}), drivers={"fill": tuple(chain)})
+    loop = ControlLoop(
+        Direct(), sample_time, Schedule({"fill": knots}), drivers={"fill": tuple(chain)}
+    )
     duration = 3.4 * len(commands) * sample_time
     assert_identical(*both(Problem(LIFT, loop, duration, integrator=RungeKutta4(sample_time))))
 
@@ -142,11 +168,15 @@ class Direct(ControlLaw):
     inputs = property(lambda self: ("fill",))
     initial_memory = property(lambda self: {})
 
-    def step(self, memory: Mapping[str, Any], measurement: Any, dt: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    def step(
+        self, memory: Mapping[str, Any], measurement: Any, dt: Any
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         return {"fill": measurement.setpoints["fill"]}, {}
 
 
-@pytest.mark.parametrize("drivers", [DRIVERS["held"], DRIVERS["pulsed and delayed"]], ids=["held", "driven"])
+@pytest.mark.parametrize(
+    "drivers", [DRIVERS["held"], DRIVERS["pulsed and delayed"]], ids=["held", "driven"]
+)
 def test_pauses_and_short_buffers_change_nothing(drivers, monkeypatch):
     loop = ControlLoop(ON_OFF, 0.0125, STEPS, drivers=drivers)
     problem = Problem(LIFT, loop, 1.0)
@@ -176,9 +206,13 @@ def test_an_interruption_keeps_complete_intervals_and_the_run_goes_on_from_there
     assert 0.0 < stopped.final_time < 1.0
     monkeypatch.undo()
     rest = Problem(
-        LIFT, loop, 1.0 - stopped.final_time, stopped.final_state, stopped.final_time,
+        LIFT,
+        loop,
+        1.0 - stopped.final_time,
+        stopped.final_state,
+        stopped.final_time,
         control_state=stopped.control_state,
-    )  # fmt: skip
+    )
     assert solve(rest).final_state == whole.final_state
 
 
@@ -193,7 +227,9 @@ class Root(ControlLaw):
     inputs = property(lambda self: ("fill",))
     initial_memory = property(lambda self: {"time": 0.0})
 
-    def step(self, memory: Mapping[str, Any], measurement: Any, dt: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+    def step(
+        self, memory: Mapping[str, Any], measurement: Any, dt: Any
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         return {"fill": ops.sqrt(self.limit - memory["time"])}, {"time": memory["time"] + dt}
 
 
@@ -237,7 +273,8 @@ class Forgetful(Root):
 
 def test_a_law_that_cannot_be_compiled_is_named_with_what_to_do():
     with pytest.raises(
-        TraceError, match=r"Branching.step cannot be compiled .*ops.*derive the controller from Controller"
+        TraceError,
+        match=r"Branching.step cannot be compiled .*ops.*derive the controller from Controller",
     ):
         solve(Problem(LIFT, ControlLoop(Branching(), 0.1, Schedule({})), 1.0))
     with pytest.raises(TraceError, match=r"Forgetful.step does not return 'time'"):
@@ -246,7 +283,8 @@ def test_a_law_that_cannot_be_compiled_is_named_with_what_to_do():
 
 def test_the_parameters_of_a_law_are_numbers_of_one_program():
     runs = [
-        solve(Problem(LIFT, ControlLoop(OnOffController("pressure", SPLIT, h), 0.0125, STEPS), 1.0)) for h in (1e4, 8e4)
+        solve(Problem(LIFT, ControlLoop(OnOffController("pressure", SPLIT, h), 0.0125, STEPS), 1.0))
+        for h in (1e4, 8e4)
     ]
     assert runs[0].final_state != runs[1].final_state
 

@@ -1,6 +1,7 @@
-"""A solution is the plant's, not the grid's: bit for bit the same wherever it is looked at, and converging at the order
-of its method away from kinks. The smooth plants have a wall that lags, creep, a cubic spring, and heat or a tube with
-inertia: not both, as air that turns round brings another temperature, which is a kink.
+"""A solution is the plant's, not the grid's: bit for bit the same wherever it is looked at, and
+converging at the order of its method away from kinks. The smooth plants have a wall that lags,
+creep, a cubic spring, and heat or a tube with inertia: not both, as air that turns round brings
+another temperature, which is a kink.
 """
 
 from __future__ import annotations
@@ -11,7 +12,15 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.engine import ZERO_INPUT, DormandPrince8, Rodas4, RungeKutta4, SampledSignal, Schedule, simulate
+from airmuscle.engine import (
+    ZERO_INPUT,
+    DormandPrince8,
+    Rodas4,
+    RungeKutta4,
+    SampledSignal,
+    Schedule,
+    simulate,
+)
 from airmuscle.physics import (
     Braid,
     ClosedChamber,
@@ -35,20 +44,31 @@ from airmuscle.physics import (
 BRAID = Braid(0.01, 0.4363, 0.2)
 HEAT = EnergyBalance(0.5)
 MUSCLE = Muscle(
-    VirtualWork(BRAID), BRAID, CubicSpring(3000.0, 20.0), LinearDamper(150.0),
-    wall=ViscoelasticWall(2e-11, 0.05), creep=CreepElements((5e3,), (0.1,)),
-)  # fmt: skip
+    VirtualWork(BRAID),
+    BRAID,
+    CubicSpring(3000.0, 20.0),
+    LinearDamper(150.0),
+    wall=ViscoelasticWall(2e-11, 0.05),
+    creep=CreepElements((5e3,), (0.1,)),
+)
 WAVES = Polytropic(1.3)
 SMOOTH = {
     "heat": Plant(MUSCLE, ClosedChamber(), HangingMass(20.0), HEAT),
-    "tube": Plant(MUSCLE, WithTubes(ClosedChamber(), DistributedTube(0.5, 2e-3, 2, WAVES)), HangingMass(20.0), WAVES),
+    "tube": Plant(
+        MUSCLE,
+        WithTubes(ClosedChamber(), DistributedTube(0.5, 2e-3, 2, WAVES)),
+        HangingMass(20.0),
+        WAVES,
+    ),
 }
 METHODS = [Rodas4(1e-5), RungeKutta4(2e-4), DormandPrince8(5e-4)]
 
 
 def valves_and_all():
     valve = Valve(8e-9, 0.4)
-    circuit = WithTubes(FillDischarge(Supply(5e5), valve, valve), DistributedTube(0.5, 3e-3, 2, HEAT))
+    circuit = WithTubes(
+        FillDischarge(Supply(5e5), valve, valve), DistributedTube(0.5, 3e-3, 2, HEAT)
+    )
     return Plant(chosen_muscle(), circuit, HangingMass(10.0), HEAT)
 
 
@@ -64,7 +84,12 @@ def test_states_at_common_instants_are_bit_for_bit_the_same(method):
     grids = [common, np.linspace(0.0, 0.4, 1001), np.linspace(0.0, 0.4, 37), np.array([0.4])]
     runs = [
         simulate(
-            plant, command, duration=0.4, initial_state=start, integrator=method, output_times=np.union1d(common, grid)
+            plant,
+            command,
+            duration=0.4,
+            initial_state=start,
+            integrator=method,
+            output_times=np.union1d(common, grid),
         )
         for grid in grids
     ]
@@ -82,10 +107,19 @@ def test_the_last_state_does_not_know_how_often_it_was_looked_at():
     command = SampledSignal({"fill": ((0.0, 0.0), (0.1, 1.0), (0.2, 0.0))})
     for method in METHODS:
         ends = [
-            simulate(plant, command, duration=0.4, initial_state=start, integrator=method, output_times=output)
+            simulate(
+                plant,
+                command,
+                duration=0.4,
+                initial_state=start,
+                integrator=method,
+                output_times=output,
+            )
             for output in (0.4, 1e-4)
         ]
-        assert [ends[0][s.name][-1] for s in plant.states] == [ends[1][s.name][-1] for s in plant.states]
+        assert [ends[0][s.name][-1] for s in plant.states] == [
+            ends[1][s.name][-1] for s in plant.states
+        ]
 
 
 # The order
@@ -96,7 +130,12 @@ def course(name, method, duration=0.32):
     plant = SMOOTH[name]
     start = plant.state_at(pressure=3e5, position=0.025, speed=0.02)
     run = simulate(
-        plant, ZERO_INPUT, duration=duration, initial_state=start, integrator=method, output_times=duration / 40
+        plant,
+        ZERO_INPUT,
+        duration=duration,
+        initial_state=start,
+        integrator=method,
+        output_times=duration / 40,
     )
     steps = int(run.notes[0].split(": ")[1].split()[0])
     assert run["force"].min() > 10.0  # taut
@@ -118,8 +157,12 @@ def error(name, method):
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize(("method", "order"), [(RungeKutta4, 4), (DormandPrince8, 8)])
 def test_explicit_methods_have_their_order(name, method, order):
-    coarse = {("heat", 4): 2e-3, ("heat", 8): 16e-3, ("tube", 4): 4e-4, ("tube", 8): 8e-4}[name, order]
-    errors = np.array([error(name, method(coarse / 2**i))[0] for i in range(2 if order == 8 else 3)])
+    coarse = {("heat", 4): 2e-3, ("heat", 8): 16e-3, ("tube", 4): 4e-4, ("tube", 8): 8e-4}[
+        name, order
+    ]
+    errors = np.array(
+        [error(name, method(coarse / 2**i))[0] for i in range(2 if order == 8 else 3)]
+    )
     measured = np.log2(errors[:-1] / errors[1:])
     assert measured == pytest.approx(order, abs=0.15 * order)
 

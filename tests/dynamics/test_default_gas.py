@@ -1,4 +1,6 @@
-"""The default gas: it warms while a muscle is filled, less than an adiabatic gas, and cools to the wall; one for all runs."""
+"""The default gas: it warms while a muscle is filled, less than an adiabatic gas, and cools to the
+wall; one for all runs.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +30,9 @@ def vessel(volume: float, gas: am.physics.Gas | None = None) -> am.Plant:
 
 def fill(plant: am.Plant, duration: float) -> am.Recording:
     start = plant.state_at(pressure=0.0)
-    return am.simulate(plant, am.Schedule({"fill": ((0.0, 1.0),)}), duration=duration, initial_state=start)
+    return am.simulate(
+        plant, am.Schedule({"fill": ((0.0, 1.0),)}), duration=duration, initial_state=start
+    )
 
 
 def test_a_fill_warms_the_air_less_than_an_adiabatic_one_and_it_cools_to_the_wall():
@@ -42,27 +46,38 @@ def test_a_fill_warms_the_air_less_than_an_adiabatic_one_and_it_cools_to_the_wal
 def test_the_air_of_a_filled_muscle_at_rest_is_that_of_the_isothermal_gas():
     mass = fill(vessel(1e-4), 20.0)["air_mass"][-1]
     assert mass == pytest.approx(7.01325e5 * 1e-4 / (287.05 * AMBIENT.temperature), rel=2e-3)
-    assert mass == pytest.approx(fill(vessel(1e-4, am.Isothermal()), 20.0)["air_mass"][-1], rel=2e-3)
+    assert mass == pytest.approx(
+        fill(vessel(1e-4, am.Isothermal()), 20.0)["air_mass"][-1], rel=2e-3
+    )
 
 
 def test_size_and_a_default_plant_need_the_same_air():
     conditions = SizingConditions(supply=6e5)
-    choice = size_muscles(LiftRequirement(stroke=0.03, mass=20.0), conditions, [am.load("dmsp-20-300")]).choices[0]
-    muscle, count = choice.muscle.muscle, choice.count
+    choice = size_muscles(
+        LiftRequirement(stroke=0.03, mass=20.0), conditions, [am.load("dmsp-20-300")]
+    ).choices[0]
+    muscle = choice.muscle.muscle
+    count = choice.count
     assert muscle is not None
     masses = []
     for point in (choice.design.extended, choice.design.contracted):
-        plant = am.Plant(muscle, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.Isometric(point.contraction))
+        plant = am.Plant(
+            muscle, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.Isometric(point.contraction)
+        )
         masses.append(plant.state_at(pressure=point.pressure)["air_mass"])
     assert choice.air == pytest.approx(count * abs(masses[1] - masses[0]), rel=0.01)
 
 
 @pytest.mark.parametrize(
-    ("diameter", "slenderness", "share"), [(0.01, 15, 1.0), (0.02, 15, 1.0), (0.04, 15, 1.0), (0.02, 5, 0.738), (0.02, 60, 1.549)]
-)  # fmt: skip
-def test_the_heat_passes_the_surface_of_a_cylinder(diameter: float, slenderness: float, share: float):
+    ("diameter", "slenderness", "share"),
+    [(0.01, 15, 1.0), (0.02, 15, 1.0), (0.04, 15, 1.0), (0.02, 5, 0.738), (0.02, 60, 1.549)],
+)
+def test_the_heat_passes_the_surface_of_a_cylinder(
+    diameter: float, slenderness: float, share: float
+):
     length = slenderness * diameter
-    volume, surface = math.pi * diameter**2 / 4 * length, math.pi * diameter * (length + diameter / 2)
+    volume = math.pi * diameter**2 / 4 * length
+    surface = math.pi * diameter * (length + diameter / 2)
     gas = WallHeatTransfer(30.0)
     state = gas.state_at(3e5, volume, AMBIENT)
     warm = {**state, "internal_energy": 1.1 * state["internal_energy"]}
@@ -75,8 +90,12 @@ def test_a_larger_muscle_cools_more_slowly_in_proportion_to_its_diameter():
         plant = vessel(math.pi * diameter**2 / 4 * 15 * diameter)
         start = plant.state_at(pressure=5e5)
         warm = {**start, "internal_energy": 1.1 * start["internal_energy"]}
-        run = am.simulate(plant, am.Schedule({}), duration=20.0, initial_state=warm, output_times=0.01)
-        return float(run["time"][np.argmax(run["temperature"] - AMBIENT.temperature < 29.3 / math.e)])
+        run = am.simulate(
+            plant, am.Schedule({}), duration=20.0, initial_state=warm, output_times=0.01
+        )
+        return float(
+            run["time"][np.argmax(run["temperature"] - AMBIENT.temperature < 29.3 / math.e)]
+        )
 
     times = [cooling_time(d) for d in (0.01, 0.02, 0.04)]
     assert [t / times[0] for t in times] == pytest.approx([1.0, 2.0, 4.0], rel=0.05)

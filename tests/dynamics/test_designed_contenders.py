@@ -1,8 +1,9 @@
-"""Designed contenders: linear-quadratic and model predictive control of the deviation from a motion of the model.
+"""Designed contenders: linear-quadratic and model predictive control of the deviation from a motion
+of the model.
 
-The design model is the linearisation of the joint's model, the sum of feed-forward and designed command keeps its range,
-and the weights of a design are tuned like the gains of any controller. Sensors and actuation of a controller that is
-called are compiled.
+The design model is the linearisation of the joint's model, the sum of feed-forward and designed
+command keeps its range, and the weights of a design are tuned like the gains of any controller.
+Sensors and actuation of a controller that is called are compiled.
 """
 
 from __future__ import annotations
@@ -42,23 +43,37 @@ from airmuscle.errors import ParameterError
 from airmuscle.physics import find_equilibrium
 
 JOINT = proportional_joint((11,))
-LQG, MPC, ADRC = "feed-forward + LQG", "feed-forward + MPC", "feed-forward + ADRC"
-CONTENDERS = {each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC, ADRC)}
+LQG = "feed-forward + LQG"
+MPC = "feed-forward + MPC"
+ADRC = "feed-forward + ADRC"
+CONTENDERS = {
+    each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC, ADRC)
+}
 
 
 def test_the_design_model_has_the_accelerations_of_the_joint():
     linear = joint_design_model(JOINT)
-    for angle, speed, half in ((0.01, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 2e3), (-0.005, 0.03, 1e3)):
+    for angle, speed, half in (
+        (0.01, 0.0, 0.0),
+        (0.0, 0.05, 0.0),
+        (0.0, 0.0, 2e3),
+        (-0.005, 0.03, 1e3),
+    ):
         wanted = angular_acceleration(JOINT, JOINT.model, angle, speed, half)
-        assert -linear.stiffness * angle - linear.damping * speed + linear.gain * half == pytest.approx(
-            wanted, rel=2e-3
+        assert (
+            -linear.stiffness * angle - linear.damping * speed + linear.gain * half
+            == pytest.approx(wanted, rel=2e-3)
         )
 
 
 def test_the_design_model_responds_as_the_joint_whose_pressures_follow_at_once():
-    """A pressure difference that is held: angle at rest of the linear model and equilibrium of the joint."""
-    linear, half = joint_design_model(JOINT), 5e3
-    first, second = JOINT.mean_pressure + half, JOINT.mean_pressure - half
+    """A pressure difference that is held: angle at rest of the linear model and equilibrium of the
+    joint.
+    """
+    linear = joint_design_model(JOINT)
+    half = 5e3
+    first = JOINT.mean_pressure + half
+    second = JOINT.mean_pressure - half
     rest = find_equilibrium(JOINT.model, pressure=(first, second))
     assert rest["angle"] == pytest.approx(linear.gain / linear.stiffness * half, rel=0.01)
 
@@ -69,17 +84,23 @@ def test_the_readings_of_the_design_model_have_the_lag_and_the_dead_time_of_thei
         linear.states.index(n) for n in ("angle", "reading", "angular_speed", "speed_reading")
     )
     for frequency in (1.0, 20.0):
-        response = np.linalg.solve(1j * frequency * np.eye(len(linear.states)) - linear.A, linear.B)[:, 0]
+        response = np.linalg.solve(
+            1j * frequency * np.eye(len(linear.states)) - linear.A, linear.B
+        )[:, 0]
         late = 1.0 / (1.0 + 0.5j * frequency * (6e-3 + 8e-3)) ** 2
         assert response[reading] / response[angle] == pytest.approx(late, rel=1e-9)
-        assert response[seen] / response[speed] == pytest.approx(late / (1.0 + 1j * frequency * 0.01), rel=1e-9)
+        assert response[seen] / response[speed] == pytest.approx(
+            late / (1.0 + 1j * frequency * 0.01), rel=1e-9
+        )
 
 
 def measured(angle: float, wanted: float, forward: float) -> Measurement:
     setpoints = {"angle": wanted, "feed_forward": forward}
     setpoints |= dict.fromkeys(("feed_forward_rate", "angular_speed", "angular_acceleration"), 0.0)
     columns = {"angle": angle, "angular_speed": 0.0}
-    return Measurement(columns, setpoints, {"difference": (-JOINT.pressure_span, JOINT.pressure_span)})
+    return Measurement(
+        columns, setpoints, {"difference": (-JOINT.pressure_span, JOINT.pressure_span)}
+    )
 
 
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
@@ -94,11 +115,17 @@ def test_without_deviation_the_command_is_the_feed_forward(name: str):
 @pytest.mark.parametrize("name", [LQG, MPC])
 def test_a_motion_that_is_followed_leaves_no_deviation_of_angle_and_speed(name: str):
     """Readings with the stated dead time and, of the speed, the lag of its sensor."""
-    law, motion, h = CONTENDERS[name].law, SineMotion(0.3, 2.0), 2e-3
+    law = CONTENDERS[name].law
+    motion = SineMotion(0.3, 2.0)
+    h = 2e-3
     angles, speeds, accelerations = motion.at(h * np.arange(200.0))
-    sensor, seen = ColumnSensor("angular_speed", lag=0.01, delay=3), dict[str, float]()
-    memory, forward = law.init(), law.feed_forward.init()
-    for k, (angle, speed, acceleration) in enumerate(zip(angles, speeds, accelerations, strict=True)):
+    sensor = ColumnSensor("angular_speed", lag=0.01, delay=3)
+    seen = dict[str, float]()
+    memory = law.init()
+    forward = law.feed_forward.init()
+    for k, (angle, speed, acceleration) in enumerate(
+        zip(angles, speeds, accelerations, strict=True)
+    ):
         reading, seen = sensor.measure(seen or sensor.initial_memory, speed, 0.0, float(k > 0), h)
         given = measured(angles[max(k - 3, 0)], angle, 0.0)
         given.columns["angular_speed"] = reading
@@ -109,13 +136,23 @@ def test_a_motion_that_is_followed_leaves_no_deviation_of_angle_and_speed(name: 
 
 
 def test_lqg_does_not_hunt_between_the_steps_of_the_encoder_because_it_measures_the_speed():
-    """Gains of the commissioning on truth 5, where LQG of the angle alone oscillates within a step of the encoder."""
+    """Gains of the commissioning on truth 5, where LQG of the angle alone oscillates within a step
+    of the encoder.
+    """
     joint = proportional_joint((5,))
-    law, (task,) = complete(joint, CONTENDERS[LQG]).law, find_tasks(("hold",))
-    found = {"permitted_angle": 0.05, "speed_noise": 12.2, "disturbance_noise": 194.0, "pressure_time": 3e-3}
+    law = complete(joint, CONTENDERS[LQG]).law
+    (task,) = find_tasks(("hold",))
+    found = {
+        "permitted_angle": 0.05,
+        "speed_noise": 12.2,
+        "disturbance_noise": 194.0,
+        "pressure_time": 3e-3,
+    }
     paths = {leaf.path.rpartition(".")[2]: leaf.path for leaf in leaves(law)}
     at_rest = [
-        run_task(joint, joint.truths[0], with_gains(law, {paths[k]: v for k, v in gains.items()}), task).metrics
+        run_task(
+            joint, joint.truths[0], with_gains(law, {paths[k]: v for k, v in gains.items()}), task
+        ).metrics
         for gains in ({**found, "speed_deviation": 0.05}, {**found, "speed_deviation": 100.0})
     ]
     assert at_rest[0].rmse < 0.035
@@ -124,8 +161,10 @@ def test_lqg_does_not_hunt_between_the_steps_of_the_encoder_because_it_measures_
 
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_the_sum_of_both_commands_keeps_its_range(name: str):
-    law, rng = CONTENDERS[name].law, np.random.default_rng(3)
-    memory, found = law.init(), []
+    law = CONTENDERS[name].law
+    rng = np.random.default_rng(3)
+    memory = law.init()
+    found = []
     for _ in range(60):
         given = measured(rng.normal(scale=0.5), rng.normal(scale=0.5), rng.normal(scale=3e5))
         command, memory = law.step(memory, given, 2e-3)
@@ -135,11 +174,14 @@ def test_the_sum_of_both_commands_keeps_its_range(name: str):
 
 
 def test_predictive_control_plans_no_faster_change_than_the_flow_permits():
-    """60 bar/s, the feed-forward apart; the state feedback of the same weights commands several times that."""
+    """60 bar/s, the feed-forward apart; the state feedback of the same weights commands several
+    times that.
+    """
     changes = []
     for name in (LQG, MPC):
         law = CONTENDERS[name].law
-        memory, told = law.init(), []
+        memory = law.init()
+        told = []
         for k in range(30):
             command, memory = law.step(memory, measured(0.0, 0.3 if k > 3 else 0.0, 0.0), 2e-3)
             told.append(command["difference"])
@@ -152,16 +194,28 @@ def test_predictive_control_plans_no_faster_change_than_the_flow_permits():
 def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name: str):
     """A torque that the model does not know, and a step that saturates the command.
 
-    With its present gains, LQG oscillates about the angle by 0.4 degrees on truth 11, but on no truth from 1 to 6.
+    With its present gains, LQG oscillates about the angle by 0.4 degrees on truth 11, but on no
+    truth from 1 to 6.
     """
-    law, truth = complete(JOINT, CONTENDERS[name]).law, JOINT.truths[0]
-    pushed = ControlTask("pushed", StepMotion(0.0, 0.1), 1.5, begin=1.2, torque=((0.0, 0.0), (0.2, 0.0), (0.21, -1.0)))
+    law = complete(JOINT, CONTENDERS[name]).law
+    truth = JOINT.truths[0]
+    pushed = ControlTask(
+        "pushed",
+        StepMotion(0.0, 0.1),
+        1.5,
+        begin=1.2,
+        torque=((0.0, 0.0), (0.2, 0.0), (0.21, -1.0)),
+    )
     found = run_task(JOINT, truth, law, pushed).recording
     assert abs(math.degrees(np.mean(found["angle"][found["time"] > 1.2]))) < 0.05
     other = proportional_joint((2,))
     contender = next(each for each in standard_contenders(other) if each.name == name)
-    assert run_task(other, other.truths[0], complete(other, contender).law, pushed).metrics.rmse < 0.05
-    stepped = run_task(JOINT, truth, law, ControlTask("step", StepMotion(math.radians(40.0), 0.1), 0.6))
+    assert (
+        run_task(other, other.truths[0], complete(other, contender).law, pushed).metrics.rmse < 0.05
+    )
+    stepped = run_task(
+        JOINT, truth, law, ControlTask("step", StepMotion(math.radians(40.0), 0.1), 0.6)
+    )
     for column in JOINT.pressures:
         pressure = stepped.recording[column]
         assert JOINT.min_pressure - 5e3 < pressure.min()
@@ -170,15 +224,27 @@ def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name
 
 
 def test_with_the_gains_that_are_best_for_the_models_lqg_rests_under_a_torque():
-    """The gains of the published page. With a pressure control of 1/bar, LQG of the angle alone oscillated by 0.45 degrees
-    on truth 11."""
+    """The gains of the published page. With a pressure control of 1/bar, LQG of the angle alone
+    oscillated by 0.45 degrees on truth 11."""
     completed = complete(JOINT, CONTENDERS[LQG])
-    found = {"lead_time": 3.7678e-3, "amplitude": 4111.3, "permitted_angle": 0.11186, "speed_noise": 32.152,
-             "disturbance_noise": 750.73, "pressure_time": 3.0405e-3, "speed_deviation": 0.015524,
-             "gain": 1.7e-5}  # fmt: skip
+    found = {
+        "lead_time": 3.7678e-3,
+        "amplitude": 4111.3,
+        "permitted_angle": 0.11186,
+        "speed_noise": 32.152,
+        "disturbance_noise": 750.73,
+        "pressure_time": 3.0405e-3,
+        "speed_deviation": 0.015524,
+        "gain": 1.7e-5,
+    }
     assert {path.rpartition(".")[2] for path in completed.bounds} == set(found)
-    assert all(low <= found[path.rpartition(".")[2]] <= high for path, (low, high) in completed.bounds.items())
-    law = with_gains(completed.law, {path: found[path.rpartition(".")[2]] for path in completed.bounds})
+    assert all(
+        low <= found[path.rpartition(".")[2]] <= high
+        for path, (low, high) in completed.bounds.items()
+    )
+    law = with_gains(
+        completed.law, {path: found[path.rpartition(".")[2]] for path in completed.bounds}
+    )
     (task,) = find_tasks(("load change",))
     run = run_task(JOINT, JOINT.truths[0], law, task).recording
     error = np.degrees(run["angle"][run["time"] > 2.4]) - 10.0
@@ -188,9 +254,15 @@ def test_with_the_gains_that_are_best_for_the_models_lqg_rests_under_a_torque():
 
 def test_the_tuning_covers_the_frequencies_that_are_judged_and_no_judged_motion():
     """With proportional valves; the small on/off valves cannot follow the fast sine."""
-    judged = {task.motion.frequency for task in STANDARD_TASKS if isinstance(task.motion, SineMotion)}
+    judged = {
+        task.motion.frequency for task in STANDARD_TASKS if isinstance(task.motion, SineMotion)
+    }
     tuned, switched = (
-        {part.frequency for part in joint.tuning_tasks[0].motion.parts if isinstance(part, SineMotion)}
+        {
+            part.frequency
+            for part in joint.tuning_tasks[0].motion.parts
+            if isinstance(part, SineMotion)
+        }
         for joint in (JOINT, on_off_joint((11,)))
     )
     assert max(tuned) > max(judged) > max(switched)
@@ -200,9 +272,13 @@ def test_the_tuning_covers_the_frequencies_that_are_judged_and_no_judged_motion(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_the_weights_of_a_design_are_tuned_like_gains(name: str):
-    """Eight sets for each gain: with three, the search ends within its first sample of the ranges, before a descent."""
+    """Eight sets for each gain: with three, the search ends within its first sample of the ranges,
+    before a descent.
+    """
     alone = dataclasses.replace(JOINT, family={"nominal": JOINT.model})
-    ((tuning, _),) = search_gains(alone, CONTENDERS[name].tuned_as or CONTENDERS[name], (1,), 8, lambda *_: None)
+    ((tuning, _),) = search_gains(
+        alone, CONTENDERS[name].tuned_as or CONTENDERS[name], (1,), 8, lambda *_: None
+    )
     law = tuned_law(alone, CONTENDERS[name], 1, tuning)
     assert tuning.objective < 0.8 * tuning.present_objective
     (path,) = (path for path in tuning.gains if path.endswith(("permitted_angle", ".bandwidth")))
@@ -213,17 +289,22 @@ def test_the_weights_of_a_design_are_tuned_like_gains(name: str):
 
 def test_bounds_of_a_parameter_that_a_controller_does_not_have_are_refused():
     with pytest.raises(
-        ParameterError, match=r"AlongMotion has no declared parameter 'design\.weight' to be tuned; there"
+        ParameterError,
+        match=r"AlongMotion has no declared parameter 'design\.weight' to be tuned; there",
     ):
         dataclasses.replace(CONTENDERS[MPC], bounds={"design.weight": (1.0, 2.0)}, commissioned={})
 
 
 def test_sensors_and_actuation_as_machine_code_are_those_called_from_python():
     sensed = complete(JOINT, CONTENDERS[MPC]).law
-    sample, rng = LawSample(sensed.sensors), np.random.default_rng(1)
-    ours, theirs = sample.initial, sensed.sensors.init()
+    sample = LawSample(sensed.sensors)
+    rng = np.random.default_rng(1)
+    ours = sample.initial
+    theirs = sensed.sensors.init()
     for _ in range(8):
-        given = Measurement({name: float(rng.normal()) for name in sensed.sensors.measured_columns}, {}, {})
+        given = Measurement(
+            {name: float(rng.normal()) for name in sensed.sensors.measured_columns}, {}, {}
+        )
         compiled, ours = sample.step(ours, given, 2e-3)
         called, theirs = sensed.sensors.step(theirs, given, 2e-3)
         assert compiled == pytest.approx(called, rel=1e-12, abs=1e-15)
@@ -241,7 +322,12 @@ def test_a_called_contender_can_be_sent_to_another_process():
     )
     start = JOINT.start(JOINT.truths[0].plant)
     first, second = (
-        simulate(JOINT.truths[0].plant, ControlLoop(law, 2e-3, wanted), duration=task.duration, initial_state=start)
+        simulate(
+            JOINT.truths[0].plant,
+            ControlLoop(law, 2e-3, wanted),
+            duration=task.duration,
+            initial_state=start,
+        )
         for law in (sensed, again)
     )
     assert np.array_equal(first["angle"], second["angle"])

@@ -1,7 +1,9 @@
-"""Claims about the engine without muscles: it solves equations of any kind with nothing of `physics` imported.
+"""Claims about the engine without muscles: it solves equations of any kind with nothing of
+`physics` imported.
 
-Predator and prey keep the integral of Lotka and Volterra, delta x - gamma ln x + beta y - alpha ln y. A pendulum under
-a sampled controller that is written here moves as SciPy says for the same torques, held from sample to sample.
+Predator and prey keep the integral of Lotka and Volterra, delta x - gamma ln x + beta y - alpha ln
+y. A pendulum under a sampled controller that is written here moves as SciPy says for the same
+torques, held from sample to sample.
 """
 
 from __future__ import annotations
@@ -99,14 +101,19 @@ def test_a_pendulum_under_a_sampled_controller_moves_as_scipy_says(results):
     def rates(_, x, torque):
         return [x[1], torque - 9.81 / 0.5 * math.sin(x[0]) - 0.2 * x[1]]
 
-    x, angles = np.array([0.1, 0.0]), [0.1]
+    x = np.array([0.1, 0.0])
+    angles = [0.1]
     for _ in range(150):
         torque = 40.0 * (3.0 - x[0]) - 8.0 * x[1]
-        x = solve_ivp(rates, (0.0, 0.02), x, "DOP853", args=(torque,), rtol=1e-12, atol=1e-12).y[:, -1]
+        x = solve_ivp(rates, (0.0, 0.02), x, "DOP853", args=(torque,), rtol=1e-12, atol=1e-12).y[
+            :, -1
+        ]
         angles.append(x[0])
     swing = results["swing"]
     assert np.abs(np.array(swing["angle"]) - angles).max() < 1e-8
     assert swing["height"] == pytest.approx(0.5 * (1.0 - np.cos(angles)), abs=1e-8)
     assert swing["command.torque"][0] == pytest.approx(40.0 * 2.9)
     assert results["batch"][0] == pytest.approx(swing["angle"], abs=1e-12)
-    assert np.abs(np.array(results["batch"][1]) - angles).max() > 1e-2, "the other length moves otherwise"
+    assert np.abs(np.array(results["batch"][1]) - angles).max() > 1e-2, (
+        "the other length moves otherwise"
+    )

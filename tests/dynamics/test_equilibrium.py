@@ -1,4 +1,6 @@
-"""A plant at rest: nothing accelerates, whatever is given of its air; every rest is found, and judged as it behaves."""
+"""A plant at rest: nothing accelerates, whatever is given of its air; every rest is found, and
+judged as it behaves.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +63,9 @@ def joint_plant(mechanism=JOINT, gas=Polytropic(1.2)):
 
 
 def rates(plant, state):
-    found = compile_system(plant).rates([state[s.name] for s in plant.states], [0.0] * len(plant.inputs))
+    found = compile_system(plant).rates(
+        [state[s.name] for s in plant.states], [0.0] * len(plant.inputs)
+    )
     return found / [s.nominal for s in plant.states]
 
 
@@ -86,7 +90,9 @@ ALL = [(name, gas) for name in PLANTS for gas in GASES if name != "compliant" or
 
 
 def in_turn(name, gas):
-    """Every mechanism with one gas and every gas with some; the compliant plant has one gas only."""
+    """Every mechanism with one gas and every gas with some; the compliant plant has one gas
+    only.
+    """
     return name == "compliant" or (list(PLANTS).index(name) + GASES.index(gas)) % len(GASES) == 0
 
 
@@ -117,7 +123,9 @@ def test_the_air_that_a_pressure_puts_in_gives_the_same_rest(name, gas):
 def test_so_it_does_where_wall_and_series_spring_give():
     plant = Plant(COMPLIANT, CIRCUIT, Isometric(0.1))
     state = find_equilibrium(plant, pressure=2.5e5)
-    assert find_equilibrium(plant, air_mass=state["air_mass"]) == pytest.approx(state, rel=1e-7, abs=1e-9)
+    assert find_equilibrium(plant, air_mass=state["air_mass"]) == pytest.approx(
+        state, rel=1e-7, abs=1e-9
+    )
 
 
 def test_a_position_without_room_for_air_is_no_rest():
@@ -125,10 +133,17 @@ def test_a_position_without_room_for_air_is_no_rest():
     (rest,) = find_equilibria(Plant(shrinking, CIRCUIT, HangingMass(1e-4)), pressure=-5e4)
     assert rest.stable
     assert np.isfinite(list(rest.state.values())).all()
-    with pytest.raises(EquilibriumError, match=r"muscle pulls [.\d]+ N at -50 kPa and a contraction of -"):
+    with pytest.raises(
+        EquilibriumError, match=r"muscle pulls [.\d]+ N at -50 kPa and a contraction of -"
+    ):
         find_equilibrium(Plant(shrinking, CIRCUIT, HangingMass(50.0)), pressure=-5e4)
-    for find in (find_equilibria, find_equilibrium):  # at some positions the air would have more than 1000 bar
-        with pytest.raises(EquilibriumError, match="PrescribedMotion is in equilibrium at every position"):
+    for find in (
+        find_equilibria,
+        find_equilibrium,
+    ):  # at some positions the air would have more than 1000 bar
+        with pytest.raises(
+            EquilibriumError, match="PrescribedMotion is in equilibrium at every position"
+        ):
             find(Plant(chosen_muscle(), CIRCUIT, PrescribedMotion()), air_mass=2e-4)
 
 
@@ -149,13 +164,17 @@ def test_shut_in_air_takes_up_pressure_where_the_load_stretches_the_muscle():
 @given(st.floats(1e5, 5e5))
 @settings(max_examples=10, deadline=None)
 def test_a_symmetric_joint_rests_at_zero(pressure):
-    assert find_equilibrium(joint_plant(), pressure=pressure)["angle"] == pytest.approx(0.0, abs=1e-12)
+    assert find_equilibrium(joint_plant(), pressure=pressure)["angle"] == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 @given(st.floats(1e5, 5e5), st.floats(1e5, 5e5))
 @settings(max_examples=10, deadline=None)
 def test_with_its_pressures_changed_over_it_rests_on_the_other_side(one, other):
-    forward, back = (find_equilibrium(joint_plant(), pressure=p)["angle"] for p in ((one, other), (other, one)))
+    forward, back = (
+        find_equilibrium(joint_plant(), pressure=p)["angle"] for p in ((one, other), (other, one))
+    )
     assert forward == pytest.approx(-back, abs=1e-9)
     assert np.sign(round(forward, 9)) == np.sign(round(one - other, 3)) or abs(one - other) < 1.0
 
@@ -170,8 +189,12 @@ def test_two_equal_muscles_in_parallel_carry_twice_the_load():
 
 
 def test_muscles_in_series_carry_the_same_load_over_the_sum_of_their_ways():
-    single = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=3e5)["position"]
-    weak = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=2e5)["position"]
+    single = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=3e5)[
+        "position"
+    ]
+    weak = find_equilibrium(Plant(LEFT, ClosedChamber(), HangingMass(10.0)), pressure=2e5)[
+        "position"
+    ]
     chain = joint_plant(MusclesInSeries(HangingMass(10.0), (0.5,), gravity=0.0))
     found = find_equilibrium(chain, pressure=(3e5, 2e5))
     assert found["node1.position"] == pytest.approx(single, rel=1e-9)
@@ -187,7 +210,9 @@ def test_muscles_in_series_carry_the_same_load_over_the_sum_of_their_ways():
 def test_a_pair_of_rests_is_found_however_close(half, middle):
     plant = Plant(chosen_muscle(), ClosedChamber(), Bumpy(middle, half))
     found = find_equilibria(plant, pressure=1e5)
-    assert [r.state["position"] for r in found] == pytest.approx([middle - half, middle + half], abs=1e-10)
+    assert [r.state["position"] for r in found] == pytest.approx(
+        [middle - half, middle + half], abs=1e-10
+    )
     assert [r.stable for r in found] == [True, False]
 
 
@@ -196,12 +221,17 @@ def test_no_pair_is_made_up_where_the_force_only_comes_near_zero():
         def acceleration(self, q, v, pulls, inputs):
             return {"position": (q["position"] - self.middle) ** 2 + self.half**2}
 
-    assert find_equilibria(Plant(chosen_muscle(), ClosedChamber(), Above(0.02, 1e-4)), pressure=1e5) == ()
+    assert (
+        find_equilibria(Plant(chosen_muscle(), ClosedChamber(), Above(0.02, 1e-4)), pressure=1e5)
+        == ()
+    )
 
 
 def statics_of(plant, pressure):
     compiled = compile_system(plant)
-    return Statics.of_plants(compiled, compiled.parameters[None], (pressure,), np.zeros(len(plant.inputs)))
+    return Statics.of_plants(
+        compiled, compiled.parameters[None], (pressure,), np.zeros(len(plant.inputs))
+    )
 
 
 def test_a_rest_that_is_one_of_the_places_looked_at_is_found_once():
@@ -228,12 +258,16 @@ def test_of_a_stretch_in_balance_the_ends_are_given():
 
 
 STANDING = replace(JOINT, weight_torque=-25.0)
-"""A weight above the joint: its torque lies between what the muscles hold at constant pressure and with shut valves."""
+"""A weight above the joint: its torque lies between what the muscles hold at constant pressure and
+with shut valves.
+"""
 
 
 def test_a_joint_may_stand_with_shut_valves_that_falls_at_constant_pressure():
     plant = joint_plant(STANDING)
-    (at_pressure,) = (r for r in find_equilibria(plant, pressure=2e5) if abs(r.state["angle"]) < 1e-9)
+    (at_pressure,) = (
+        r for r in find_equilibria(plant, pressure=2e5) if abs(r.state["angle"]) < 1e-9
+    )
     air = tuple(at_pressure.state[f"{name}.air_mass"] for name in ("left", "right"))
     (shut,) = (r for r in find_equilibria(plant, air_mass=air) if abs(r.state["angle"]) < 1e-9)
     assert (at_pressure.stable, shut.stable) == (False, True)
@@ -245,13 +279,18 @@ def test_a_joint_may_stand_with_shut_valves_that_falls_at_constant_pressure():
     wide = FillDischarge(Supply(2e5), Valve(1e-6, 0.433), Valve(1e-6, 0.433))
     fed = replace(plant, circuit=(wide, wide))
     falls = simulate(
-        fed, Schedule({"left.fill": ((0, 1),), "right.fill": ((0, 1),)}), duration=0.6, initial_state=pushed
+        fed,
+        Schedule({"left.fill": ((0, 1),), "right.fill": ((0, 1),)}),
+        duration=0.6,
+        initial_state=pushed,
     )
     assert falls["angle"][-1] > 0.1
 
 
 def test_between_stops_a_joint_that_falls_has_three_rests():
-    stopped = JointWithEndStops(replace(JOINT, weight_torque=-60.0), -0.4, 0.4, 0.05, HuntCrossley(1e8))
+    stopped = JointWithEndStops(
+        replace(JOINT, weight_torque=-60.0), -0.4, 0.4, 0.05, HuntCrossley(1e8)
+    )
     found = find_equilibria(joint_plant(stopped), pressure=2e5)
     assert [r.stable for r in found] == [True, False, True]
     assert [r.state["angle"] for r in found] == pytest.approx([-0.4, 0.0, 0.4], abs=0.01)
@@ -259,20 +298,34 @@ def test_between_stops_a_joint_that_falls_has_three_rests():
 
 
 def test_of_two_stable_rests_the_one_nearer_to_full_length_is_taken():
-    stopped = JointWithEndStops(replace(JOINT, weight_torque=-60.0), -0.4, 0.2, 0.05, HuntCrossley(1e8))
-    assert [r.stable for r in find_equilibria(joint_plant(stopped), pressure=2e5)] == [True, False, True]
-    assert find_equilibrium(joint_plant(stopped), pressure=2e5)["angle"] == pytest.approx(0.2, abs=0.01)
+    stopped = JointWithEndStops(
+        replace(JOINT, weight_torque=-60.0), -0.4, 0.2, 0.05, HuntCrossley(1e8)
+    )
+    assert [r.stable for r in find_equilibria(joint_plant(stopped), pressure=2e5)] == [
+        True,
+        False,
+        True,
+    ]
+    assert find_equilibrium(joint_plant(stopped), pressure=2e5)["angle"] == pytest.approx(
+        0.2, abs=0.01
+    )
 
 
 # What is said where there is none
 
 
 def test_the_failure_names_the_muscles_and_what_they_pull():
-    with pytest.raises(EquilibriumError, match=r"left pulls [\d.]+ N at 200 kPa .*right pulls .* at 200 kPa.*rad/s2"):
+    with pytest.raises(
+        EquilibriumError,
+        match=r"left pulls [\d.]+ N at 200 kPa .*right pulls .* at 200 kPa.*rad/s2",
+    ):
         find_equilibrium(joint_plant(replace(JOINT, weight_torque=-60.0)), pressure=2e5)
     with pytest.raises(
         EquilibriumError,
-        match=r"MusclesInSeries has no stable equilibrium: left pulls .*node1.position .* m/s2, position",
+        match=(
+            r"MusclesInSeries has no stable equilibrium: left pulls .*node1.position .* m/s2,"
+            r" position"
+        ),
     ):
         find_equilibrium(joint_plant(MusclesInSeries(HangingMass(900.0), (0.5,))), pressure=2e5)
 
@@ -282,18 +335,27 @@ def test_what_rests_anywhere_is_said_to():
         plant = Plant(chosen_muscle(), ClosedChamber(), mechanism)
         inputs = {"latched": 1.0} if plant.inputs == ("latched",) else None
         with pytest.raises(
-            EquilibriumError, match=r"is in equilibrium at every position.*plant.state_at\(pressure=..., position=...\)"
+            EquilibriumError,
+            match=(
+                r"is in equilibrium at every position.*plant.state_at\(pressure=..., position=...\)"
+            ),
         ):
             find_equilibrium(plant, pressure=1e5, inputs=inputs)
 
 
 def test_a_joint_whose_muscles_cannot_both_be_mounted_is_refused():
-    with pytest.raises(GeometryLimitError, match="no position within the contraction limits of left, right"):
-        find_equilibrium(joint_plant(WithOffsets(replace(JOINT), (-0.6 + 0.12, -0.6 + 0.12))), pressure=1e5)
+    with pytest.raises(
+        GeometryLimitError, match="no position within the contraction limits of left, right"
+    ):
+        find_equilibrium(
+            joint_plant(WithOffsets(replace(JOINT), (-0.6 + 0.12, -0.6 + 0.12))), pressure=1e5
+        )
 
 
 def test_air_that_no_pressure_holds_names_the_muscle():
-    with pytest.raises(EquilibriumError, match=r"muscle cannot hold 10 kg of air at a contraction of 10.0 %"):
+    with pytest.raises(
+        EquilibriumError, match=r"muscle cannot hold 10 kg of air at a contraction of 10.0 %"
+    ):
         find_equilibrium(PLANTS["isometric"], air_mass=10.0)
 
 
@@ -307,7 +369,10 @@ def test_air_that_no_pressure_holds_names_the_muscle():
         ({"air_mass": float("nan")}, "must be a finite number in kg"),
         ({"pressure": b"3 bar"}, "must be a finite number in Pa"),
         ({"pressure": None, "air_mass": {}}, "must be a finite number in kg"),
-        ({"pressure": {"left": 2e5, "right": 3e5}}, "in Pa, or a tuple with the values of left, right"),
+        (
+            {"pressure": {"left": 2e5, "right": 3e5}},
+            "in Pa, or a tuple with the values of left, right",
+        ),
         ({"pressure": -2e5}, "not above absolute vacuum"),
         ({"pressure": 1e5, "inputs": {"hold": 1.0}}, "no input 'hold'"),
     ],
@@ -338,7 +403,11 @@ def test_states_and_equilibria_take_texts_with_a_unit_and_lists():
     )
     one = PLANTS["isometric"]
     assert find_equilibrium(one, air_mass="0.1 g") == find_equilibrium(one, air_mass=1e-4)
-    with pytest.raises(UnitError, match="find_equilibrium: pressure: unit 'N' cannot be converted to 'Pa'"):
+    with pytest.raises(
+        UnitError, match="find_equilibrium: pressure: unit 'N' cannot be converted to 'Pa'"
+    ):
         find_equilibrium(one, pressure="3 N")
-    with pytest.raises(UnitError, match="the angle of a state: unit 'mm' cannot be converted to 'rad'"):
+    with pytest.raises(
+        UnitError, match="the angle of a state: unit 'mm' cannot be converted to 'rad'"
+    ):
         plant.state_at(pressure=1e5, angle="5 mm")

@@ -1,5 +1,7 @@
-"""Many plants side by side rest where each of them rests alone: the same one of several rests, to the last digits, and
-none where there is none. What is out of the ordinary is asked alone, and whoever stands beside it does not matter."""
+"""Many plants side by side rest where each of them rests alone: the same one of several rests, to
+the last digits, and none where there is none. What is out of the ordinary is asked alone, and
+whoever stands beside it does not matter.
+"""
 
 from __future__ import annotations
 
@@ -52,18 +54,27 @@ FAST = RungeKutta4(1e-3)
 JOINT = pulled(AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12), 2)
 OTHERS = {
     "a joint that falls to a stop on either side": pulled(
-        JointWithEndStops(AntagonisticJoint(0.03, 0.05, 0.2, -60.0, 0.12), -0.4, 0.2, 0.05, HuntCrossley(1e8)), 2
+        JointWithEndStops(
+            AntagonisticJoint(0.03, 0.05, 0.2, -60.0, 0.12), -0.4, 0.2, 0.05, HuntCrossley(1e8)
+        ),
+        2,
     ),
     "two muscles on a lever": pulled(Lever((0.05, -0.05), 2.0, 0.3, 0.01, 0.1, (0.1, 0.1)), 2),
     "series springs on a joint": Plant(
-        tuple(replace(chosen_muscle(), name=n, series=SeriesSpring(5e4)) for n in ("left", "right")),
-        (TWO_VALVES, TWO_VALVES), JOINT.mechanism, Polytropic(1.2),
+        tuple(
+            replace(chosen_muscle(), name=n, series=SeriesSpring(5e4)) for n in ("left", "right")
+        ),
+        (TWO_VALVES, TWO_VALVES),
+        JOINT.mechanism,
+        Polytropic(1.2),
     ),
     "series spring and wall, held": Plant(
-        replace(chosen_muscle(), series=SeriesSpring(5e4), wall=ViscoelasticWall(1e-12, 0.05)), TWO_VALVES, Isometric(0.1)
+        replace(chosen_muscle(), series=SeriesSpring(5e4), wall=ViscoelasticWall(1e-12, 0.05)),
+        TWO_VALVES,
+        Isometric(0.1),
     ),
     "no load on a spring": pulled(SpringLoad(5.0, 2000.0)),
-}  # fmt: skip
+}
 
 
 def one_way(plant):
@@ -75,7 +86,8 @@ PLANTS = {name: plant for name, plant in {**EXAMPLES, **OTHERS}.items() if one_w
 
 def varied(plant, count):
     """All parameters (N, P) of plants around one, each within its bounds."""
-    draw, columns = np.random.default_rng(4), []
+    draw = np.random.default_rng(4)
+    columns = []
     for leaf in tree.leaves(plant):
         values = leaf.value * (1 + SPREAD * draw.uniform(-1, 1, count))
         columns.append(np.clip(values, *leaf.declared.bounds))
@@ -89,7 +101,9 @@ def found(plant, parameters, pressure, inputs=None):
 
 
 def one_by_one(plant, pressure):
-    """The stable equilibrium nearest to full length of one plant alone, from `find_equilibria`; None without one."""
+    """The stable equilibrium nearest to full length of one plant alone, from `find_equilibria`;
+    None without one.
+    """
     try:
         stable = [rest.state for rest in find_equilibria(plant, pressure=pressure) if rest.stable]
     except AirmuscleError:
@@ -103,7 +117,9 @@ def squared_contractions(plant, state):
 
 
 def acceleration_of(plant, state):
-    """The greatest acceleration of the compiled plant, which the search does not use, in units of its rates."""
+    """The greatest acceleration of the compiled plant, which the search does not use, in units of
+    its rates.
+    """
     rates = dict(
         zip(
             (s.name for s in plant.states),
@@ -115,8 +131,11 @@ def acceleration_of(plant, state):
 
 
 def as_alone(plant, parameters, pressure):
-    """Assert that every plant of a table has the equilibrium that it has alone; the number that have one, and states."""
-    of_each, count = found(plant, parameters, pressure), 0
+    """Assert that every plant of a table has the equilibrium that it has alone; the number that
+    have one, and states.
+    """
+    of_each = found(plant, parameters, pressure)
+    count = 0
     for row, state in zip(parameters, of_each, strict=True):
         one = tree.with_parameters(plant, row.tolist())
         expected = one_by_one(one, pressure)
@@ -125,14 +144,18 @@ def as_alone(plant, parameters, pressure):
             count += 1
             if not isinstance(pressure, tuple):
                 assert acceleration_of(one, state) < 1e-5
-            difference = [(x - expected[s.name]) / s.nominal for x, s in zip(state, one.states, strict=True)]
+            difference = [
+                (x - expected[s.name]) / s.nominal for x, s in zip(state, one.states, strict=True)
+            ]
             np.testing.assert_allclose(difference, 0.0, atol=1e-11)
     return count, of_each
 
 
 @pytest.mark.parametrize("name", PLANTS)
 def test_every_plant_rests_where_it_does_alone(name):
-    """Of all kinds of components; at 2 bar nearly all have a rest, and none had to be asked alone."""
+    """Of all kinds of components; at 2 bar nearly all have a rest, and none had to be asked
+    alone.
+    """
     plant = PLANTS[name]
     count, _ = as_alone(plant, varied(plant, 3), 2e5)
     if name != "prescribed":  # rests wherever it is, which is said alone
@@ -149,7 +172,9 @@ def test_so_it_does_at_ambient_pressure_and_below(name):
 
 
 def test_of_several_rests_each_takes_its_own():
-    """With its stops at -0.4 and 0.2 a joint that falls rests at the nearer one, and at either while it is turned."""
+    """With its stops at -0.4 and 0.2 a joint that falls rests at the nearer one, and at either
+    while it is turned.
+    """
     plant = OTHERS["a joint that falls to a stop on either side"]
     paths = [leaf.path for leaf in tree.leaves(plant)]
     table = np.repeat(tree.flatten(plant)[None, :], 3, axis=0)
@@ -169,12 +194,18 @@ def test_pressures_may_differ_from_muscle_to_muscle_and_inputs_be_given():
     table = varied(held, 2)
     free, shut = (found(held, table, 2e5, np.array([0.0, 0.0, latch])) for latch in (0.0, 1.0))
     assert np.isfinite(free).all()
-    assert np.isnan(shut).all()  # in equilibrium everywhere, which `find_equilibrium` reports of one plant
+    assert np.isnan(
+        shut
+    ).all()  # in equilibrium everywhere, which `find_equilibrium` reports of one plant
 
 
-@pytest.mark.parametrize("name", ["polytropic", "series spring with a stop", "lever", "joint with stops", "surface"])
+@pytest.mark.parametrize(
+    "name", ["polytropic", "series spring with a stop", "lever", "joint with stops", "surface"]
+)
 def test_neighbours_do_not_matter_to_the_last_digit(name):
-    """Powers of arrays and of numbers may differ in their last digit; the rest of a plant must not."""
+    """Powers of arrays and of numbers may differ in their last digit; the rest of a plant must
+    not.
+    """
     plant = PLANTS[name]
     table = varied(plant, 9)
     together = found(plant, table, 2e5)
@@ -236,7 +267,9 @@ def test_of_a_stretch_in_balance_the_nearer_end_is_taken():
 
 
 def test_a_pole_is_no_rest():
-    """A law whose braid straightens within the muscle's reach passes from one sign to the other through infinity."""
+    """A law whose braid straightens within the muscle's reach passes from one sign to the other
+    through infinity.
+    """
     law = MartensBoblan2017(Braid(0.0103, 0.39, 0.3), 0.0019, 9.4e7, -7.4e8, 1.6e9, -4.9e8)
     plant = of(law, Braid(0.01, 0.4363, 0.2), spring=LinearSpring(3000.0))
     rests = find_equilibria(plant, pressure=1e5)
@@ -247,16 +280,23 @@ def test_a_pole_is_no_rest():
     as_alone(plant, varied(plant, 3), 1e5)
 
 
-@pytest.mark.parametrize("name", ["lever", "two muscles on a lever", "joint with stops", "mass on a spring"])
+@pytest.mark.parametrize(
+    "name", ["lever", "two muscles on a lever", "joint with stops", "mass on a spring"]
+)
 def test_they_are_looked_at_in_the_same_places(name):
-    """Ends of the reach and all, whether contractions are straight lines over the coordinate or not."""
+    """Ends of the reach and all, whether contractions are straight lines over the coordinate or
+    not.
+    """
     plant = PLANTS[name]
     table = varied(plant, 4)
     ready = compile_system(plant)
-    pressures, inputs = (0.0,) * len(plant.muscles), np.zeros(len(plant.inputs))
+    pressures = (0.0,) * len(plant.muscles)
+    inputs = np.zeros(len(plant.inputs))
     for row, x in zip(table, grid(Statics.of_plants(ready, table, pressures, inputs)), strict=True):
         (alone,) = grid(Statics.of_plants(ready, row[None], pressures, inputs))
-        np.testing.assert_allclose(x[np.isfinite(x)], alone[np.isfinite(alone)], rtol=0.0, atol=1e-15)
+        np.testing.assert_allclose(
+            x[np.isfinite(x)], alone[np.isfinite(alone)], rtol=0.0, atol=1e-15
+        )
 
 
 # What is evaluated one by one
@@ -265,8 +305,13 @@ def test_they_are_looked_at_in_the_same_places(name):
 def test_plants_of_several_coordinates_have_the_equilibria_that_each_has_alone():
     plant = pulled(MusclesInSeries(HangingMass(10.0), (0.5,)), 2)
     assert as_alone(plant, varied(plant, 3), 3e5)[0] == 3
-    batch = simulate_batch(pulled(MusclesInSeries(HangingMass(1.0), (0.05,)), 2), {"mechanism.inner.mass": [1.0, 1.1]}, ZERO_INPUT,
-                           duration=2e-3, integrator=FAST)  # fmt: skip
+    batch = simulate_batch(
+        pulled(MusclesInSeries(HangingMass(1.0), (0.05,)), 2),
+        {"mechanism.inner.mass": [1.0, 1.1]},
+        ZERO_INPUT,
+        duration=2e-3,
+        integrator=FAST,
+    )
     for i in range(2):
         alone = find_equilibrium(batch.plant(i), pressure=0.0)
         np.testing.assert_allclose(batch["position"][i, 0], alone["position"], rtol=1e-12)
@@ -306,13 +351,19 @@ def test_a_plant_beyond_its_reach_or_in_a_vacuum_has_no_equilibrium_and_its_neig
 
 def test_a_plant_whose_input_is_out_of_range_has_no_equilibrium():
     regulator = ProportionalRegulator(
-        Supply(6e5), Valve(1e-8, 0.3), Valve(1e-8, 0.3), EXAMPLES["regulator, leak"].circuit.circuit.lag
+        Supply(6e5),
+        Valve(1e-8, 0.3),
+        Valve(1e-8, 0.3),
+        EXAMPLES["regulator, leak"].circuit.circuit.lag,
     )
     plant = Plant(chosen_muscle(), regulator, Isometric(0.05))
     paths = [leaf.path for leaf in tree.leaves(plant)]
     table = np.repeat(tree.flatten(plant)[None, :], 2, axis=0)
     table[0, paths.index("circuit.max_setpoint")] = 1e5
-    assert np.isfinite(found(plant, table, 1e5, np.array([2e5]))).all(axis=1).tolist() == [False, True]
+    assert np.isfinite(found(plant, table, 1e5, np.array([2e5]))).all(axis=1).tolist() == [
+        False,
+        True,
+    ]
 
 
 # The starts of a batch
@@ -332,7 +383,9 @@ def test_a_batch_begins_at_rest_and_says_of_each_that_has_none_what_is_said_alon
     for i, mass in enumerate(masses):
         alone = replace(plant, mechanism=HangingMass(mass))
         if mass < 100.0:
-            assert {name: column[i] for name, column in start.items()} == find_equilibrium(alone, pressure=0.0)
+            assert {name: column[i] for name, column in start.items()} == find_equilibrium(
+                alone, pressure=0.0
+            )
         else:
             with pytest.raises(EquilibriumError) as said:
                 find_equilibrium(alone, pressure=0.0)
@@ -340,8 +393,12 @@ def test_a_batch_begins_at_rest_and_says_of_each_that_has_none_what_is_said_alon
 
 
 def test_what_a_circuit_holds_at_rest_is_its_own():
-    """A tube twice as large holds twice the air: plants that differ in it alone do not share their start."""
-    plant = Plant(chosen_muscle(), WithTubes(TWO_VALVES, Tube(Valve(1e-8, 0.3), 1e-5)), HangingMass(1.0))
+    """A tube twice as large holds twice the air: plants that differ in it alone do not share their
+    start.
+    """
+    plant = Plant(
+        chosen_muscle(), WithTubes(TWO_VALVES, Tube(Valve(1e-8, 0.3), 1e-5)), HangingMass(1.0)
+    )
     start, _ = starts_of(plant, {"circuit.tube.volume": [1e-5, 2e-5]})
     (name,) = [n for n in start if "tube" in n]
     assert start[name][1] == pytest.approx(2.0 * start[name][0], rel=1e-12)
@@ -354,13 +411,17 @@ def test_the_example_of_the_batch_begins_where_it_rests():
     table = varied(replace(plant, mechanism=HangingMass(3.0)), 200)
     of_each = found(plant, table, 0.0)
     assert np.isfinite(of_each).all()
-    rates = [compile_system(tree.with_parameters(plant, row.tolist())).rates(state, [0.0, 0.0])
-             for row, state in zip(table[::20], of_each[::20], strict=True)]  # fmt: skip
+    rates = [
+        compile_system(tree.with_parameters(plant, row.tolist())).rates(state, [0.0, 0.0])
+        for row, state in zip(table[::20], of_each[::20], strict=True)
+    ]
     assert np.abs(np.array(rates)[:, 1:]).max() < 1e-9
 
 
 def test_fill_discharge_alone_is_shared():
     circuit = FillDischarge(Supply(5e5), Valve(1e-8, 0.4), Valve(3e-9, 0.2))
     plant = Plant(chosen_muscle(), circuit, HangingMass(1.0))
-    start, _ = starts_of(plant, {"circuit.fill.conductance": [1e-8, 2e-8], "mechanism.mass": [1.0, 1.0]})
+    start, _ = starts_of(
+        plant, {"circuit.fill.conductance": [1e-8, 2e-8], "mechanism.mass": [1.0, 1.0]}
+    )
     assert all(column[0] == column[1] for column in start.values())

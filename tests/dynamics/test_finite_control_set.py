@@ -1,5 +1,5 @@
-"""The chosen mode of the valves is that of the best of all sequences, found independently by trying each; a lifted load
-is held with few switchings, which a cost of switching reduces.
+"""The chosen mode of the valves is that of the best of all sequences, found independently by trying
+each; a lifted load is held with few switchings, which a cost of switching reduces.
 """
 
 from __future__ import annotations
@@ -20,10 +20,16 @@ H = 0.01
 MODES = tuple({"fill": a, "discharge": b} for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
 START = am.find_equilibrium(LIFT, pressure=2e5)
 FILTER = ExtendedKalmanFilter(
-    LIFT, ("pressure", "position"), H, {"air_mass": 2e-6, "speed": 0.02, "speed.disturbance": 1.0},
-    {"pressure": 500.0, "position": 2e-5}, disturbances=("speed",),
-)  # fmt: skip
-FIRST = FILTER.start(START, {"air_mass": 2e-6, "position": 1e-4, "speed": 1e-3, "speed.disturbance": 0.5})
+    LIFT,
+    ("pressure", "position"),
+    H,
+    {"air_mass": 2e-6, "speed": 0.02, "speed.disturbance": 1.0},
+    {"pressure": 500.0, "position": 2e-5},
+    disturbances=("speed",),
+)
+FIRST = FILTER.start(
+    START, {"air_mass": 2e-6, "position": 1e-4, "speed": 1e-3, "speed.disturbance": 0.5}
+)
 
 
 def law(**changes):
@@ -31,7 +37,8 @@ def law(**changes):
 
 
 def cost_of(sequence, state, wanted, before, switching_cost):
-    cost, estimate = 0.0, StateEstimate(state, np.zeros((4, 4)))
+    cost = 0.0
+    estimate = StateEstimate(state, np.zeros((4, 4)))
     for mode in sequence:
         inputs = list(MODES[mode].values())
         estimate = FILTER.predict(estimate, inputs)
@@ -43,11 +50,19 @@ def cost_of(sequence, state, wanted, before, switching_cost):
 
 @pytest.mark.parametrize("switching_cost", [0.0, 0.3])
 def test_the_sequence_is_the_best_of_all(switching_cost):
-    judged, rng, chosen = law(switching_cost=switching_cost, horizon=3), np.random.default_rng(1), set()
+    judged = law(switching_cost=switching_cost, horizon=3)
+    rng = np.random.default_rng(1)
+    chosen = set()
     for _ in range(12):
-        state = FIRST.mean * (1.0 + 0.02 * rng.normal(size=4)) + np.array([0.0, 0.0, 0.02, 0.5]) * rng.normal(size=4)
-        wanted, before = START["position"] + 3e-3 * rng.normal(), int(rng.integers(3))
-        every = {s: cost_of(s, state, wanted, before, switching_cost) for s in itertools.product(range(3), repeat=3)}
+        state = FIRST.mean * (1.0 + 0.02 * rng.normal(size=4)) + np.array(
+            [0.0, 0.0, 0.02, 0.5]
+        ) * rng.normal(size=4)
+        wanted = START["position"] + 3e-3 * rng.normal()
+        before = int(rng.integers(3))
+        every = {
+            s: cost_of(s, state, wanted, before, switching_cost)
+            for s in itertools.product(range(3), repeat=3)
+        }
         found = judged.best_sequence(state, [wanted], before)
         assert every[found] == pytest.approx(min(every.values()), rel=1e-9)
         chosen.add(found[0])
@@ -85,7 +100,8 @@ def test_a_continued_run_is_the_undivided_run():
 def test_another_sample_time_is_refused():
     loop = ControlLoop(law(), 0.02, am.Schedule({"position": ((0.0, 0.0),)}))
     with pytest.raises(
-        ParameterError, match=r"the sample time of the loop is 0\.02 s and that of the estimator 0\.01 s"
+        ParameterError,
+        match=r"the sample time of the loop is 0\.02 s and that of the estimator 0\.01 s",
     ):
         am.simulate(LIFT, loop, duration=0.1, initial_state=START)
 
@@ -94,10 +110,16 @@ def test_another_sample_time_is_refused():
     ("changes", "message"),
     [
         ({"modes": ({"fil": 1.0},)}, "modes names 'fil'.*Did you mean 'fill'"),
-        ({"modes": ({"fill": 1.0}, {"discharge": 1.0})}, "must have a finite number for each of fill"),
+        (
+            {"modes": ({"fill": 1.0}, {"discharge": 1.0})},
+            "must have a finite number for each of fill",
+        ),
         ({"modes": ()}, "give one mode or more"),
         ({"permitted": {"positon": 1.0}}, "permitted names 'positon'"),
-        ({"permitted": {"position": float("nan")}}, "permitted of 'position' is nan; it must be positive and finite"),
+        (
+            {"permitted": {"position": float("nan")}},
+            "permitted of 'position' is nan; it must be positive and finite",
+        ),
         ({"switching_cost": -1.0}, "switching_cost is -1.0; allowed range: 0 and above"),
         ({"horizon": 30}, "3 modes over a horizon of 30 samples"),
     ],
@@ -110,7 +132,9 @@ def test_an_impossible_law_is_refused(changes, message):
 
 @pytest.mark.parametrize("mode", [-1, 3])
 def test_a_mode_beyond_the_last_one_is_refused(mode):
-    with pytest.raises(ParameterError, match=f"FiniteControlSet: mode is {mode}; allowed range: 0 to 2"):
+    with pytest.raises(
+        ParameterError, match=f"FiniteControlSet: mode is {mode}; allowed range: 0 to 2"
+    ):
         law().best_sequence(FIRST.mean, [START["position"]], mode)
 
 

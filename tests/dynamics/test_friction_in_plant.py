@@ -1,6 +1,8 @@
-"""Friction in a plant: bristles are states by name, its work is in the books, and without it nothing changes.
+"""Friction in a plant: bristles are states by name, its work is in the books, and without it
+nothing changes.
 
-What a plant integrates is the law's own replay of the path it took, within the transition that the law states.
+What a plant integrates is the law's own replay of the path it took, within the transition that the
+law states.
 """
 
 from __future__ import annotations
@@ -48,7 +50,9 @@ LAWS = [
     SLIP,
     PrandtlIshlinskii((4e4, 2e4, 1e4), (2e-4, 8e-4, 2e-3), (8.0, -8.0), (0.5, -0.5)),
 ]
-LOOPS = Schedule({"fill": ((0.0, 1), (2.0, 0), (6.0, 1), (7.0, 0)), "discharge": ((3.0, 1), (5.0, 0))})
+LOOPS = Schedule(
+    {"fill": ((0.0, 1), (2.0, 0), (6.0, 1), (7.0, 0)), "discharge": ((3.0, 1), (5.0, 0))}
+)
 
 
 def name(law):
@@ -56,7 +60,9 @@ def name(law):
 
 
 def plant_with(friction):
-    return Plant(replace(chosen_muscle(), friction=friction), CIRCUIT, HangingMass(10.0), Polytropic(1.2))
+    return Plant(
+        replace(chosen_muscle(), friction=friction), CIRCUIT, HangingMass(10.0), Polytropic(1.2)
+    )
 
 
 def loops_of(friction, duration=9.0, output=2e-3, method=None):
@@ -64,7 +70,12 @@ def loops_of(friction, duration=9.0, output=2e-3, method=None):
     plant = plant_with(friction)
     start = find_equilibrium(plant, pressure=1.5e5)
     return simulate(
-        plant, LOOPS, duration=duration, initial_state=start, output_times=output, integrator=method or Rodas4(1e-7)
+        plant,
+        LOOPS,
+        duration=duration,
+        initial_state=start,
+        output_times=output,
+        integrator=method or Rodas4(1e-7),
     )
 
 
@@ -94,8 +105,15 @@ def test_without_friction_a_plant_is_what_it_was():
     assert "friction" not in found.output_names
     muscle = chosen_muscle()
     p, c, v = (casadi.SX.sym(n) for n in "pcv")
-    bare = muscle.contractile.force(p, c) - muscle.spring.force(p, c, 0.2) - muscle.damper.force(p, c, v)
-    count = [casadi.Function("f", [p, c, v], [x]).n_instructions() for x in (bare, muscle.unclamped_tension(p, c, v))]
+    bare = (
+        muscle.contractile.force(p, c)
+        - muscle.spring.force(p, c, 0.2)
+        - muscle.damper.force(p, c, v)
+    )
+    count = [
+        casadi.Function("f", [p, c, v], [x]).n_instructions()
+        for x in (bare, muscle.unclamped_tension(p, c, v))
+    ]
     assert count[0] == count[1]
 
 
@@ -130,7 +148,10 @@ def test_the_slips_of_a_plant_tend_to_the_exact_ones():
     ids=name,
 )
 def test_the_result_does_not_depend_on_method_and_tolerance(friction):
-    runs = [loops_of(friction, 4.0, 0.1, method) for method in (Rodas4(1e-6), Rodas4(1e-9), DormandPrince8(1e-4))]
+    runs = [
+        loops_of(friction, 4.0, 0.1, method)
+        for method in (Rodas4(1e-6), Rodas4(1e-9), DormandPrince8(1e-4))
+    ]
     size = np.ptp(runs[1]["position"])
     for run in (runs[0], runs[2]):
         assert np.abs(run["position"] - runs[1]["position"]).max() < 1e-4 * size
@@ -138,7 +159,8 @@ def test_the_result_does_not_depend_on_method_and_tolerance(friction):
 
 def test_a_load_stands_lower_on_the_way_up_than_on_the_way_down():
     run = loops_of(SLIP)
-    up, down = (run["time"] > 0.5) & (run["time"] < 2.0), (run["time"] > 4.5) & (run["time"] < 5.0)
+    up = (run["time"] > 0.5) & (run["time"] < 2.0)
+    down = (run["time"] > 4.5) & (run["time"] < 5.0)
     pressures = np.linspace(2.42e5, 2.58e5, 9)
 
     def height(rows):
@@ -149,7 +171,9 @@ def test_a_load_stands_lower_on_the_way_up_than_on_the_way_down():
 
 
 def test_the_books_close_and_friction_gives_nothing():
-    """Mechanical: kinetic and potential energy grow by the work of the tension; friction keeps what it took."""
+    """Mechanical: kinetic and potential energy grow by the work of the tension; friction keeps what
+    it took.
+    """
     metered = WithEnergyMeters(plant_with(SLIP))
     start = metered.extend_state(find_equilibrium(metered.plant, pressure=1.5e5))
     run = simulate(metered, LOOPS, duration=9.0, initial_state=start, integrator=Rodas4(1e-9))
@@ -159,7 +183,9 @@ def test_the_books_close_and_friction_gives_nothing():
     heat = run["friction_work"] - stored
     assert (np.diff(heat) >= -1e-8).all()
     assert heat[-1] > 0.1
-    assert "friction_work" not in [m.name for m in WithEnergyMeters(plant_with(NoFriction())).meters]
+    assert "friction_work" not in [
+        m.name for m in WithEnergyMeters(plant_with(NoFriction())).meters
+    ]
 
 
 def test_bristles_carry_the_name_of_their_muscle():
@@ -176,19 +202,25 @@ def test_bristles_carry_the_name_of_their_muscle():
     assert np.abs(run["left.friction"]).max() > 1.0
     assert np.sign(run["left.friction"][10]) == -np.sign(run["right.friction"][10])
     assert any(
-        note.startswith("friction of the muscles: left MaxwellSlip(") and "right Dahl(" in note for note in run.notes
+        note.startswith("friction of the muscles: left MaxwellSlip(") and "right Dahl(" in note
+        for note in run.notes
     )
 
 
 def test_a_run_says_which_friction_was_on():
-    assert "friction of the muscles: Dahl(stiffness=50000, coulomb_force=20)" in loops_of(Dahl(5e4, 20.0), 0.1).notes
+    assert (
+        "friction of the muscles: Dahl(stiffness=50000, coulomb_force=20)"
+        in loops_of(Dahl(5e4, 20.0), 0.1).notes
+    )
     assert "friction of the muscles: off" in loops_of(NoFriction(), 0.1).notes
 
 
 def test_a_state_may_begin_with_bent_bristles_and_refuses_unknown_ones():
     plant = plant_with(Dahl(5e4, 20.0))
     assert plant.state_at(pressure=1e5, bristle=2e-4)["bristle"] == 2e-4
-    with pytest.raises(ParameterError, match="no coordinate 'bristle1'; there are position, speed, bristle"):
+    with pytest.raises(
+        ParameterError, match="no coordinate 'bristle1'; there are position, speed, bristle"
+    ):
         plant.state_at(pressure=1e5, bristle1=2e-4)
 
 

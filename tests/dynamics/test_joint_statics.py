@@ -1,6 +1,7 @@
 """Statics of a joint: two equations for two pressures, and their inverse.
 
-Q_1(theta, p_1) + Q_2(theta, p_2) = dV/dtheta + load,   K_1 + K_2 = K with K_i = -dQ_i/dtheta at constant pressure
+Q_1(theta, p_1) + Q_2(theta, p_2) = dV/dtheta + load,   K_1 + K_2 = K with K_i = -dQ_i/dtheta at
+constant pressure
 """
 
 from __future__ import annotations
@@ -44,7 +45,9 @@ JOINT = AntagonisticJoint(0.04, 0.05, 0.2, 2.0, 0.11, min_angle=-1.0, max_angle=
 SHAPED = replace(JOINT, profile=CrankProfile(0.2), weight_angle=0.5)
 VALVE = am.Valve(2.6e-9, 0.433)
 CIRCUIT = am.FillDischarge(am.Supply(6e5), VALVE, VALVE)
-QUADRATIC = ContractileSurface((300.0, -200.0, 40.0, 250.0, -60.0, 30.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1500.0, 2)
+QUADRATIC = ContractileSurface(
+    (300.0, -200.0, 40.0, 250.0, -60.0, 30.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1500.0, 2
+)
 MUSCLES = {
     "affine": DMSP,
     "affine with a spring": am.Muscle(VirtualWork(BRAID), BRAID, LinearSpring(2000.0)),
@@ -53,7 +56,12 @@ MUSCLES = {
 
 
 def pair(muscle=DMSP, mechanism=JOINT, gas=Polytropic()):
-    return Plant((replace(muscle, name="left"), replace(muscle, name="right")), (CIRCUIT, CIRCUIT), mechanism, gas)
+    return Plant(
+        (replace(muscle, name="left"), replace(muscle, name="right")),
+        (CIRCUIT, CIRCUIT),
+        mechanism,
+        gas,
+    )
 
 
 def reachable(statics, count, load, seed=0):
@@ -84,15 +92,22 @@ def test_pressures_for_angle_and_stiffness_give_them_back_to_1e_9(muscle, mechan
 def test_two_muscles_of_different_laws_have_the_angle_and_the_stiffness_of_the_inverse(swapped):
     """One law is affine in the pressure and the other is not, so that there is no closed form."""
     muscles = (MUSCLES["quadratic"], DMSP) if swapped else (DMSP, MUSCLES["quadratic"])
-    left, right = (replace(muscle, name=name) for muscle, name in zip(muscles, ("left", "right"), strict=True))
+    left, right = (
+        replace(muscle, name=name) for muscle, name in zip(muscles, ("left", "right"), strict=True)
+    )
     statics = joint_statics(replace(pair(mechanism=SHAPED), muscle=(left, right)))
     assert [function.affine for function in statics.unlimited] == [not swapped, swapped]
     angle, wanted = reachable(statics, 10, 1.0)
     points = statics.pressures(angle, wanted, 1.0)
     first, second = points.pressures[:, 0].T
-    torques = [f(angle, p, "torque", "stiffness") for f, p in zip(statics.torques, (first, second), strict=True)]
+    torques = [
+        f(angle, p, "torque", "stiffness")
+        for f, p in zip(statics.torques, (first, second), strict=True)
+    ]
     np.testing.assert_allclose(torques[0][1] + torques[1][1], wanted, rtol=1e-9)
-    np.testing.assert_allclose(torques[0][0] + torques[1][0], statics.load(angle)[0] + 1.0, atol=1e-9)
+    np.testing.assert_allclose(
+        torques[0][0] + torques[1][0], statics.load(angle)[0] + 1.0, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -101,7 +116,9 @@ def test_two_muscles_of_different_laws_have_the_angle_and_the_stiffness_of_the_i
     ids=["affine", "SAM of the library"],
 )
 def test_a_thousand_points_of_the_inverse_take_a_few_milliseconds(plant, affine, bound):
-    """To 1e-9. The target on a quiet machine is 5 ms of CPU time; the bounds allow for other processes."""
+    """To 1e-9. The target on a quiet machine is 5 ms of CPU time; the bounds allow for other
+    processes.
+    """
     statics = joint_statics(plant)
     assert [function.affine for function in statics.unlimited] == [affine, affine]
     angle, wanted = reachable(statics, 1000, 0.0)
@@ -115,8 +132,12 @@ def test_a_thousand_points_of_the_inverse_take_a_few_milliseconds(plant, affine,
     assert min(times) < bound
 
 
-@pytest.mark.parametrize("gas", [Polytropic(1.3), Isothermal(), EnergyBalance(0.5)], ids=lambda gas: type(gas).__name__)
-@pytest.mark.parametrize("muscle", [*MUSCLES.values(), replace(DMSP, wall=SwellingWall(4e-5, 2e5, 3e4, 0.05))])
+@pytest.mark.parametrize(
+    "gas", [Polytropic(1.3), Isothermal(), EnergyBalance(0.5)], ids=lambda gas: type(gas).__name__
+)
+@pytest.mark.parametrize(
+    "muscle", [*MUSCLES.values(), replace(DMSP, wall=SwellingWall(4e-5, 2e5, 3e4, 0.05))]
+)
 def test_both_stiffnesses_are_those_of_the_plant(muscle, gas):
     plant = pair(muscle, SHAPED, gas)
     statics = joint_statics(plant)
@@ -147,7 +168,8 @@ def test_an_inverted_pendulum_with_soft_muscles_has_an_unstable_equilibrium_betw
 def test_a_symmetric_joint_at_angle_zero_needs_equal_pressures_and_mirrored_ones_elsewhere():
     statics = joint_statics(pair())
     points = statics.pressures([0.0, 0.3, -0.3], 35.0)
-    first, second = points.pressures[:, 0, 0], points.pressures[:, 0, 1]
+    first = points.pressures[:, 0, 0]
+    second = points.pressures[:, 0, 1]
     assert first[0] == pytest.approx(second[0], rel=1e-12)
     assert (first[1], second[1]) == pytest.approx((second[2], first[2]), rel=1e-12)
     assert first[1] > second[1]
@@ -162,10 +184,16 @@ def test_a_load_is_carried_by_the_difference_of_the_torques():
 
 
 def test_a_law_whose_stiffness_falls_again_with_pressure_has_two_solutions_and_both_are_found():
-    """A cubic law with a term x q^2: the stiffness of a symmetric joint has a maximum over the co-contraction."""
+    """A cubic law with a term x q^2: the stiffness of a symmetric joint has a maximum over the
+    co-contraction.
+    """
     powers = dict.fromkeys(exponents(3), 0.0) | {
-        (0, 0): 700.0, (1, 0): -350.0, (0, 1): 400.0, (1, 1): -60.0, (1, 2): 150.0,
-    }  # fmt: skip
+        (0, 0): 700.0,
+        (1, 0): -350.0,
+        (0, 1): 400.0,
+        (1, 1): -60.0,
+        (1, 2): 150.0,
+    }
     law = ContractileSurface(tuple(powers.values()), 0.0, 6e5, 0.0, 0.25, 0.0, 1e4, 3)
     statics = joint_statics(pair(am.Muscle(law, BRAID), replace(JOINT, weight_torque=0.0)))
     levels = np.linspace(0.4e5, 5.6e5, 24)
@@ -175,7 +203,9 @@ def test_a_law_whose_stiffness_falls_again_with_pressure_has_two_solutions_and_b
     for row in range(24):
         own = points.pressures[row][np.isfinite(points.pressures[row, :, 0])]
         assert np.abs(own - levels[row]).max(axis=1).min() < 1.0, row
-        np.testing.assert_allclose(points.constant_pressure[row][: len(own)], wanted[row], rtol=1e-9)
+        np.testing.assert_allclose(
+            points.constant_pressure[row][: len(own)], wanted[row], rtol=1e-9
+        )
 
 
 def test_the_search_in_cells_agrees_with_the_closed_form():
@@ -201,7 +231,8 @@ def test_just_beyond_the_reachable_stiffness_there_is_no_solution_and_the_reason
     assert statics.pressures(0.1, [low * 1.0001, high * 0.9999]).count.tolist() == [1, 1]
     assert statics.pressures(0.1, [low * 0.9999, high * 1.0001]).count.tolist() == [0, 0]
     with pytest.raises(
-        SolveError, match=rf"allowed range at pressures of 0 to 600 kPa: {low:.4g} to {high:.4g} N m/rad"
+        SolveError,
+        match=rf"allowed range at pressures of 0 to 600 kPa: {low:.4g} to {high:.4g} N m/rad",
     ):
         statics.check_reachable(0.1, 500.0)
     assert statics.check_reachable(0.1, 0.5 * (low + high)).count == 1
@@ -224,16 +255,24 @@ def test_the_supply_bounds_the_pressures_unless_a_range_is_given():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: joint_statics(Plant(DMSP, CIRCUIT, HangingMass(5.0))), "one angle and two muscles are required"),
+        (
+            lambda: joint_statics(Plant(DMSP, CIRCUIT, HangingMass(5.0))),
+            "one angle and two muscles are required",
+        ),
         (lambda: joint_statics(pair(), (5e5, 1e5)), "pressure_range is 500000 to 100000 Pa"),
         (lambda: joint_statics(pair()).pressures(np.nan, 30.0), "must be finite"),
         (lambda: joint_statics(pair()).pressures([0.0, 0.1], [30.0, 30.0, 30.0]), "of one length"),
         (lambda: joint_statics(pair()).pressures("a", 30.0), "must be numbers"),
         (
-            lambda: joint_statics(pair(replace(DMSP, damper=am.LinearDamper(100.0), series=SeriesSpring(1e5)))),
+            lambda: joint_statics(
+                pair(replace(DMSP, damper=am.LinearDamper(100.0), series=SeriesSpring(1e5)))
+            ),
             "left has a series spring",
         ),
-        (lambda: joint_statics(pair(mechanism=replace(JOINT, offset=0.9))).angles((1e5, 1e5)), "there is no angle"),
+        (
+            lambda: joint_statics(pair(mechanism=replace(JOINT, offset=0.9))).angles((1e5, 1e5)),
+            "there is no angle",
+        ),
     ],
 )
 def test_what_is_no_joint_is_refused(build, message):
@@ -243,7 +282,9 @@ def test_what_is_no_joint_is_refused(build, message):
 
 def test_end_stops_carry_what_the_muscles_pull_beyond_them():
     stopped = JointWithEndStops(JOINT, -0.1, 0.1, 0.05, HuntCrossley(1e9))
-    free, held = (joint_statics(pair(mechanism=m)).angles((5e5, 1e5)).angle[0] for m in (JOINT, stopped))
+    free, held = (
+        joint_statics(pair(mechanism=m)).angles((5e5, 1e5)).angle[0] for m in (JOINT, stopped)
+    )
     assert free[0] > 0.4
     assert held.tolist() == pytest.approx([0.1], abs=5e-3)
 
@@ -252,7 +293,9 @@ def test_end_stops_carry_what_the_muscles_pull_beyond_them():
 
 
 def test_a_recording_gains_torque_stiffness_and_cocontraction():
-    """In the slow part of a run the torque carries the weight, and the stiffnesses are those of the plant."""
+    """In the slow part of a run the torque carries the weight, and the stiffnesses are those of the
+    plant.
+    """
     plant = pair()
     statics = joint_statics(plant)
     start = find_equilibrium(plant, pressure=(3e5, 2.5e5))
@@ -268,7 +311,9 @@ def test_a_recording_gains_torque_stiffness_and_cocontraction():
     assert run["stiffness"][-1] == pytest.approx(both.constant_pressure, rel=1e-9)
     assert run["shut_valves_stiffness"][-1] == pytest.approx(both.shut_valves, rel=1e-9)
     with pytest.raises(ColumnError, match=r"left\.pressure"):
-        statics.with_columns(am.Recording({"time": np.zeros(2), "angle": np.zeros(2)}, origin="made"))
+        statics.with_columns(
+            am.Recording({"time": np.zeros(2), "angle": np.zeros(2)}, origin="made")
+        )
 
 
 def test_the_figure_shows_the_limits_of_the_stiffness_and_contours_of_stiffness_and_angle():

@@ -1,5 +1,7 @@
-"""The stored machine code of a kernel computes bit for bit what numba computes; code of other sources, truncated code
-and code for another processor are never run; a kernel that needs the library of numba is run by numba."""
+"""The stored machine code of a kernel computes bit for bit what numba computes; code of other
+sources, truncated code and code for another processor are never run; a kernel that needs the
+library of numba is run by numba.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,13 @@ def arguments(rows=ROWS):
     seeds = np.random.default_rng(1)
     states = CASE.vector * seeds.uniform(0.9, 1.1, (rows, CASE.vector.size))
     inputs = seeds.uniform(0.0, 1.0, (rows, len(CASE.system.inputs)))
-    return READY.address["outputs"], READY.precomputed, states, inputs, np.zeros((rows, READY.sizes.outputs))
+    return (
+        READY.address["outputs"],
+        READY.precomputed,
+        states,
+        inputs,
+        np.zeros((rows, READY.sizes.outputs)),
+    )
 
 
 def expected():
@@ -82,7 +90,9 @@ def test_a_run_is_bit_for_bit_that_of_numba(method, monkeypatch):
 
     def run():
         system = dataclasses.replace(CASE.system)  # nothing that was bound before is kept with it
-        return simulate(system, ramps, duration=3.0, initial_state=CASE.initial_state, integrator=method)
+        return simulate(
+            system, ramps, duration=3.0, initial_state=CASE.initial_state, integrator=method
+        )
 
     by_code = run()
     monkeypatch.setattr(Kernel, "entry", lambda self, kinds: None)
@@ -117,7 +127,8 @@ def test_an_array_that_is_not_contiguous_and_writeable_is_an_error(other):
 
 
 def test_an_input_may_be_read_only_but_must_be_contiguous_and_of_its_kind(without_numba):
-    bound, second = Kernel("evaluate").bind(*arguments()), arguments()
+    bound = Kernel("evaluate").bind(*arguments())
+    second = arguments()
     for index in (1, 2, 3):
         given = second[index].copy()
         given.setflags(write=False)
@@ -132,7 +143,8 @@ def test_an_input_may_be_read_only_but_must_be_contiguous_and_of_its_kind(withou
 
 
 def test_replaced_arguments_are_those_that_count(without_numba):
-    bound, second = Kernel("evaluate").bind(*arguments()), arguments()
+    bound = Kernel("evaluate").bind(*arguments())
+    second = arguments()
     bound()
     for index in (1, 2, 3, 4):
         bound.replace(index, second[index])
@@ -144,7 +156,11 @@ def test_a_view_of_a_live_array_is_pointed_at(without_numba):
     given = arguments()
     bound = Kernel("evaluate").bind(*given)
     width = given[2].shape[1]
-    bound.point(2, (given[2].ctypes.data + 8 * width * 2, given[3].ctypes.data + 8 * given[3].shape[1] * 2), 3)
+    bound.point(
+        2,
+        (given[2].ctypes.data + 8 * width * 2, given[3].ctypes.data + 8 * given[3].shape[1] * 2),
+        3,
+    )
     bound()
     assert np.array_equal(given[-1][:3], expected()[2:5])
     assert not given[-1][3:].any()
@@ -155,7 +171,9 @@ def test_a_view_of_a_live_array_is_pointed_at_by_numba_too(monkeypatch):
     given = arguments()
     bound = Kernel("evaluate").bind(*given)
     items = [8 * table.shape[1] for table in given[2:5]]
-    bound.point(2, [table.ctypes.data + 2 * size for table, size in zip(given[2:5], items, strict=True)], 3)
+    bound.point(
+        2, [table.ctypes.data + 2 * size for table, size in zip(given[2:5], items, strict=True)], 3
+    )
     bound()
     assert np.array_equal(given[-1][2:5], expected()[2:5])
     assert not given[-1][:2].any()
@@ -210,7 +228,9 @@ def test_each_processor_and_each_kind_has_its_own_file(monkeypatch):
 
 
 @pytest.mark.parametrize("place", ["a file", "writeable by others"])
-def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place, tmp_path, monkeypatch):
+def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(
+    place, tmp_path, monkeypatch
+):
     folder = tmp_path / "kernels"
     if place == "a file":
         folder.write_text("not a folder", encoding="utf-8")
@@ -219,7 +239,9 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place,
         folder.chmod(0o777)
     monkeypatch.setenv("AIRMUSCLE_CACHE_DIR", str(folder))
     kept.warn_not_stored.cache_clear()
-    with pytest.warns(AirmuscleWarning, match="compiled kernels are not stored: .*AIRMUSCLE_CACHE_DIR") as caught:
+    with pytest.warns(
+        AirmuscleWarning, match="compiled kernels are not stored: .*AIRMUSCLE_CACHE_DIR"
+    ) as caught:
         stored = kept.save("evaluate", ("q",), b"code")
     assert stored == b"code"
     with warnings.catch_warnings():
@@ -296,19 +318,26 @@ def test_only_what_does_without_numba_is_made_machine_code():
 def test_a_kernel_that_needs_numba_is_tried_once_on_a_machine(empty, monkeypatch):
     looked = []
     monkeypatch.setattr(Kernel, "numba", property(lambda self: allocates))
-    monkeypatch.setattr(kernels.store, "load", lambda *asked: looked.append(asked) or kept_found(*asked))
+    monkeypatch.setattr(
+        kernels.store, "load", lambda *asked: looked.append(asked) or kept_found(*asked)
+    )
     for kernel in (Kernel("allocates"), Kernel("allocates")):
         for _ in range(2):
-            x, y = np.array([3.0, 1.0, 2.0]), np.zeros(3)
+            x = np.array([3.0, 1.0, 2.0])
+            y = np.zeros(3)
             assert kernel(x, y) == 3
             assert y.tolist() == [1.0, 2.0, 3.0]
     assert len(looked) == 2
-    assert [file.stat().st_size for file in files(empty)] == [64]  # no code: the next process need not try
+    assert [file.stat().st_size for file in files(empty)] == [
+        64
+    ]  # no code: the next process need not try
 
 
 def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, monkeypatch):
     kernel, right, looked = Kernel("evaluate"), expected(), []
-    monkeypatch.setattr(kernels.store, "load", lambda *asked: looked.append(asked) or kept_found(*asked))
+    monkeypatch.setattr(
+        kernels.store, "load", lambda *asked: looked.append(asked) or kept_found(*asked)
+    )
 
     def found(_):
         given = arguments()
@@ -328,7 +357,9 @@ def squares() -> float:
     x = casadi.SX.sym("x", 1)
     function = Function({"x": x}, {"y": x * x + 1.0})
     given, result = np.array([3.0]), np.empty(1)
-    ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(function.address)(given.ctypes.data, result.ctypes.data)
+    ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(function.address)(
+        given.ctypes.data, result.ctypes.data
+    )
     return float(result[0])
 
 
@@ -355,7 +386,9 @@ def test_codes_that_were_not_used_for_the_longest_time_are_removed(empty, monkey
 
 
 def test_the_code_of_another_kernel_is_compiled_anew(empty):
-    """The checksum contains the name of the file, so that files that exchanged their names are not run."""
+    """The checksum contains the name of the file, so that files that exchanged their names are not
+    run.
+    """
     for name in ("one", "other"):
         kept.save(name, ("d",), f"code of {name}".encode())
     one, other = files(empty)

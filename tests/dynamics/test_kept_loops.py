@@ -1,5 +1,5 @@
-"""A run of a compiled loop is kept with its plant for the next loop of the same form: the result is that of a new run
-to the last bit, and results that were returned before do not change."""
+"""A run of a compiled loop is kept with its plant for the next loop of the same form: the result is
+that of a new run to the last bit, and results that were returned before do not change."""
 
 from __future__ import annotations
 
@@ -10,13 +10,25 @@ import pytest
 from control_plants import LIFT, SPLIT, assert_identical
 
 from airmuscle.control import PID, OnOffController
-from airmuscle.engine import PWM, ControlLoop, Problem, RungeKutta4, SampledSignal, Schedule, SolenoidDriver, solve
+from airmuscle.engine import (
+    PWM,
+    ControlLoop,
+    Problem,
+    RungeKutta4,
+    SampledSignal,
+    Schedule,
+    SolenoidDriver,
+    solve,
+)
 from airmuscle.engine.run import prepare_loop
 from airmuscle.engine.run.run import form_of
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (0.703, 2e5))})
 SOLENOID = SolenoidDriver(2e-3, 1.5e-3, 1e-3, 1.2e-3)
-DRIVERS = {"held": {}, "pulsed and delayed": {"fill": (PWM(50.0, 1e-3), SOLENOID), "discharge": (PWM(31.0), SOLENOID)}}
+DRIVERS = {
+    "held": {},
+    "pulsed and delayed": {"fill": (PWM(50.0, 1e-3), SOLENOID), "discharge": (PWM(31.0), SOLENOID)},
+}
 ON_OFF = OnOffController("pressure", SPLIT, hysteresis=1e4)
 SLOW = PID("pressure", SPLIT, gain=4e-6, integral_time=0.4)
 QUICK = PID("pressure", SPLIT, gain=2e-5, integral_time=0.2, initial_output=0.1)
@@ -37,7 +49,9 @@ def prepared(monkeypatch):
 
 
 @pytest.mark.parametrize("drivers", ["held", "pulsed and delayed"])
-def test_loops_of_other_gains_run_in_the_same_arrays_with_the_results_of_new_runs(drivers, prepared):
+def test_loops_of_other_gains_run_in_the_same_arrays_with_the_results_of_new_runs(
+    drivers, prepared
+):
     plant = dataclasses.replace(LIFT)
     loop = ControlLoop(SLOW, 0.0125, STEPS, drivers=DRIVERS[drivers])
     first = Problem(plant, loop, 1.0)
@@ -52,7 +66,9 @@ def test_loops_of_other_gains_run_in_the_same_arrays_with_the_results_of_new_run
     assert len(prepared) == 1
     for problem, solution in zip(problems, solutions, strict=True):
         assert_identical(solution, fresh(problem), notes=True)
-    assert not np.array_equal(solutions[0].recording["pressure"], solutions[1].recording["pressure"])
+    assert not np.array_equal(
+        solutions[0].recording["pressure"], solutions[1].recording["pressure"]
+    )
     assert "initial_output=0.1" in solutions[1].diagnostics[0].text
 
 
@@ -65,7 +81,11 @@ def test_loops_of_another_form_are_prepared_anew():
         {"input": dataclasses.replace(loop, setpoint=Schedule({"pressure": ((0.0, 2e5),)}))},
         {"input": dataclasses.replace(loop, drivers={"discharge": SOLENOID})},
         {"input": dataclasses.replace(loop, controller=ON_OFF)},
-        {"input": dataclasses.replace(loop, controller=dataclasses.replace(SLOW, commanded="fill"))},
+        {
+            "input": dataclasses.replace(
+                loop, controller=dataclasses.replace(SLOW, commanded="fill")
+            )
+        },
         {"duration": 0.7},
         {"output_times": 0.04},
         {"output_times": np.linspace(0.0, 1.0, 7)},
@@ -77,7 +97,8 @@ def test_loops_of_another_form_are_prepared_anew():
 
 
 def test_a_run_that_is_continued_is_the_run_in_one_also_after_other_runs_of_its_form():
-    plant, loop = dataclasses.replace(LIFT), ControlLoop(QUICK, 0.0125, STEPS)
+    plant = dataclasses.replace(LIFT)
+    loop = ControlLoop(QUICK, 0.0125, STEPS)
     whole = solve(Problem(plant, loop, 1.0))
     half = solve(Problem(plant, loop, 0.5))
     solve(Problem(plant, dataclasses.replace(loop, controller=SLOW), 0.5))
@@ -107,7 +128,8 @@ class Emptied(list):
 
 def test_what_another_thread_takes_first_is_made_anew():
     plant = dataclasses.replace(LIFT)
-    loop, command = Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.3), Problem(plant, Schedule({}), 0.3)
+    loop = Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.3)
+    command = Problem(plant, Schedule({}), 0.3)
     alone = [solve(loop), solve(command)]
     cache = loop.compiled.description.cache
     for pool in (cache.loops, cache.integrators, cache.recorders):

@@ -1,6 +1,6 @@
-"""The lane printer is the scalar printer with another type: every operation in lanes means what it means in NumPy, also
-at zero, infinity and NaN; exp, log, pow, sin and cos, which have forms of their own, err by a unit of the last place at most,
-a power with a steady exponent by 1e-12."""
+"""The lane printer is the scalar printer with another type: every operation in lanes means what it
+means in NumPy, also at zero, infinity and NaN; exp, log, pow, sin and cos, which have forms of
+their own, err by a unit of the last place at most, a power with a steady exponent by 1e-12."""
 
 from __future__ import annotations
 
@@ -18,15 +18,38 @@ from airmuscle.engine.compile.llvm.emit import LlvmType
 from airmuscle.engine.compile.llvm.jit import engine_of, object_code
 from airmuscle.errors import TraceError
 
-NUMBERS = {"16 doubles": LlvmType(64, 16), "8 doubles": LlvmType(64, 8), "32 singles": LlvmType(32, 32)}
+NUMBERS = {
+    "16 doubles": LlvmType(64, 16),
+    "8 doubles": LlvmType(64, 8),
+    "32 singles": LlvmType(32, 32),
+}
 WIDE = max(number.lanes for number in NUMBERS.values())
 ENDS = np.array(
-    [0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 1e-300, 5e-324, 1e300, -1e300, 40.0, np.inf, -np.inf, np.nan, 3.0]
+    [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.5,
+        2.0,
+        -3.0,
+        1e-300,
+        5e-324,
+        1e300,
+        -1e300,
+        40.0,
+        np.inf,
+        -np.inf,
+        np.nan,
+        3.0,
+    ]
 )
 
 
 def run(number, expressions, *columns):
-    """The expressions of x, y, z at every row of the columns, computed in lanes; (rows, expressions)."""
+    """The expressions of x, y, z at every row of the columns, computed in lanes; (rows,
+    expressions).
+    """
     symbols = casadi.SX.sym("x", len(columns))
     printer = Printer(emit.LlvmLanguage(number))
     outputs = casadi.vertcat(*expressions(*(symbols[i] for i in range(len(columns)))))
@@ -39,8 +62,11 @@ def run(number, expressions, *columns):
 def call(engine, number, columns, results):
     kind = np.float64 if number.bits == 64 else np.float32
     x, y = (aligned_array((count, number.lanes), kind) for count in (len(columns), results))
-    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("f"))
-    size, found = len(columns[0]), []
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(
+        engine.get_function_address("f")
+    )
+    size = len(columns[0])
+    found = []
     for at in range(0, size, number.lanes):
         rows = np.minimum(np.arange(at, at + number.lanes), size - 1)
         for i, column in enumerate(columns):
@@ -51,9 +77,18 @@ def call(engine, number, columns, results):
 
 
 OPERATIONS = {
-    "sum, difference, product, quotient": (lambda x, y: [x + y, x - y, x * y, x / y], lambda x, y: [x + y, x - y, x * y, x / y]),
-    "negative, square, twice, inverse": (lambda x, y: [-x, x**2, 2 * x, 1 / y], lambda x, y: [-x, x * x, x + x, 1 / y]),
-    "root and size": (lambda x, y: [casadi.sqrt(x), casadi.fabs(y)], lambda x, y: [np.sqrt(x), np.abs(y)]),
+    "sum, difference, product, quotient": (
+        lambda x, y: [x + y, x - y, x * y, x / y],
+        lambda x, y: [x + y, x - y, x * y, x / y],
+    ),
+    "negative, square, twice, inverse": (
+        lambda x, y: [-x, x**2, 2 * x, 1 / y],
+        lambda x, y: [-x, x * x, x + x, 1 / y],
+    ),
+    "root and size": (
+        lambda x, y: [casadi.sqrt(x), casadi.fabs(y)],
+        lambda x, y: [np.sqrt(x), np.abs(y)],
+    ),
     "comparisons": (
         lambda x, y: [x < y, x <= y, x == y, x != y, casadi.logic_not(x)],
         lambda x, y: [x < y, x <= y, x == y, x != y, x == 0],
@@ -63,23 +98,42 @@ OPERATIONS = {
         lambda x, y: [(x > 0) & (y > 0), (x > 0) | (y > 0)],
     ),
     "choices": (
-        lambda x, y: [casadi.if_else(x > y, x, y), casadi.if_else(x > 0, y, 0), casadi.if_else(x < y, x * 3, y - 1)],
+        lambda x, y: [
+            casadi.if_else(x > y, x, y),
+            casadi.if_else(x > 0, y, 0),
+            casadi.if_else(x < y, x * 3, y - 1),
+        ],
         lambda x, y: [np.where(x > y, x, y), np.where(x > 0, y, 0), np.where(x < y, x * 3, y - 1)],
     ),
     "masks of what is below or above zero": (
-        lambda x, y: [casadi.if_else(x >= 0, x, 0), casadi.if_else(x >= 0, 0, x), casadi.if_else(x <= 0, 0, x)],
+        lambda x, y: [
+            casadi.if_else(x >= 0, x, 0),
+            casadi.if_else(x >= 0, 0, x),
+            casadi.if_else(x <= 0, 0, x),
+        ],
         lambda x, y: [np.where(x >= 0, x, 0), np.where(x >= 0, 0, x), np.where(x <= 0, 0, x)],
     ),
     "extremes": (
         lambda x, y: [casadi.fmin(x, y), casadi.fmax(x, y), casadi.sign(x)],
-        lambda x, y: [np.where(x < y, x, y), np.where(x > y, x, y), np.where(x > 0, 1, np.where(x < 0, -1, 0))],
+        lambda x, y: [
+            np.where(x < y, x, y),
+            np.where(x > y, x, y),
+            np.where(x > 0, 1, np.where(x < 0, -1, 0)),
+        ],
     ),
     "exponentials": (
         lambda x, y: [casadi.exp(x), casadi.log(x), casadi.log1p(x), casadi.expm1(x)],
         lambda x, y: [np.exp(x), np.log(x), np.log1p(x), np.expm1(x)],
     ),
     "angles": (
-        lambda x, y: [casadi.sin(x), casadi.cos(x), casadi.tan(x), casadi.atan(x), casadi.asin(x), casadi.acos(x)],
+        lambda x, y: [
+            casadi.sin(x),
+            casadi.cos(x),
+            casadi.tan(x),
+            casadi.atan(x),
+            casadi.asin(x),
+            casadi.acos(x),
+        ],
         lambda x, y: [np.sin(x), np.cos(x), np.tan(x), np.arctan(x), np.arcsin(x), np.arccos(x)],
     ),
     "hyperbolics": (
@@ -88,9 +142,12 @@ OPERATIONS = {
     ),
     "powers": (
         lambda x, y: [x**y, x**3, x**-2, x**0.5, x**-1.5, x**1.7, x**7.5, x**17],
-        lambda x, y: [np.power(x, y), *(np.power(x, k) for k in (3.0, -2.0, 0.5, -1.5, 1.7, 7.5, 17.0))],
+        lambda x, y: [
+            np.power(x, y),
+            *(np.power(x, k) for k in (3.0, -2.0, 0.5, -1.5, 1.7, 7.5, 17.0)),
+        ],
     ),
-}  # fmt: skip
+}
 
 
 def arguments(kind, ordinary):
@@ -100,14 +157,19 @@ def arguments(kind, ordinary):
     if not ordinary:
         with np.errstate(over="ignore"):
             ends = np.unique(ENDS.astype(kind))
-        x, y = np.concatenate([x, np.repeat(ends, ends.size)]), np.concatenate([y, np.tile(ends, ends.size)])
+        x, y = (
+            np.concatenate([x, np.repeat(ends, ends.size)]),
+            np.concatenate([y, np.tile(ends, ends.size)]),
+        )
     return x.astype(kind), y.astype(kind)
 
 
 @pytest.mark.parametrize("number", NUMBERS.values(), ids=NUMBERS)
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_an_operation_in_lanes_means_what_it_means_in_numpy(name, number):
-    """Constant powers that are products, and sums in the fast arithmetic, are held to ordinary numbers."""
+    """Constant powers that are products, and sums in the fast arithmetic, are held to ordinary
+    numbers.
+    """
     kind, tolerance = (np.float64, 4e-15) if number.bits == 64 else (np.float32, 2e-6)
     x, y = arguments(kind, ordinary=name == "powers")
     if name == "powers":
@@ -121,7 +183,8 @@ def test_an_operation_in_lanes_means_what_it_means_in_numpy(name, number):
 @pytest.mark.parametrize("number", NUMBERS.values(), ids=NUMBERS)
 def test_the_printers_own_operations_choose_lane_by_lane(number):
     block = emit.FunctionBody((), number)
-    a, b = block.load("x", 0), block.load("x", 1)
+    a = block.load("x", 0)
+    b = block.load("x", 1)
     for i, (operation, operands) in enumerate(
         [
             (Operation.MAXIMUM, (a, b)),
@@ -135,7 +198,9 @@ def test_the_printers_own_operations_choose_lane_by_lane(number):
     engine = engine_of(object_code(emit.function("f", ["x", "y"], block)))
     kind = np.float64 if number.bits == 64 else np.float32
     x, y = (
-        column.astype(kind) for column in ([0.0, 1.0, 0.0, -2.0] * 5, np.arange(20.0)) for column in [np.array(column)]
+        column.astype(kind)
+        for column in ([0.0, 1.0, 0.0, -2.0] * 5, np.arange(20.0))
+        for column in [np.array(column)]
     )
     found = call(engine, number, (x, y), 5)
     expected = [np.maximum(x, y), np.minimum(x, y), np.where(x != 0, y, x), y, x * y]
@@ -154,18 +219,28 @@ def units_of_last_place(found, exact):
     return np.abs(found[usual] - exact[usual]) / np.spacing(np.abs(found[usual]))
 
 
-extended = pytest.mark.skipif(np.finfo(np.longdouble).nmant <= 52, reason="no extended precision to compare with")
+extended = pytest.mark.skipif(
+    np.finfo(np.longdouble).nmant <= 52, reason="no extended precision to compare with"
+)
 
 
 @extended
 def test_exp_errs_by_less_than_a_unit_over_its_whole_range():
-    x = np.concatenate([np.linspace(-745, 709.7, 40001), np.linspace(-1, 1, 20001), 10.0 ** np.linspace(-300, 0, 301)])
+    x = np.concatenate(
+        [
+            np.linspace(-745, 709.7, 40001),
+            np.linspace(-1, 1, 20001),
+            10.0 ** np.linspace(-300, 0, 301),
+        ]
+    )
     found = run(NUMBERS["16 doubles"], lambda x: [casadi.exp(x)], x)[:, 0]
     assert units_of_last_place(found, np.exp(x.astype(np.longdouble))).max() < 0.9
     tiny = np.exp(x.astype(np.longdouble)) < 1e-290
     assert np.abs(found[tiny] - np.exp(x[tiny])).max() <= 1e-305
     np.testing.assert_array_equal(
-        run(NUMBERS["16 doubles"], lambda x: [casadi.exp(x)], [710.0, 1e9, -746.0, -1e9, -0.0])[:, 0],
+        run(NUMBERS["16 doubles"], lambda x: [casadi.exp(x)], [710.0, 1e9, -746.0, -1e9, -0.0])[
+            :, 0
+        ],
         [np.inf, np.inf, 0.0, 0.0, 1.0],
     )
 
@@ -173,7 +248,11 @@ def test_exp_errs_by_less_than_a_unit_over_its_whole_range():
 @extended
 def test_log_errs_by_less_than_a_unit_over_its_whole_range():
     x = np.concatenate(
-        [10.0 ** np.linspace(-323, 308, 40001), 1 + np.linspace(-0.3, 0.42, 20001), [5e-324, 2.0**-1022]]
+        [
+            10.0 ** np.linspace(-323, 308, 40001),
+            1 + np.linspace(-0.3, 0.42, 20001),
+            [5e-324, 2.0**-1022],
+        ]
     )
     found = run(NUMBERS["16 doubles"], lambda x: [casadi.log(x)], x)[:, 0]
     exact = np.log(x.astype(np.longdouble))
@@ -204,11 +283,13 @@ def steady_power(number, x, y):
     text = emit.function("f", ["x", "c", "y"], block)
     engine = engine_of(object_code("\n".join([vector_math.declarations({number}), *parts, text])))
     function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(engine.get_function_address("f"))
-    kind, found = np.float64 if number.bits == 64 else np.float32, []
+    kind = np.float64 if number.bits == 64 else np.float32
+    found = []
     arrays = [aligned_array((1, number.lanes), kind) for _ in range(3)]
     for at in range(0, x.size, number.lanes):
         rows = np.minimum(np.arange(at, at + number.lanes), x.size - 1)
-        arrays[0][0], arrays[1][0] = x[rows], y[rows]
+        arrays[0][0] = x[rows]
+        arrays[1][0] = y[rows]
         function(*(array.ctypes.data for array in arrays))
         found.append(arrays[2][0].copy())
     return np.concatenate(found)[: x.size]
@@ -222,7 +303,9 @@ def test_a_power_with_a_steady_exponent_errs_by_less_than_1e_12(number):
         (np.float64, 300, 1e-12, 3e-15) if number.bits == 64 else (np.float32, 37, 2e-6, 6e-7)
     )
     rng = np.random.default_rng(5)
-    x = np.concatenate([10.0 ** rng.uniform(-widest, widest, 20000), rng.uniform(0.05, 20, 20000)]).astype(kind)
+    x = np.concatenate(
+        [10.0 ** rng.uniform(-widest, widest, 20000), rng.uniform(0.05, 20, 20000)]
+    ).astype(kind)
     y = np.concatenate([rng.uniform(-1, 1, 20000), rng.uniform(1.001, 1.667, 20000)]).astype(kind)
     exact = np.power(x.astype(np.longdouble), y.astype(np.longdouble))
     error = np.abs(steady_power(number, x, y) / exact - 1)
@@ -237,30 +320,44 @@ def test_a_power_with_a_steady_exponent_has_the_exceptions_of_ieee_754_in_each_l
         ends = np.unique(ENDS.astype(kind))
     x, y = np.repeat(ends, ends.size), np.tile(ends, ends.size)
     with np.errstate(all="ignore"):
-        np.testing.assert_allclose(steady_power(number, x, y), np.power(x, y), rtol=tolerance, atol=0)
+        np.testing.assert_allclose(
+            steady_power(number, x, y), np.power(x, y), rtol=tolerance, atol=0
+        )
     usual = np.linspace(0.5, 9.0, number.lanes).astype(kind)
     beside = usual.copy()
     beside[1] = 0.0
     exponents = np.full(number.lanes, 1.2, kind)
-    alone, together = steady_power(number, usual, exponents), steady_power(number, beside, exponents)
+    alone = steady_power(number, usual, exponents)
+    together = steady_power(number, beside, exponents)
     assert together[1] == 0.0
     np.testing.assert_array_equal(np.delete(alone, 1), np.delete(together, 1))
 
 
 @extended
-@pytest.mark.parametrize(("symbolic", "exact"), [(casadi.sin, np.sin), (casadi.cos, np.cos)], ids=["sin", "cos"])
+@pytest.mark.parametrize(
+    ("symbolic", "exact"), [(casadi.sin, np.sin), (casadi.cos, np.cos)], ids=["sin", "cos"]
+)
 def test_sin_and_cos_err_by_less_than_a_unit(symbolic, exact):
-    """Also next to multiples of a quarter turn; what is large, infinite or NaN is left to the C library."""
+    """Also next to multiples of a quarter turn; what is large, infinite or NaN is left to the C
+    library.
+    """
     quarters = np.arange(-600.0, 600.0) * np.pi / 2
     x = np.concatenate(
-        [np.linspace(-10, 10, 40001), quarters, np.nextafter(quarters, 1e9), np.linspace(-9e5, 9e5, 40001)]
+        [
+            np.linspace(-10, 10, 40001),
+            quarters,
+            np.nextafter(quarters, 1e9),
+            np.linspace(-9e5, 9e5, 40001),
+        ]
     )
     found = run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0]
     reduced = exact(x.astype(np.longdouble))
     assert units_of_last_place(found, reduced).max() < 0.85
     x = np.array([0.0, -0.0, 1e-300, 1e7, -1e22, 1e300, np.inf, np.nan, 0.5])
     with np.errstate(all="ignore"):
-        np.testing.assert_allclose(run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0], exact(x), rtol=2e-16)
+        np.testing.assert_allclose(
+            run(NUMBERS["16 doubles"], lambda x: [symbolic(x)], x)[:, 0], exact(x), rtol=2e-16
+        )
 
 
 def test_pow_has_the_exceptions_of_ieee_754():
@@ -270,4 +367,6 @@ def test_pow_has_the_exceptions_of_ieee_754():
     with np.errstate(all="ignore"):
         expected = np.power(x, y)
     np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
-    np.testing.assert_array_equal(np.signbit(found[~np.isnan(expected)]), np.signbit(expected[~np.isnan(expected)]))
+    np.testing.assert_array_equal(
+        np.signbit(found[~np.isnan(expected)]), np.signbit(expected[~np.isnan(expected)])
+    )

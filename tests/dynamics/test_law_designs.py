@@ -1,5 +1,5 @@
-"""A control law that is designed from weights runs as its designed law, compiled with the plant, in single runs and in
-batches; a search for the weights designs it anew for each set.
+"""A control law that is designed from weights runs as its designed law, compiled with the plant, in
+single runs and in batches; a search for the weights designs it anew for each set.
 """
 
 from __future__ import annotations
@@ -15,11 +15,20 @@ import airmuscle as am
 from airmuscle.control import PID, WithFeedForward, WithSetpointDelay
 from airmuscle.core import model, parameter
 from airmuscle.design import LoopCase, tune
-from airmuscle.engine import ControlLaw, ControlLoop, LawDesign, RungeKutta4, SplitRange, simulate, simulate_batch
+from airmuscle.engine import (
+    ControlLaw,
+    ControlLoop,
+    LawDesign,
+    RungeKutta4,
+    SplitRange,
+    simulate,
+    simulate_batch,
+)
 from airmuscle.engine.loop import designed_loop, with_designed_laws
 from airmuscle.errors import ParameterError
 
-H, BAR = 0.01, 1e5
+H = 0.01
+BAR = 1e5
 VALVES = SplitRange("fill", "discharge")
 
 
@@ -51,9 +60,14 @@ def test_a_design_runs_as_its_designed_law_compiled_with_the_plant(enclosed: boo
     design = Placement(0.1)
 
     def around(law: ControlLaw) -> ControlLaw:
-        return WithSetpointDelay(WithFeedForward(PID("pressure", VALVES, gain=1e-6), law), 1) if enclosed else law
+        return (
+            WithSetpointDelay(WithFeedForward(PID("pressure", VALVES, gain=1e-6), law), 1)
+            if enclosed
+            else law
+        )
 
-    ours, theirs = run(around(design)), run(around(design.law))
+    ours = run(around(design))
+    theirs = run(around(design.law))
     assert np.array_equal(ours["pressure"], theirs["pressure"])
     assert any("compiled with the plant" in note for note in ours.notes)
     assert np.ptp(ours["pressure"]) > 0.5 * BAR
@@ -63,9 +77,14 @@ def test_a_design_runs_as_its_designed_law_compiled_with_the_plant(enclosed: boo
 def test_a_batch_takes_designs_with_different_weights(integrator: RungeKutta4 | None):
     times = (0.05, 0.1, 0.2)
     batch = simulate_batch(
-        LIFT, {}, [loop(Placement(time)) for time in times], duration=0.4, output_times=H,
-        initial_states={name: np.full(3, value) for name, value in START.items()}, integrator=integrator,
-    )  # fmt: skip
+        LIFT,
+        {},
+        [loop(Placement(time)) for time in times],
+        duration=0.4,
+        output_times=H,
+        initial_states={name: np.full(3, value) for name, value in START.items()},
+        integrator=integrator,
+    )
     for row, time in zip(batch["pressure"], times, strict=True):
         alone = run(Placement(time).law, integrator=integrator)
         np.testing.assert_allclose(row, alone["pressure"], rtol=1e-9)
@@ -88,4 +107,6 @@ def test_a_loop_without_designs_remains_the_same_object():
 
 def test_a_weight_cannot_be_varied_without_a_new_design():
     with pytest.raises(ParameterError, match="time_constant"):
-        simulate_batch(LIFT, {"controller.time_constant": [0.1, 0.2]}, loop(Placement(0.1)), duration=0.1)
+        simulate_batch(
+            LIFT, {"controller.time_constant": [0.1, 0.2]}, loop(Placement(0.1)), duration=0.1
+        )

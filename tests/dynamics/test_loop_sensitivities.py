@@ -1,8 +1,10 @@
-"""Sensitivities of control loops: derivatives by gains and plant parameters pass through the samples.
+"""Sensitivities of control loops: derivatives by gains and plant parameters pass through the
+samples.
 
-At a sample, du/dtheta = (dk/dy) dy/dtheta + (dk/dm) dm/dtheta + dk/dtheta for the commands u, and so on for the memory
-m; between two samples the variational equation holds with du/dtheta held. With a fixed step this is the derivative of
-the run itself, therefore central differences of runs agree to their own rounding.
+At a sample, du/dtheta = (dk/dy) dy/dtheta + (dk/dm) dm/dtheta + dk/dtheta for the commands u, and
+so on for the memory m; between two samples the variational equation holds with du/dtheta held. With
+a fixed step this is the derivative of the run itself, therefore central differences of runs agree
+to their own rounding.
 """
 
 from __future__ import annotations
@@ -47,7 +49,10 @@ from airmuscle.errors import ParameterError
 
 OUTER = PID("position", "pressure", 4e6, 0.3, 0.02, initial_output=1e5)
 FORWARD = StaticFeedForward(
-    StaticInverse(LIFT.muscles[0], max_pressure=5e5), "pressure", LIFT.muscles[0].geometry.resting_length, load=20.0
+    StaticInverse(LIFT.muscles[0], max_pressure=5e5),
+    "pressure",
+    LIFT.muscles[0].geometry.resting_length,
+    load=20.0,
 )
 CASCADE = Cascade(OUTER, PRESSURE, (0.0,), (5e5,))
 STEP = Schedule({"position": ((0.0, 0.01), (0.2, 0.02))})
@@ -56,14 +61,25 @@ FIXED = RungeKutta4(1e-3)
 DURATION = 0.6
 SMOOTH = {
     "cascade": (CASCADE, "outer.gain"),
-    "feed-forward": (Cascade(WithFeedForward(FORWARD, OUTER), PRESSURE, (0.0,), (5e5,)), "outer.feedback.gain"),
+    "feed-forward": (
+        Cascade(WithFeedForward(FORWARD, OUTER), PRESSURE, (0.0,), (5e5,)),
+        "outer.feedback.gain",
+    ),
     "gain schedule": (
-        Cascade(GainSchedule(OUTER, "gain", "pressure", (0.0, 3e5), (6e6, 2e6)), PRESSURE, (0.0,), (5e5,)),
+        Cascade(
+            GainSchedule(OUTER, "gain", "pressure", (0.0, 3e5), (6e6, 2e6)),
+            PRESSURE,
+            (0.0,),
+            (5e5,),
+        ),
         "outer.scheduled_values[1]",
     ),
     "sliding mode": (SlidingMode("position", SPLIT, 0.8, 0.05, 2e-2, 5e-3), "amplitude"),
     "super-twisting": (SuperTwisting("position", SPLIT, 10.0, 1.0, 0.05, 5e-3), "integral"),
-    "sensors": (WithSensors(CASCADE, (ColumnSensor("position", lag=5e-3, delay=2),)), "law.outer.gain"),
+    "sensors": (
+        WithSensors(CASCADE, (ColumnSensor("position", lag=5e-3, delay=2),)),
+        "law.outer.gain",
+    ),
 }
 
 
@@ -107,14 +123,17 @@ class Lag(System):
         return {"y": self.a * state["x"]}
 
 
-LAG, ZERO = Lag(), {"x": 0.0}
+LAG = Lag()
+ZERO = {"x": 0.0}
 PI = PID("y", "u", gain=0.3, integral_time=0.5)
 PI_LOOP = ControlLoop(PI, 0.02, Schedule({"y": ((0.0, 1.0), (0.3, 6.0))}))
 
 
 def moved(thing, path, value):
     """A model with another value of one parameter."""
-    return tree.with_parameters(thing, [value if leaf.path == path else leaf.value for leaf in tree.leaves(thing)])
+    return tree.with_parameters(
+        thing, [value if leaf.path == path else leaf.value for leaf in tree.leaves(thing)]
+    )
 
 
 def value_of(thing, path):
@@ -123,7 +142,12 @@ def value_of(thing, path):
 
 def run_of(plant, loop, integrator=FIXED, start=START, duration=DURATION):
     return simulate(
-        plant, loop, duration=duration, initial_state=start, integrator=integrator, output_times=loop.sample_time
+        plant,
+        loop,
+        duration=duration,
+        initial_state=start,
+        integrator=integrator,
+        output_times=loop.sample_time,
     )
 
 
@@ -144,14 +168,18 @@ def difference(plant, loop, path, column, **options):
     """Central difference of a column of a run by one parameter."""
     value = present(plant, loop, path)
     h = 1e-5 * value
-    up, down = (run_of(*at_paths(plant, loop, path, value + side * h), **options)[column] for side in (1, -1))
+    up, down = (
+        run_of(*at_paths(plant, loop, path, value + side * h), **options)[column]
+        for side in (1, -1)
+    )
     return (up - down) / (2 * h)
 
 
 @pytest.mark.parametrize("name", SMOOTH)
 def test_derivatives_of_a_run_are_its_differences_whatever_the_law(name):
     law, gain = SMOOTH[name]
-    loop, paths = ControlLoop(law, 0.01, STEP), (f"controller.{gain}", "mechanism.mass")
+    loop = ControlLoop(law, 0.01, STEP)
+    paths = (f"controller.{gain}", "mechanism.mass")
     both = differentiate_loop(LIFT, loop, paths, [present(LIFT, loop, path) for path in paths])
     run = run_of(both.system, both.loop, start=both.initial_state(START))
     alone = run_of(LIFT, loop)
@@ -160,7 +188,9 @@ def test_derivatives_of_a_run_are_its_differences_whatever_the_law(name):
         expected = difference(LIFT, loop, path, "position")
         size = np.abs(expected).max()
         assert size > 0
-        np.testing.assert_allclose(run[sensitivity("position", k)] / size, expected / size, atol=2e-6, err_msg=path)
+        np.testing.assert_allclose(
+            run[sensitivity("position", k)] / size, expected / size, atol=2e-6, err_msg=path
+        )
 
 
 @pytest.mark.parametrize("integrator", [FIXED, Rodas4(1e-8)], ids=["fixed step", "implicit"])
@@ -175,12 +205,15 @@ def test_the_gradient_of_the_tracking_error_is_its_difference(integrator):
     def error(path, value):
         record = run_of(*at_paths(LIFT, loop, path, value), integrator)
         rows = record["time"] >= 0.1 - 1e-12
-        square, time = (record["setpoint.position"] - record["position"])[rows] ** 2, record["time"][rows]
+        square = (record["setpoint.position"] - record["position"])[rows] ** 2
+        time = record["time"][rows]
         return np.sqrt(np.trapezoid(square, time) / (time[-1] - time[0]))
 
     for k, (path, value) in enumerate(zip(paths, values, strict=True)):
         assert found.error == pytest.approx(error(path, value), rel=1e-6)
-        expected = (error(path, value * 1.0001) - error(path, value / 1.0001)) / (value * 1.0001 - value / 1.0001)
+        expected = (error(path, value * 1.0001) - error(path, value / 1.0001)) / (
+            value * 1.0001 - value / 1.0001
+        )
         assert found.gradient[k] == pytest.approx(expected, rel=2e-4), path
 
 
@@ -206,44 +239,68 @@ def test_a_parameter_of_plant_and_controller_moves_both():
 
 @pytest.mark.slow  # the derivatives of a joint are compiled
 def test_a_joint_has_derivatives():
-    law = Cascade(PID("angle", "left.pressure", 4e5, 0.2, initial_output=2e5), PRESSURES.laws[0], (0.2e5,), (5e5,))
+    law = Cascade(
+        PID("angle", "left.pressure", 4e5, 0.2, initial_output=2e5),
+        PRESSURES.laws[0],
+        (0.2e5,),
+        (5e5,),
+    )
     loop = ControlLoop(law, 0.01, Schedule({"angle": ((0.0, 0.1),)}))
     start = am.find_equilibrium(JOINT, pressure=2e5)
     damping = next(leaf.path for leaf in tree.leaves(JOINT) if leaf.path.endswith("damper.damping"))
     paths = ("controller.outer.gain", "mechanism.inertia", damping)
-    both = differentiate_loop(JOINT, loop, paths, [present(JOINT, loop, path) for path in paths], observed=("angle",))
+    both = differentiate_loop(
+        JOINT, loop, paths, [present(JOINT, loop, path) for path in paths], observed=("angle",)
+    )
     run = run_of(both.system, both.loop, start=both.initial_state(start), duration=0.3)
     for k, path in enumerate(paths):
         expected = difference(JOINT, loop, path, "angle", start=start, duration=0.3)
         size = np.abs(expected).max()
-        np.testing.assert_allclose(run[sensitivity("angle", k)] / size, expected / size, atol=2e-6, err_msg=path)
+        np.testing.assert_allclose(
+            run[sensitivity("angle", k)] / size, expected / size, atol=2e-6, err_msg=path
+        )
 
 
 def test_a_batch_of_differentiated_loops_varies_gains():
     both = differentiate_loop(LAG, PI_LOOP, ("controller.gain",), (0.3,))
     gains = np.array([0.1, 0.2])
     batch = simulate_batch(
-        both.system, {"controller.law.gain": gains}, both.loop, duration=DURATION, output_times=0.02,
-        initial_states=both.initial_state(ZERO), integrator=FIXED,
-    )  # fmt: skip
+        both.system,
+        {"controller.law.gain": gains},
+        both.loop,
+        duration=DURATION,
+        output_times=0.02,
+        initial_states=both.initial_state(ZERO),
+        integrator=FIXED,
+    )
     for row, gain in enumerate(gains):
         other = dataclasses.replace(PI_LOOP, controller=moved(PI, "gain", gain))
         expected = difference(LAG, other, "controller.gain", "y", start=ZERO)
         size = np.abs(expected).max()
-        np.testing.assert_allclose(batch[sensitivity("y", 0)][row] / size, expected / size, atol=2e-6)
+        np.testing.assert_allclose(
+            batch[sensitivity("y", 0)][row] / size, expected / size, atol=2e-6
+        )
 
 
-@pytest.mark.parametrize("integrator", [Rodas4(1e-10), RungeKutta4(1e-2)], ids=["implicit", "fixed step"])
+@pytest.mark.parametrize(
+    "integrator", [Rodas4(1e-10), RungeKutta4(1e-2)], ids=["implicit", "fixed step"]
+)
 def test_an_input_that_depends_on_a_column_and_moves_has_its_closed_form(integrator):
-    """u = theta t at theta = 1: x = exp(a t^2/2), dx/dtheta = a t^2/2 x, d(u x)/dtheta = t x + t dx/dtheta."""
+    """u = theta t at theta = 1: x = exp(a t^2/2), dx/dtheta = a t^2/2 x, d(u x)/dtheta = t x + t
+    dx/dtheta.
+    """
     system = WithSensitivities(Integrator(), ((),), (1.0,), (), ("u",))
     assert system.inputs == ("u", sensitivity("u", 0))
     ramp = ((0.0, 0.0), (2.0, 2.0))
     start = {"x": 1.0, sensitivity("x", 0): 0.0}
     run = simulate(
-        system, SampledSignal({"u": ramp, sensitivity("u", 0): ramp}), duration=2.0, initial_state=start,
-        integrator=integrator, output_times=0.1,
-    )  # fmt: skip
+        system,
+        SampledSignal({"u": ramp, sensitivity("u", 0): ramp}),
+        duration=2.0,
+        initial_state=start,
+        integrator=integrator,
+        output_times=0.1,
+    )
     t = run["time"]
     x = np.exp(0.25 * t**2)
     np.testing.assert_allclose(run[sensitivity("x", 0)], 0.25 * t**2 * x, atol=2e-8)
@@ -253,7 +310,9 @@ def test_an_input_that_depends_on_a_column_and_moves_has_its_closed_form(integra
 def test_the_law_is_the_same_when_it_is_called():
     both = differentiate_loop(LAG, PI_LOOP, ("controller.gain", "a"), (0.3, 5.0))
     called = dataclasses.replace(both.loop, controller=Called(both.loop.controller))
-    one, other = (run_of(both.system, loop, start=both.initial_state(ZERO)) for loop in (both.loop, called))
+    one, other = (
+        run_of(both.system, loop, start=both.initial_state(ZERO)) for loop in (both.loop, called)
+    )
     for name in (sensitivity("y", 0), f"command.{sensitivity('u', 1)}"):
         np.testing.assert_allclose(one[name], other[name], atol=1e-12 * np.abs(one[name]).max())
 
@@ -261,11 +320,21 @@ def test_the_law_is_the_same_when_it_is_called():
 def test_what_cannot_be_differentiated_is_refused_by_name():
     loop = ControlLoop(CASCADE, 0.01, STEP)
     gain = ("controller.outer.gain",)
-    with pytest.raises(ParameterError, match=r"the input 'fill' has a driver, .* Give a loop without drivers"):
-        differentiate_loop(LIFT, dataclasses.replace(loop, drivers={"fill": PWM(50.0)}), gain, (1.0,))
-    with pytest.raises(ParameterError, match=r"Called is no ControlLaw, its samples have no derivatives"):
-        differentiate_loop(LIFT, dataclasses.replace(loop, controller=Called(CASCADE)), gain, (1.0,))
-    with pytest.raises(ParameterError, match=r"Cascade has no parameter 'outer.gian'; .*'outer.gain'"):
+    with pytest.raises(
+        ParameterError, match=r"the input 'fill' has a driver, .* Give a loop without drivers"
+    ):
+        differentiate_loop(
+            LIFT, dataclasses.replace(loop, drivers={"fill": PWM(50.0)}), gain, (1.0,)
+        )
+    with pytest.raises(
+        ParameterError, match=r"Called is no ControlLaw, its samples have no derivatives"
+    ):
+        differentiate_loop(
+            LIFT, dataclasses.replace(loop, controller=Called(CASCADE)), gain, (1.0,)
+        )
+    with pytest.raises(
+        ParameterError, match=r"Cascade has no parameter 'outer.gian'; .*'outer.gain'"
+    ):
         differentiate_loop(LIFT, loop, ("controller.outer.gian",), (1.0,))
     with pytest.raises(ParameterError, match=r"Plant has no parameter 'mechanism.mas'"):
         differentiate_loop(LIFT, loop, ("mechanism.mas",), (1.0,))
@@ -281,7 +350,9 @@ def test_what_cannot_be_differentiated_is_refused_by_name():
 
 def test_a_recording_without_derivatives_has_no_gradient():
     run = run_of(LAG, PI_LOOP, start=ZERO)
-    with pytest.raises(ParameterError, match=r"no column 'd y/d 0'; simulate a loop of differentiate_loop"):
+    with pytest.raises(
+        ParameterError, match=r"no column 'd y/d 0'; simulate a loop of differentiate_loop"
+    ):
         tracking_sensitivity(run, "y")
     with pytest.raises(ParameterError, match=r"no column 'setpoint.x'"):
         tracking_sensitivity(run, "x")
@@ -291,7 +362,10 @@ def test_a_gradient_needs_rows():
     both = differentiate_loop(LAG, PI_LOOP, ("controller.gain",), (0.3,))
     run = run_of(both.system, both.loop, start=both.initial_state(ZERO))
     for begin in (DURATION, np.nan, np.inf):
-        with pytest.raises(ParameterError, match=r"begin is .* s; at least two rows must follow, allowed range: 0 to"):
+        with pytest.raises(
+            ParameterError,
+            match=r"begin is .* s; at least two rows must follow, allowed range: 0 to",
+        ):
             tracking_sensitivity(run, "y", begin=begin)
 
 

@@ -1,4 +1,6 @@
-"""Mechanisms in plants: the energy book closes, a prescribed motion is followed, the joint is that written by hand."""
+"""Mechanisms in plants: the energy book closes, a prescribed motion is followed, the joint is that
+written by hand.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,14 @@ from hypothesis import strategies as st
 from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 from widths import widened
 
-from airmuscle.engine import ZERO_INPUT, Rodas4, SampledSignal, Schedule, simulate, spline_trajectory
+from airmuscle.engine import (
+    ZERO_INPUT,
+    Rodas4,
+    SampledSignal,
+    Schedule,
+    simulate,
+    spline_trajectory,
+)
 from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 from airmuscle.physics import (
@@ -74,7 +83,9 @@ def pair(mechanism, gas=Polytropic(1.2), circuit=CIRCUIT):
 
 
 OF_ONE_KIND = ("spring", "isotonic", "pulley", "lever", "series")
-"""Their losses are the friction and damping of those that remain; the power of each is judged in laws/test_mechanisms."""
+"""Their losses are the friction and damping of those that remain; the power of each is judged in
+laws/test_mechanisms.
+"""
 
 
 @pytest.mark.parametrize("name", widened(MECHANISMS, lambda name: name not in OF_ONE_KIND))
@@ -83,10 +94,14 @@ def test_the_energy_book_closes_with_what_is_lost(name):
     mechanism = MECHANISMS[name]
     plant = WithEnergyMeters(pair(mechanism))
     start = plant.extend_state(find_equilibrium(plant.plant, pressure=2e5))
-    command = Schedule({
-        "left.fill": ((0.1, 1.0), (0.2, 0.0)), "right.fill": ((0.4, 1.0), (0.5, 0.0)),
-        "left.discharge": ((0.9, 1.0), (0.94, 0.0)), "right.discharge": ((1.1, 1.0), (1.14, 0.0)),
-    })  # fmt: skip
+    command = Schedule(
+        {
+            "left.fill": ((0.1, 1.0), (0.2, 0.0)),
+            "right.fill": ((0.4, 1.0), (0.5, 0.0)),
+            "left.discharge": ((0.9, 1.0), (0.94, 0.0)),
+            "right.discharge": ((1.1, 1.0), (1.14, 0.0)),
+        }
+    )
     run = simulate(plant, command, duration=1.4, initial_state=start, integrator=Rodas4(1e-9))
     mechanical = run["kinetic_energy"] + run["potential_energy"]
     book = run["work_of_tension"] - run["mechanism_loss"]
@@ -103,7 +118,10 @@ def test_stops_hold_between_their_ends_but_for_the_depth_of_the_contact():
     """At rest against the stop the contact carries what the muscle pulls beyond the spring."""
     plant = Plant(LEFT, CIRCUIT, MECHANISMS["stopped"])
     run = simulate(
-        plant, Schedule({"fill": ((0.0, 1.0),)}), duration=3.0, initial_state=find_equilibrium(plant, pressure=0.0)
+        plant,
+        Schedule({"fill": ((0.0, 1.0),)}),
+        duration=3.0,
+        initial_state=find_equilibrium(plant, pressure=0.0),
     )
     depth = run["position"][-1] - 0.02
     assert 0.0 < depth < 2e-3
@@ -176,11 +194,18 @@ def test_points_that_are_no_motion_are_refused(times, places, settings, message)
 
 
 TUBE = Tube(Valve(4e-8, 0.433), 2e-5)
-BY_HAND = {"speed": "angular_speed", "air_mass": "air_mass", "tube_mass": "tube.air_mass", "energy": "internal_energy"}
+BY_HAND = {
+    "speed": "angular_speed",
+    "air_mass": "air_mass",
+    "tube_mass": "tube.air_mass",
+    "energy": "internal_energy",
+}
 
 
 def of_plant(state):
-    """A state of the joint that is written by hand, by the plant's names; a spool is no state of the plant."""
+    """A state of the joint that is written by hand, by the plant's names; a spool is no state of
+    the plant.
+    """
     found = {}
     for name, value in state.items():
         side, _, kind = name.rpartition(".")
@@ -203,11 +228,15 @@ def test_the_joint_of_a_plant_is_the_joint_written_by_hand():
         state = random_state(system, rng)
         inputs = {name: rng.uniform() for name in system.inputs}
         assert plant.inputs == system.inputs
-        expected, found = of_plant(system.rates(state, inputs)), plant.rates(of_plant(state), inputs)
+        expected = of_plant(system.rates(state, inputs))
+        found = plant.rates(of_plant(state), inputs)
         assert found == pytest.approx(expected, rel=1e-11, abs=1e-14)
 
-    command = Schedule({"left.fill": ((0.1, 1.0), (0.4, 0.0)), "right.discharge": ((0.2, 1.0), (0.5, 0.0))})
-    method, start = Rodas4(1e-9), joint_start(system)
+    command = Schedule(
+        {"left.fill": ((0.1, 1.0), (0.4, 0.0)), "right.discharge": ((0.2, 1.0), (0.5, 0.0))}
+    )
+    method = Rodas4(1e-9)
+    start = joint_start(system)
     by_hand = simulate(system, command, duration=1.5, initial_state=start, integrator=method)
     run = simulate(plant, command, duration=1.5, initial_state=of_plant(start), integrator=method)
     assert np.ptp(run["angle"]) > 0.2
@@ -216,20 +245,25 @@ def test_the_joint_of_a_plant_is_the_joint_written_by_hand():
 
 
 def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_temperature():
-    """By hand every orifice passes air as if it were as warm as the surroundings; in a plant as warm as it is.
+    """By hand every orifice passes air as if it were as warm as the surroundings; in a plant as
+    warm as it is.
 
-    So a muscle that loses air loses sqrt(T_amb/T) times as much, and all else is equal. The spool by hand lags by one
-    time constant; here its place is given.
+    So a muscle that loses air loses sqrt(T_amb/T) times as much, and all else is equal. The spool
+    by hand lags by one time constant; here its place is given.
     """
     system = joint(heat=True)
     valve = ThreePositionValve(Supply(6e5), VALVE, VALVE)
     plant = pair(JOINT, EnergyBalance(1.0), WithTubes(valve, TUBE))
-    rng, directions = np.random.default_rng(2), set()
+    rng = np.random.default_rng(2)
+    directions = set()
     for _ in range(50):
         state = random_state(system, rng)
         state |= {f"{side}.spool": rng.uniform(-1.0, 1.0) for side in ("left", "right")}
         expected = system.rates(state, dict.fromkeys(system.inputs, 0.0))
-        places = {name: state[f"{side}.spool"] for name, side in zip(plant.inputs, ("left", "right"), strict=True)}
+        places = {
+            name: state[f"{side}.spool"]
+            for name, side in zip(plant.inputs, ("left", "right"), strict=True)
+        }
         found = plant.rates(of_plant(state), places)
         assert found["angular_speed"] == pytest.approx(expected["speed"], rel=1e-11)
         for side in ("left", "right"):
@@ -243,42 +277,74 @@ def test_with_heat_it_is_too_but_that_air_that_leaves_a_muscle_flows_at_its_own_
                 expected[f"{side}.tube_mass"] + (1 - factor) * flow, rel=1e-9, abs=1e-15
             )
             more = (factor - 1) * flow * (HEAT_CAPACITY + GAS_CONSTANT) * temperature
-            assert found[f"{side}.internal_energy"] == pytest.approx(expected[f"{side}.energy"] + more, rel=1e-9)
+            assert found[f"{side}.internal_energy"] == pytest.approx(
+                expected[f"{side}.energy"] + more, rel=1e-9
+            )
     assert directions == {True, False}
 
 
 def test_the_tubes_of_one_circuit_for_all_are_called_by_their_muscles():
-    """Each tube belongs to a muscle, whose name it carries as it does where every muscle has a circuit of its own."""
+    """Each tube belongs to a muscle, whose name it carries as it does where every muscle has a
+    circuit of its own.
+    """
     valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscle_count=2)
     plant = Plant((LEFT, RIGHT), WithTubes(valve, Tube(VALVE, 1e-5, 2)), JOINT, Isothermal())
     of_tubes = [s.name for s in plant.states if "tube" in s.name]
     assert of_tubes == [f"{side}.tube{i}.air_mass" for side in ("left", "right") for i in (1, 2)]
     start = plant.state_at(pressure=(2e5, 3e5))
-    assert start["left.tube1.air_mass"] / start["right.tube1.air_mass"] == pytest.approx(301.325 / 401.325)
+    assert start["left.tube1.air_mass"] / start["right.tube1.air_mass"] == pytest.approx(
+        301.325 / 401.325
+    )
     run = simulate(plant, Schedule({"command": ((0.0, 1.0),)}), duration=0.02, initial_state=start)
-    assert run["left.tube1.pressure"][-1] > run["left.tube2.pressure"][-1] > run["left.pressure"][-1] > 2e5
-    assert run["right.tube1.pressure"][-1] < run["right.tube2.pressure"][-1] < run["right.pressure"][-1]
+    assert (
+        run["left.tube1.pressure"][-1]
+        > run["left.tube2.pressure"][-1]
+        > run["left.pressure"][-1]
+        > 2e5
+    )
+    assert (
+        run["right.tube1.pressure"][-1]
+        < run["right.tube2.pressure"][-1]
+        < run["right.pressure"][-1]
+    )
 
 
 @pytest.mark.parametrize("nested", [False, True], ids=["one circuit", "manifold"])
 def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
-    """A wide valve before a long narrow tube into an empty muscle: beyond a third of the speed of sound, in one."""
-    tube, wide, narrow = DistributedTube(0.5, 2e-3, 3), Valve(1e-7, 0.4), Valve(1e-10, 0.4)
-    feeds = [WithTubes(FillDischarge(SharedSupply() if nested else Supply(6e5), v, v), tube) for v in (wide, narrow)]
+    """A wide valve before a long narrow tube into an empty muscle: beyond a third of the speed of
+    sound, in one.
+    """
+    tube = DistributedTube(0.5, 2e-3, 3)
+    wide = Valve(1e-7, 0.4)
+    narrow = Valve(1e-10, 0.4)
+    feeds = [
+        WithTubes(FillDischarge(SharedSupply() if nested else Supply(6e5), v, v), tube)
+        for v in (wide, narrow)
+    ]
     circuit = Manifold(Supply(6e5), tuple(feeds), ("left", "right")) if nested else tuple(feeds)
     plant = Plant((LEFT, RIGHT), circuit, JOINT, Isothermal())
     command = Schedule({"left.fill": ((0.0, 1.0),), "right.fill": ((0.0, 1.0),)})
-    found = simulate(plant, command, duration=0.02, initial_state=plant.state_at(pressure=0.0), integrator=Rodas4(1e-5))
+    found = simulate(
+        plant,
+        command,
+        duration=0.02,
+        initial_state=plant.state_at(pressure=0.0),
+        integrator=Rodas4(1e-5),
+    )
     doubts = [note for note in found.notes if "Mach number" in note]
     assert {note.partition(":")[0] for note in doubts} <= {f"left.tube{i}" for i in (1, 2, 3)}
     speeds = {
-        i: found[f"left.tube{i}.flow"]
-        * GAS_CONSTANT
-        * 293.15
-        / (tube.area * (found[f"left.tube{i}.pressure"] + 101325))
+        i: (
+            found[f"left.tube{i}.flow"]
+            * GAS_CONSTANT
+            * 293.15
+            / (tube.area * (found[f"left.tube{i}.pressure"] + 101325))
+        )
         for i in (1, 2, 3)
     }
-    greatest = {i: float(abs(speed).max() / np.sqrt(GAS_CONSTANT * 293.15)) for i, speed in speeds.items()}
+    greatest = {
+        i: float(abs(speed).max() / np.sqrt(GAS_CONSTANT * 293.15)) for i, speed in speeds.items()
+    }
     assert len(doubts) == sum(share > 1 / 3 for share in greatest.values()) > 0
     assert f"the Mach number reached {greatest[3]:.2g}" in doubts[-1]
     still = simulate(plant, ZERO_INPUT, duration=0.02, initial_state=plant.state_at(pressure=0.0))
@@ -287,13 +353,24 @@ def test_a_run_says_where_air_ran_too_fast_for_a_distributed_tube(nested):
 
 def test_two_tubes_of_one_name_are_refused():
     with pytest.raises(ParameterError, match=r"two of its parts use the name 'left.tube.air_mass'"):
-        pair(JOINT, Isothermal(), WithTubes(WithTubes(ThreePositionValve(Supply(6e5), VALVE, VALVE), TUBE), TUBE))
+        pair(
+            JOINT,
+            Isothermal(),
+            WithTubes(WithTubes(ThreePositionValve(Supply(6e5), VALVE, VALVE), TUBE), TUBE),
+        )
 
 
 def test_one_five_port_valve_turns_a_joint_to_either_side():
-    """Its command fills one muscle and discharges the other; changed over, the joint mirrors its motion."""
+    """Its command fills one muscle and discharges the other; changed over, the joint mirrors its
+    motion.
+    """
     valve = ProportionalValve(
-        Supply(6e5), Valve(2.6e-9, 0.433), Valve(2.6e-9, 0.433), SecondOrderLag(80.0), 0.05, muscle_count=2
+        Supply(6e5),
+        Valve(2.6e-9, 0.433),
+        Valve(2.6e-9, 0.433),
+        SecondOrderLag(80.0),
+        0.05,
+        muscle_count=2,
     )
     plant = Plant((LEFT, RIGHT), valve, JOINT, EnergyBalance(0.5))
     start = find_equilibrium(plant, pressure=2.5e5)
@@ -326,7 +403,9 @@ def test_muscles_in_parallel_pull_as_one_with_the_sum_of_their_tensions():
 
 
 def test_a_chain_of_equal_muscles_swings_as_one_of_their_length():
-    """With a light node between them; both carry the same tension, and each takes half of the way."""
+    """With a light node between them; both carry the same tension, and each takes half of the
+    way.
+    """
     chain = pair(MusclesInSeries(HangingMass(20.0), (1e-3,)), Isothermal(), ClosedChamber())
     start = find_equilibrium(chain, pressure=3e5)
     run = simulate(

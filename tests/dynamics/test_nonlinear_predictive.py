@@ -1,5 +1,6 @@
-"""Nonlinear model predictive control: near the operating point its plan is that of the linear one, with an error of second
-order; limits of columns are kept, there is no offset at rest, and a program without solution is stated.
+"""Nonlinear model predictive control: near the operating point its plan is that of the linear one,
+with an error of second order; limits of columns are kept, there is no offset at rest, and a program
+without solution is stated.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from airmuscle.physics import find_equilibrium, linearise
 H = 0.01
 MUSCLE = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))
 VALVE = am.Valve(1e-9, 0.35)
-PLANT = am.Plant(MUSCLE, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.HangingMass(10.0), am.Polytropic(1.2))
+PLANT = am.Plant(
+    MUSCLE, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.HangingMass(10.0), am.Polytropic(1.2)
+)
 REST = find_equilibrium(PLANT, pressure=2e5)
 NOISE = {"air_mass": 1e-6, "speed": 0.02, "speed.disturbance": 1.0}
 SENSOR = {"position": 1e-5}
@@ -45,14 +48,24 @@ def loop(law: NonlinearModelPredictive, step: float) -> ControlLoop:
 
 
 def both_plans(size: float):
-    """The planned openings (N,) of nonlinear and linear control for a deviation of this size [m]."""
+    """The planned openings (N,) of nonlinear and linear control for a deviation of this size
+    [m].
+    """
     model = linearise(PLANT, REST, OPEN).select(inputs=["fill"])
     linear = design_predictive(
-        model, H, measured=("position",), controlled=("position",), disturbed=("speed",), permitted=PERMITTED,
-        process_noise=NOISE, measurement_noise=SENSOR, horizon=12,
-    )  # fmt: skip
+        model,
+        H,
+        measured=("position",),
+        controlled=("position",),
+        disturbed=("speed",),
+        permitted=PERMITTED,
+        process_noise=NOISE,
+        measurement_noise=SENSOR,
+        horizon=12,
+    )
     deviation = np.array([2e-5 * size, size, 0.0])
-    disturbance, wanted = 200.0 * size, -0.5 * size
+    disturbance = 200.0 * size
+    wanted = -0.5 * size
     scale = np.array([NOISE["air_mass"], PERMITTED["position"], NOISE["speed"]])
     estimate = np.array([*deviation / scale, disturbance])
     limits = [np.array([(end - OPEN["fill"]) / 0.2]) for end in (0.0, 1.0)]
@@ -74,7 +87,9 @@ def test_near_the_operating_point_the_plan_is_that_of_linear_control():
 
 
 def test_the_plan_is_the_best_under_the_equations_of_the_plant():
-    """A change of any planned input, within its range, does not lower the cost of the plant's own steps."""
+    """A change of any planned input, within its range, does not lower the cost of the plant's own
+    steps.
+    """
     state = np.array([*(REST[name] for name in STATES), 0.0])
     wanted = np.array([REST["position"] + 3e-3])
     plan, variables = LAW.plan(state, wanted, np.zeros(1), np.ones(1))
@@ -83,7 +98,8 @@ def test_the_plan_is_the_best_under_the_equations_of_the_plant():
     step = program.step_function()
 
     def cost(openings):
-        x, total = state[:3] / program.scale, 0.0
+        x = state[:3] / program.scale
+        total = 0.0
         for u in openings / program.sizes:
             total += (x - aim[:3]) @ program.weights @ (x - aim[:3]) + float((u - aim[3]) ** 2)
             x = np.array(step(x, u, state[3:])).ravel()
@@ -108,7 +124,9 @@ def test_a_load_that_the_model_does_not_know_leaves_no_offset():
 
 def test_a_limit_of_a_column_is_kept():
     free, kept = (
-        am.simulate(PLANT, loop(replace(LAW, limits=limits), 4e-3), duration=0.35, initial_state=REST)["speed"].max()
+        am.simulate(
+            PLANT, loop(replace(LAW, limits=limits), 4e-3), duration=0.35, initial_state=REST
+        )["speed"].max()
         for limits in ({}, {"speed": (-0.02, 0.02)})
     )
     assert free > 0.03
@@ -118,9 +136,12 @@ def test_a_limit_of_a_column_is_kept():
 def test_a_program_without_solution_is_stated_and_the_last_input_is_held():
     impossible = {"position": (REST["position"] + 5e-3, REST["position"] + 6e-3)}
     law = replace(LAW, limits=impossible, slack_weight=float("inf"))
-    memory, commands = law.init(), []
+    memory = law.init()
+    commands = []
     for _ in range(2):
-        measurement = Measurement({"position": REST["position"]}, {"position": REST["position"]}, {"fill": (0.0, 1.0)})
+        measurement = Measurement(
+            {"position": REST["position"]}, {"position": REST["position"]}, {"fill": (0.0, 1.0)}
+        )
         command, memory = law.step(memory, measurement, H)
         commands.append(command["fill"])
     assert commands == pytest.approx([OPEN["fill"]] * 2)
@@ -137,12 +158,18 @@ def test_a_program_without_solution_is_stated_and_the_last_input_is_held():
         ({"commanded": ("fil",)}, "fil"),
         ({"permitted": {"position": 1e-3}}, "fill"),
         ({"permitted": {"position": -1e-3, "fill": 0.2}}, "position"),
-        ({"limits": {"speed": (0.1, -0.1)}}, r"the limits of 'speed' are 0.1 and -0.1; the minimum must be below"),
+        (
+            {"limits": {"speed": (0.1, -0.1)}},
+            r"the limits of 'speed' are 0.1 and -0.1; the minimum must be below",
+        ),
         ({"limits": {"speed": (0.0, float("nan"))}}, r"the limits of 'speed' are 0 and nan"),
         ({"horizon": 0}, r"horizon is 0; allowed range: 1 to 200"),
         ({"substeps": 0}, r"substeps is 0; allowed range: 1 to 200"),
         ({"slack_weight": 0.0}, r"slack_weight is 0.0; it must be positive"),
-        ({"estimator": replace(FILTER, parameters=("mechanism.mass",))}, r"has the parameters mechanism\.mass; give"),
+        (
+            {"estimator": replace(FILTER, parameters=("mechanism.mass",))},
+            r"has the parameters mechanism\.mass; give",
+        ),
     ],
 )
 def test_a_controller_that_cannot_be_is_refused(changes: dict, message: str):
@@ -153,14 +180,17 @@ def test_a_controller_that_cannot_be_is_refused(changes: dict, message: str):
 def test_another_sample_time_than_that_of_the_estimator_is_refused():
     measurement = Measurement({"position": 0.02}, {"position": 0.02}, {"fill": (0.0, 1.0)})
     with pytest.raises(
-        ParameterError, match=r"the sample time of the loop is 0\.02 s and that of the estimator 0\.01 s"
+        ParameterError,
+        match=r"the sample time of the loop is 0\.02 s and that of the estimator 0\.01 s",
     ):
         LAW.step(LAW.init(), measurement, 0.02)
 
 
 def test_a_controller_can_be_sent_to_another_process():
     """Also after it has planned, when it holds the programs of the solver."""
-    wanted, low, high = np.array([REST["position"] + 1e-3]), np.zeros(1), np.ones(1)
+    wanted = np.array([REST["position"] + 1e-3])
+    low = np.zeros(1)
+    high = np.ones(1)
     first, _ = LAW.plan(FIRST.mean, wanted, low, high)
     again = pickle.loads(pickle.dumps(LAW))
     assert again._idle == []

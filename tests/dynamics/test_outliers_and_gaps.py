@@ -1,6 +1,8 @@
-"""Filters with outliers, missing values and lost samples; the smoother has the least squares of all noise.
+"""Filters with outliers, missing values and lost samples; the smoother has the least squares of all
+noise.
 
-An innovation nu is an outlier where nu^T S^-1 nu exceeds the quantile of the chi-squared distribution at the gate.
+An innovation nu is an outlier where nu^T S^-1 nu exceeds the quantile of the chi-squared
+distribution at the gate.
 """
 
 from __future__ import annotations
@@ -10,7 +12,12 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.control import ExtendedKalmanFilter, MovingHorizonEstimator, StateEstimate, UnscentedKalmanFilter
+from airmuscle.control import (
+    ExtendedKalmanFilter,
+    MovingHorizonEstimator,
+    StateEstimate,
+    UnscentedKalmanFilter,
+)
 from airmuscle.core import StateVariable, System
 from airmuscle.errors import ParameterError, SolveError
 
@@ -26,7 +33,9 @@ def lift_filter(kind=ExtendedKalmanFilter, measured=("pressure", "position"), **
 
 
 def noisy(outliers=0.0, rows=400, seed=3):
-    """A lifted load that is measured with noise; a part of the pressures is wrong by 50 sigma. The states, and rows."""
+    """A lifted load that is measured with noise; a part of the pressures is wrong by 50 sigma. The
+    states, and rows.
+    """
     time = H * np.arange(rows)
     command = am.Schedule({"fill": ((0.2, 0.4), (0.5, 0.0)), "discharge": ((1.2, 0.3), (1.5, 0.0))})
     run = am.simulate(LIFT, command, duration=float(time[-1]), initial_state=START, output_times=H)
@@ -40,7 +49,7 @@ def noisy(outliers=0.0, rows=400, seed=3):
         "discharge": np.where((time > 1.2 - 1e-9) & (time < 1.5 - 1e-9), 0.3, 0.0),
         "pressure": run["pressure"][kept] + SIGMA["pressure"] * random.normal(size=rows) + wrong,
         "position": run["position"][kept] + SIGMA["position"] * random.normal(size=rows),
-    }  # fmt: skip
+    }
     return {name: run[name][kept] for name in run.columns}, am.Recording(columns, "test")
 
 
@@ -60,9 +69,11 @@ def test_a_gate_keeps_outliers_out_of_the_estimate(kind):
 
 
 def test_the_gate_refuses_the_stated_part_of_true_measurements():
-    judged, free = lift_filter(gate=0.9), lift_filter()
+    judged = lift_filter(gate=0.9)
+    free = lift_filter()
     estimate = free.start(START, DEVIATIONS)
-    random, kept = np.random.default_rng(5), 0
+    random = np.random.default_rng(5)
+    kept = 0
     _, innovation = free.correct(estimate, [2e5, START["position"]], [0.0, 0.0])
     root = np.linalg.cholesky(innovation.covariance)
     centre = np.array([2e5, START["position"]]) - innovation.difference
@@ -74,7 +85,8 @@ def test_the_gate_refuses_the_stated_part_of_true_measurements():
 
 @pytest.mark.parametrize("kind", [ExtendedKalmanFilter, UnscentedKalmanFilter])
 def test_without_a_value_the_others_correct_the_estimate(kind):
-    both, alone = lift_filter(kind), lift_filter(kind, ("position",))
+    both = lift_filter(kind)
+    alone = lift_filter(kind, ("position",))
     estimate = both.start(START, DEVIATIONS)
     found, innovation = both.correct(estimate, [np.nan, START["position"] + 1e-4], [0.0, 0.0])
     expected, other = alone.correct(estimate, [START["position"] + 1e-4], [0.0, 0.0])
@@ -91,7 +103,9 @@ def test_lost_rows_are_bridged_by_predictions_as_rows_without_values_are():
     lost = np.isin(np.arange(100), [10, 11, 12, 60, 77])
     judged = lift_filter()
     first = judged.start(START, DEVIATIONS)
-    shorter = judged.estimate(am.Recording({n: record[n][~lost] for n in record.columns}, "test"), first)
+    shorter = judged.estimate(
+        am.Recording({n: record[n][~lost] for n in record.columns}, "test"), first
+    )
     hollow = {n: record[n].copy() for n in record.columns}
     for name in SIGMA:
         hollow[name][lost] = np.nan
@@ -102,7 +116,8 @@ def test_lost_rows_are_bridged_by_predictions_as_rows_without_values_are():
 
 def test_a_gate_beyond_its_range_is_refused():
     with pytest.raises(
-        ParameterError, match=r"ExtendedKalmanFilter: gate is 0\.0; allowed range: above 0, 1 \(no gate\)"
+        ParameterError,
+        match=r"ExtendedKalmanFilter: gate is 0\.0; allowed range: above 0, 1 \(no gate\)",
     ):
         lift_filter(gate=0.0)
 
@@ -114,7 +129,10 @@ class Oscillator(System):
     inputs = ("force",)
 
     def rates(self, state, inputs):
-        return {"position": state["speed"], "speed": inputs["force"] - 4.0 * state["position"] - 0.4 * state["speed"]}
+        return {
+            "position": state["speed"],
+            "speed": inputs["force"] - 4.0 * state["position"] - 0.4 * state["speed"],
+        }
 
     def outputs(self, state, inputs):
         return {"sum": state["position"] + 0.5 * state["speed"]}
@@ -122,8 +140,11 @@ class Oscillator(System):
 
 def oscillation(rows=30):
     """A filter of the oscillator, a record with missing values, and the first estimate."""
-    h, random = 0.1, np.random.default_rng(7)
-    judged = ExtendedKalmanFilter(Oscillator(), ("sum",), h, {"position": 0.05, "speed": 0.3}, {"sum": 0.2})
+    h = 0.1
+    random = np.random.default_rng(7)
+    judged = ExtendedKalmanFilter(
+        Oscillator(), ("sum",), h, {"position": 0.05, "speed": 0.3}, {"sum": 0.2}
+    )
     values = random.normal(size=rows)
     values[[k for k in (4, 5, 20) if k < rows]] = np.nan
     columns = {"time": h * np.arange(rows), "force": np.sin(np.arange(rows)), "sum": values}
@@ -133,7 +154,9 @@ def oscillation(rows=30):
 
 def noise_equations(judged, record, first):
     """Matrix and right side of all noise in standard deviations, by the states of all samples."""
-    rows, equations, right = len(record["time"]), [], []
+    rows = len(record["time"])
+    equations = []
+    right = []
 
     def add(blocks, value, deviation):
         row = np.zeros(2 * rows)
@@ -154,21 +177,25 @@ def noise_equations(judged, record, first):
 
 
 def test_the_smoother_of_a_linear_plant_has_the_least_squares_of_all_noise():
-    """All states of all samples as unknowns of one least-squares problem, an independent solution."""
+    """All states of all samples as unknowns of one least-squares problem, an independent
+    solution.
+    """
     judged, record, first = oscillation()
     found = judged.smooth(record, first)
     exact = np.linalg.lstsq(*noise_equations(judged, record, first), rcond=None)[0].reshape(-1, 2)
-    assert np.column_stack([found["position"], found["speed"]]) == pytest.approx(exact, rel=1e-8, abs=1e-10)
+    assert np.column_stack([found["position"], found["speed"]]) == pytest.approx(
+        exact, rel=1e-8, abs=1e-10
+    )
 
 
 def test_smoothed_estimates_of_a_lift_are_closer_than_filtered_ones():
     """The truth has the noise of the filter, by the simulated plant."""
-    judged, random, stepper = (
-        lift_filter(measured=("position",)),
-        np.random.default_rng(11),
-        am.engine.Stepper(LIFT, START),
-    )
-    deviations, states, inputs = np.sqrt(np.diag(judged.noise)), [stepper.state.copy()], []
+    judged = lift_filter(measured=("position",))
+    random = np.random.default_rng(11)
+    stepper = am.engine.Stepper(LIFT, START)
+    deviations = np.sqrt(np.diag(judged.noise))
+    states = [stepper.state.copy()]
+    inputs = []
     for k in range(400):
         inputs.append([0.3 * (k % 80 < 20), 0.2 * (k % 80 >= 60)])
         stepper.step(inputs[-1], H)
@@ -177,11 +204,20 @@ def test_smoothed_estimates_of_a_lift_are_closer_than_filtered_ones():
     truth = dict(zip(judged.states, np.array(states).T, strict=True))
     fill, discharge = np.array([*inputs, [0.0, 0.0]]).T
     position = truth["position"] + SIGMA["position"] * random.normal(size=401)
-    columns = {"time": H * np.arange(401), "fill": fill, "discharge": discharge, "position": position}
-    record, first = am.Recording(columns, "test"), judged.start(START, {"position": 1e-5})
-    filtered, smoothed = judged.estimate(record, first), judged.smooth(record, first)
+    columns = {
+        "time": H * np.arange(401),
+        "fill": fill,
+        "discharge": discharge,
+        "position": position,
+    }
+    record = am.Recording(columns, "test")
+    first = judged.start(START, {"position": 1e-5})
+    filtered = judged.estimate(record, first)
+    smoothed = judged.smooth(record, first)
     for name in judged.states:
-        errors = [np.sqrt(np.mean((each[name] - truth[name]) ** 2)) for each in (filtered, smoothed)]
+        errors = [
+            np.sqrt(np.mean((each[name] - truth[name]) ** 2)) for each in (filtered, smoothed)
+        ]
         assert errors[1] < 0.85 * errors[0], name
     assert smoothed["force"][-1] == filtered["force"][-1]
 
@@ -189,7 +225,8 @@ def test_smoothed_estimates_of_a_lift_are_closer_than_filtered_ones():
 class Lag(System):
     """y' = eps - y."""
 
-    states, inputs = (StateVariable("y", "1", 1.0),), ("contraction",)
+    states = (StateVariable("y", "1", 1.0),)
+    inputs = ("contraction",)
 
     def rates(self, state, inputs):
         return {"y": inputs.get("contraction", 0.0) - state["y"]}
@@ -202,25 +239,43 @@ class Decay(Lag):
     inputs = ()
 
 
-@pytest.mark.parametrize(("plant", "end"), [(Lag(), 0.25), (Decay(), 0.0)], ids=["converted input", "no input"])
-def test_inputs_are_the_columns_of_a_recording_also_converted_ones_and_a_plant_may_have_none(plant, end):
+@pytest.mark.parametrize(
+    ("plant", "end"), [(Lag(), 0.25), (Decay(), 0.0)], ids=["converted input", "no input"]
+)
+def test_inputs_are_the_columns_of_a_recording_also_converted_ones_and_a_plant_may_have_none(
+    plant, end
+):
     judged = ExtendedKalmanFilter(plant, ("double",), 0.5, {}, {"double": 1.0})
-    columns = {"time": 0.5 * np.arange(40), "double": np.full(40, np.nan), "length": np.full(40, 0.15)}
+    columns = {
+        "time": 0.5 * np.arange(40),
+        "double": np.full(40, np.nan),
+        "length": np.full(40, 0.15),
+    }
     record = am.Recording(columns, "test", {"resting_length": 0.2})
-    assert judged.estimate(record, judged.start({"y": 0.0}, {}))["y"][-1] == pytest.approx(end, abs=1e-6)
+    assert judged.estimate(record, judged.start({"y": 0.0}, {}))["y"][-1] == pytest.approx(
+        end, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize("kind", [ExtendedKalmanFilter, UnscentedKalmanFilter])
 def test_a_sample_needs_one_value_for_each_measured_column_and_each_input(kind):
     judged = lift_filter(kind)
     estimate = judged.start(START, DEVIATIONS)
-    with pytest.raises(ParameterError, match=r"the measured values are \[200000\.0\], 1; needed are pressure, pos"):
+    with pytest.raises(
+        ParameterError, match=r"the measured values are \[200000\.0\], 1; needed are pressure, pos"
+    ):
         judged.correct(estimate, [2e5], [0.0, 0.0])
-    with pytest.raises(ParameterError, match=r"the inputs are \[0\.1\], 1; needed are fill, discharge"):
+    with pytest.raises(
+        ParameterError, match=r"the inputs are \[0\.1\], 1; needed are fill, discharge"
+    ):
         judged.predict(estimate, [0.1])
-    with pytest.raises(ParameterError, match=r"the inputs are \[0\.1\], 1; needed are fill, discharge"):
+    with pytest.raises(
+        ParameterError, match=r"the inputs are \[0\.1\], 1; needed are fill, discharge"
+    ):
         judged.columns(estimate, [0.1])
-    with pytest.raises(ParameterError, match=r"the states are \[0\.0\], 1; needed are air_mass, position, speed"):
+    with pytest.raises(
+        ParameterError, match=r"the states are \[0\.0\], 1; needed are air_mass, position, speed"
+    ):
         judged.columns(StateEstimate(np.zeros(1), np.eye(1)), [0.0, 0.0])
 
 
@@ -232,20 +287,26 @@ def test_without_bounds_the_moving_horizon_of_a_linear_plant_is_the_kalman_filte
     judged, record, first = oscillation()
     kept = np.arange(30) != 12  # a lost sample
     record = am.Recording({name: record[name][kept] for name in record}, "test")
-    exact, found = judged.estimate(record, first), MovingHorizonEstimator(judged, horizon).estimate(record, first)
+    exact = judged.estimate(record, first)
+    found = MovingHorizonEstimator(judged, horizon).estimate(record, first)
     for name in judged.states:
         assert found[name] == pytest.approx(exact[name], abs=1e-9)
 
 
 def test_the_moving_horizon_has_the_least_squares_within_bounds():
-    """All states of all samples as unknowns of a bounded least-squares problem, an independent solution."""
+    """All states of all samples as unknowns of a bounded least-squares problem, an independent
+    solution.
+    """
     from scipy.optimize import lsq_linear
 
     judged, record, first = oscillation(12)
-    low, high = -0.05, 0.03
+    low = -0.05
+    high = 0.03
     found = MovingHorizonEstimator(judged, 40, {"position": (low, high)}).estimate(record, first)
     limits = np.tile([low, -np.inf], 12), np.tile([high, np.inf], 12)
-    best = lsq_linear(*noise_equations(judged, record, first), limits, method="bvls", tol=1e-14).x.reshape(-1, 2)
+    best = lsq_linear(
+        *noise_equations(judged, record, first), limits, method="bvls", tol=1e-14
+    ).x.reshape(-1, 2)
     assert (np.isclose(best[:, 0], high) | np.isclose(best[:, 0], low)).sum() > 2
     assert [found["position"][-1], found["speed"][-1]] == pytest.approx(best[-1], abs=1e-9)
     assert found["position"].min() >= low - 1e-9
@@ -253,16 +314,22 @@ def test_the_moving_horizon_has_the_least_squares_within_bounds():
 
 
 def test_a_bound_that_is_known_brings_the_estimate_of_a_lift_closer():
-    """The load is at rest; the filter starts with a wrong position, which its speed would explain."""
+    """The load is at rest; the filter starts with a wrong position, which its speed would
+    explain.
+    """
     truth, record = noisy(rows=30)
     judged = lift_filter(measured=("position",))
-    first = judged.start({**START, "position": START["position"] + 1e-3}, {"position": 1e-3, "speed": 0.2})
+    first = judged.start(
+        {**START, "position": START["position"] + 1e-3}, {"position": 1e-3, "speed": 0.2}
+    )
     plain = judged.estimate(record, first)
     found = MovingHorizonEstimator(judged, 5, {"speed": (-2e-3, 2e-3)}).estimate(record, first)
     assert np.abs(truth["speed"]).max() < 1e-6
     assert np.abs(plain["speed"]).max() > 4e-3
     assert np.abs(found["speed"]).max() <= 2e-3 + 1e-9
-    assert np.abs(found["force"] - truth["force"])[-1] < np.abs(plain["force"] - truth["force"]).max()
+    assert (
+        np.abs(found["force"] - truth["force"])[-1] < np.abs(plain["force"] - truth["force"]).max()
+    )
 
 
 def test_an_impossible_window_is_refused():

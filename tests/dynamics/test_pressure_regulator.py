@@ -1,7 +1,9 @@
-"""A pressure regulator passes steps after rest, and hardly a fast sine or a quick reversal of the same size.
+"""A pressure regulator passes steps after rest, and hardly a fast sine or a quick reversal of the
+same size.
 
-The published tables are in files/library/data/smc-itv2050.toml; `docs/make_regulator_figure.py` measures a model as the record
-was measured, and docs/regulators.md states the errors that are claimed here.
+The published tables are in files/library/data/smc-itv2050.toml; `docs/make_regulator_figure.py`
+measures a model as the record was measured, and docs/regulators.md states the errors that are
+claimed here.
 """
 
 from __future__ import annotations
@@ -19,18 +21,45 @@ import airmuscle as am
 from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, IdentificationError, ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.physics import Isothermal, Manifold, SharedSupply, Supply, Tank, Valve, WithEnergyMeters
+from airmuscle.physics import (
+    Isothermal,
+    Manifold,
+    SharedSupply,
+    Supply,
+    Tank,
+    Valve,
+    WithEnergyMeters,
+)
 from airmuscle.recording import Recording
 
 DOCS = Path(__file__).parents[2] / "docs"
 ITV = am.load("vessel-smc-itv2050").plant
-RECORD = [(0.0, 3e5), (0.5, 3.2e5), (1.6, 3e5), (2.7, 2.6e5), (2.8, 3e5), (3.9, 3.1e5), (4.05, 2.9e5), (4.2, 3.1e5),
-          (4.35, 2.9e5), (4.5, 3e5), (5.5, 5.6e5), (6.5, 2e4), (7.5, 3e5), (8.5, 3.05e5), (9.5, 3e5)]  # fmt: skip
-"""Steps after rest, reversals after 150 ms, and steps over the whole range: instants [s] and commands [Pa]."""
+RECORD = [
+    (0.0, 3e5),
+    (0.5, 3.2e5),
+    (1.6, 3e5),
+    (2.7, 2.6e5),
+    (2.8, 3e5),
+    (3.9, 3.1e5),
+    (4.05, 2.9e5),
+    (4.2, 3.1e5),
+    (4.35, 2.9e5),
+    (4.5, 3e5),
+    (5.5, 5.6e5),
+    (6.5, 2e4),
+    (7.5, 3e5),
+    (8.5, 3.05e5),
+    (9.5, 3e5),
+]
+"""Steps after rest, reversals after 150 ms, and steps over the whole range: instants [s] and
+commands [Pa].
+"""
 
 
 def figure_script():
-    spec = importlib.util.spec_from_file_location("make_regulator_figure", DOCS / "make_regulator_figure.py")
+    spec = importlib.util.spec_from_file_location(
+        "make_regulator_figure", DOCS / "make_regulator_figure.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -40,7 +69,9 @@ script = figure_script()
 
 
 def passes(row):
-    """The three tests: sustained sine, step after rest, quick reversal; each within 5 points of the measurement."""
+    """The three tests: sustained sine, step after rest, quick reversal; each within 5 points of the
+    measurement.
+    """
     effects = script.FACTS["effects"]
     return {
         "sine": abs(row["40 kPa at 4 Hz"] - effects["sine_40kPa_4Hz"]) <= 0.05,
@@ -61,7 +92,8 @@ def test_the_regulator_passes_the_three_tests_together(fitted):
 @pytest.mark.parametrize(
     ("name", "failed"),
     widened(
-        [("O", {"sine", "reversal"}), ("BL", {"step", "reversal"}), ("B", {"reversal"})], lambda name, _: name == "O"
+        [("O", {"sine", "reversal"}), ("BL", {"step", "reversal"}), ("B", {"reversal"})],
+        lambda name, _: name == "O",
     ),
 )
 def test_no_published_structure_passes_them(name, failed):
@@ -97,7 +129,9 @@ def two_regulators(volume):
     part = replace(ITV.circuit, supply=SharedSupply())
     tank = Tank(Supply(6e5), Valve(2e-9, 0.3), volume, Isothermal())
     muscles = tuple(replace(ITV.muscles[0], name=name) for name in ("first", "second"))
-    return am.Plant(muscles, Manifold(tank, (part, part), ("one", "two")), ITV.mechanism, Isothermal())
+    return am.Plant(
+        muscles, Manifold(tank, (part, part), ("one", "two")), ITV.mechanism, Isothermal()
+    )
 
 
 def test_a_shared_supply_sinks_and_its_books_close():
@@ -105,15 +139,29 @@ def test_a_shared_supply_sinks_and_its_books_close():
     metered = WithEnergyMeters(plant)
     start = metered.extend_state(plant.state_at(pressure=5e4))
     steps = am.Schedule(
-        {"one.setpoint": [(0.0, 5e4), (0.1, 5.5e5)], "two.setpoint": [(0.0, 5e4), (0.1, 3e5), (0.6, 5e4)]}
+        {
+            "one.setpoint": [(0.0, 5e4), (0.1, 5.5e5)],
+            "two.setpoint": [(0.0, 5e4), (0.1, 3e5), (0.6, 5e4)],
+        }
     )
-    run = am.simulate(metered, steps, duration=1.0, initial_state=start, integrator=Rodas4(1e-9), output_times=0.01)
+    run = am.simulate(
+        metered,
+        steps,
+        duration=1.0,
+        initial_state=start,
+        integrator=Rodas4(1e-9),
+        output_times=0.01,
+    )
     gained = run["air_total"] - run["air_total"][0]
-    np.testing.assert_allclose(gained, run["air_supplied"] - run["air_exhausted"], atol=1e-9 * run["air_total"][0])
+    np.testing.assert_allclose(
+        gained, run["air_supplied"] - run["air_exhausted"], atol=1e-9 * run["air_total"][0]
+    )
     assert run["air_exhausted"][-1] > 0.1 * run["air_supplied"][-1] > 0
     reached = run["first.pressure"][60]
     wide = two_regulators(0.05)
-    alone = am.simulate(wide, steps, duration=1.0, initial_state=wide.state_at(pressure=5e4), output_times=0.01)
+    alone = am.simulate(
+        wide, steps, duration=1.0, initial_state=wide.state_at(pressure=5e4), output_times=0.01
+    )
     assert alone["first.pressure"][60] - reached > 5e4
 
 
@@ -121,8 +169,13 @@ def test_a_shared_supply_sinks_and_its_books_close():
 
 
 def record(steps, noise=1e3, zero=-8e3):
-    run = am.simulate(ITV, am.Schedule({"setpoint": steps}), duration=steps[-1][0] + 1.0, output_times=5e-3,
-                      initial_state=ITV.state_at(pressure=steps[0][1]))  # fmt: skip
+    run = am.simulate(
+        ITV,
+        am.Schedule({"setpoint": steps}),
+        duration=steps[-1][0] + 1.0,
+        output_times=5e-3,
+        initial_state=ITV.state_at(pressure=steps[0][1]),
+    )
     instants, levels = np.array(steps).T
     command = levels[np.searchsorted(instants, run["time"] + 1e-9, side="right") - 1]
     sensed = run["pressure"] + np.random.default_rng(1).normal(zero, noise, len(run))
@@ -131,40 +184,61 @@ def record(steps, noise=1e3, zero=-8e3):
 
 def test_a_record_with_reversals_determines_the_regulator():
     fit = am.bench.fit_regulator([record(RECORD)], supply_pressure=0.578e6)
-    truth, found = ITV.circuit, fit.regulator
+    truth = ITV.circuit
+    found = fit.regulator
     assert fit.fit.rms("pressure") < 1.2e3
     assert found.pilot_time == pytest.approx(truth.pilot_time, rel=0.05)
     assert found.dead_time == pytest.approx(truth.dead_time, abs=2e-3)
     assert found.overlap * found.band == pytest.approx(truth.overlap * truth.band, rel=0.1)
-    assert found.fill.conductance / found.band == pytest.approx(truth.fill.conductance / truth.band, rel=0.05)
+    assert found.fill.conductance / found.band == pytest.approx(
+        truth.fill.conductance / truth.band, rel=0.05
+    )
     assert fit.zeros[0] == pytest.approx(-8e3, abs=600)
 
 
 def test_what_a_record_excites_too_little_is_named_with_the_command_that_would():
     run = record([(0.0, 3e5), (0.5, 3.2e5)])
-    missing = run.with_columns(pressure=np.where(np.arange(len(run)) == 50, np.nan, run["pressure"]))
+    missing = run.with_columns(
+        pressure=np.where(np.arange(len(run)) == 50, np.nan, run["pressure"])
+    )
     fit = am.bench.fit_regulator([missing], supply_pressure=0.578e6)
     assert np.isfinite(fit.zeros).all()
-    assert any("circuit.discharge.conductance is not determined; give a step down" in each for each in fit.remarks)
+    assert any(
+        "circuit.discharge.conductance is not determined; give a step down" in each
+        for each in fit.remarks
+    )
     assert "too little excited: circuit.overlap" in str(fit)
 
 
 @pytest.mark.parametrize(
     ("change", "kind", "message"),
     [
-        (lambda r: Recording({n: r[n] for n in ("time", "pressure")}, "made"), ColumnError, "no column 'setpoint'"),
-        (lambda r: Recording({**r.columns, "setpoint": 0 * r["time"]}, "made"), IdentificationError, "setpoint varies by 0 kPa"),
-        (lambda r: Recording({**r.columns, "pressure": 0 * r["time"]}, "made"), IdentificationError, "Record steps up and down"),
+        (
+            lambda r: Recording({n: r[n] for n in ("time", "pressure")}, "made"),
+            ColumnError,
+            "no column 'setpoint'",
+        ),
+        (
+            lambda r: Recording({**r.columns, "setpoint": 0 * r["time"]}, "made"),
+            IdentificationError,
+            "setpoint varies by 0 kPa",
+        ),
+        (
+            lambda r: Recording({**r.columns, "pressure": 0 * r["time"]}, "made"),
+            IdentificationError,
+            "Record steps up and down",
+        ),
         (lambda r: r.rows(slice(0, 0)), IdentificationError, "setpoint varies by 0 kPa"),
     ],
-)  # fmt: skip
+)
 def test_a_record_without_excitation_is_refused(change, kind, message):
     with pytest.raises(kind, match=message):
         am.bench.fit_regulator([change(record([(0.0, 3e5), (0.5, 3.2e5)]))], supply_pressure=6e5)
 
 
 def test_the_command_writes_a_regulator_that_a_scenario_takes(tmp_path):
-    made, out = record(RECORD[:11]), tmp_path / "out"
+    made = record(RECORD[:11])
+    out = tmp_path / "out"
     kilopascal = {
         "time": made["time"],
         "setpoint [kPa]": 1e-3 * made["setpoint"],
@@ -183,4 +257,6 @@ def test_the_command_writes_a_regulator_that_a_scenario_takes(tmp_path):
 
 def test_an_unknown_parameter_is_named():
     with pytest.raises(ParameterError, match=r"unknown parameter 'gain'.*among fill\.conductance"):
-        am.bench.fit_regulator([record([(0.0, 3e5), (0.5, 3.2e5)])], supply_pressure=6e5, free=("gain",))
+        am.bench.fit_regulator(
+            [record([(0.0, 3e5), (0.5, 3.2e5)])], supply_pressure=6e5, free=("gain",)
+        )

@@ -1,5 +1,6 @@
-"""From equations to machine code: every operation means the same in floats, arrays, symbols and print; what silently
-goes wrong in a trace is refused; kernels compile once per machine, and say so."""
+"""From equations to machine code: every operation means the same in floats, arrays, symbols and
+print; what silently goes wrong in a trace is refused; kernels compile once per machine, and say
+so."""
 
 from __future__ import annotations
 
@@ -46,12 +47,20 @@ def test_jax_arrays_are_accepted(name):
 
 
 def test_the_printed_jacobian_solves_the_shifted_system():
-    """factor and solve are (d I - J)^-1, and stage is that of f + g, for a full two by two Jacobian."""
+    """factor and solve are (d I - J)^-1, and stage is that of f + g, for a full two by two
+    Jacobian.
+    """
     ready = compile_system(Formula("angles"))
-    x, h = np.array([0.4, -0.7]), 1e-6
-    jacobian = np.column_stack([(ready.rates(x + h * e, []) - ready.rates(x - h * e, [])) / (2 * h) for e in np.eye(2)])
-    f, values = np.empty(2), np.empty(ready.sizes.jacobian)
-    factors, g, k = np.empty(ready.sizes.factors), np.array([1.0, -2.0]), np.empty(2)
+    x = np.array([0.4, -0.7])
+    h = 1e-6
+    jacobian = np.column_stack(
+        [(ready.rates(x + h * e, []) - ready.rates(x - h * e, [])) / (2 * h) for e in np.eye(2)]
+    )
+    f = np.empty(2)
+    values = np.empty(ready.sizes.jacobian)
+    factors = np.empty(ready.sizes.factors)
+    g = np.array([1.0, -2.0])
+    k = np.empty(2)
     none = np.zeros(1)
     ready.call("jac", x, none, ready.precomputed, f, values)
     np.testing.assert_allclose(values.reshape(2, 2), jacobian, rtol=1e-7)
@@ -62,7 +71,9 @@ def test_the_printed_jacobian_solves_the_shifted_system():
 
 @model
 class Silent(System):
-    """What a law must not do: math.nan stands for math.sqrt or float() of a symbol, which make it silently."""
+    """What a law must not do: math.nan stands for math.sqrt or float() of a symbol, which make it
+    silently.
+    """
 
     inputs = ()
 
@@ -88,7 +99,10 @@ class Forgetful(Silent):
 def test_a_constant_that_is_not_finite_names_the_law():
     with pytest.raises(
         TraceError,
-        match=r"Silent: the traced expression contains a constant that is not finite. Use airmuscle.core.ops",
+        match=(
+            r"Silent: the traced expression contains a constant that is not finite. Use"
+            r" airmuscle.core.ops"
+        ),
     ):
         compile_system(Silent())
     with pytest.raises(TraceError, match=r"states are \['x'\], but rates are given for \[\]"):
@@ -96,7 +110,8 @@ def test_a_constant_that_is_not_finite_names_the_law():
 
 
 def test_slopes_are_exact_and_equal_in_every_world():
-    x, h = 0.8, 1e-6
+    x = 0.8
+    h = 1e-6
 
     @model
     class Wave:
@@ -115,9 +130,13 @@ def test_slopes_are_exact_and_equal_in_every_world():
 
 
 def test_where_two_numbers_are_equal_one_is_the_larger_and_the_other_the_smaller():
-    """Otherwise their slopes vanish together, and with them the Jacobian of a flow at equal pressures."""
+    """Otherwise their slopes vanish together, and with them the Jacobian of a flow at equal
+    pressures.
+    """
     x, y = casadi.SX.sym("x"), casadi.SX.sym("y")
-    both = casadi.vertcat(ops.maximum(x, y) + ops.minimum(x, y), ops.maximum(x, y) - ops.minimum(x, y))
+    both = casadi.vertcat(
+        ops.maximum(x, y) + ops.minimum(x, y), ops.maximum(x, y) - ops.minimum(x, y)
+    )
     slopes = casadi.Function("slopes", [x, y], [casadi.jacobian(both, casadi.vertcat(x, y))])
     np.testing.assert_array_equal(np.array(slopes(2.0, 2.0)), [[1.0, 1.0], [1.0, -1.0]])
 
@@ -143,17 +162,22 @@ def test_a_parameter_is_checked_when_a_model_is_made(value, message):
 
 @pytest.mark.slow
 def test_kernels_compile_once_per_machine_and_say_so(tmp_path):
-    """Three processes in a row leave the cache folder with the same number of files; only the first says a word."""
+    """Three processes in a row leave the cache folder with the same number of files; only the first
+    says a word.
+    """
     code = (
-        "import airmuscle as am; from airmuscle.units import bar\n"
-        "plant = am.Plant(am.load('chou-hannaford').muscle, "
-        "am.FillDischarge(am.Supply(6 * bar), am.Valve(1e-9, 0.4), am.Valve(1e-9, 0.4)), am.Isometric(0.05))\n"
-        "am.simulate(plant, am.Schedule({'fill': ((0.0, 1.0),)}), duration=1.0)"
+        "import airmuscle as am; from airmuscle.units import bar\nplant ="
+        " am.Plant(am.load('chou-hannaford').muscle, am.FillDischarge(am.Supply(6 * bar),"
+        " am.Valve(1e-9, 0.4), am.Valve(1e-9, 0.4)), am.Isometric(0.05))\nam.simulate(plant,"
+        " am.Schedule({'fill': ((0.0, 1.0),)}), duration=1.0)"
     )
     environment = {**os.environ, "AIRMUSCLE_CACHE_DIR": str(tmp_path)}
-    files, words = [], []
+    files = []
+    words = []
     for _ in range(3):
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+        )
         assert done.returncode == 0, done.stderr
         files.append(sum(1 for path in tmp_path.rglob("*") if path.is_file()))
         words.append(done.stderr)

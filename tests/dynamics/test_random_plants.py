@@ -1,9 +1,11 @@
-"""Plants composed at random from every model, within the declared bounds: each runs, ends with a reason, or is refused.
+"""Plants composed at random from every model, within the declared bounds: each runs, ends with a
+reason, or is refused.
 
-No exception of another package is raised, no number is NaN, and the books of air mass, of the air's energy and of the
-mechanism close. The tolerances of the books, relative to what was held or turned over, are chosen; that of the mass is
-not less than one rounding error a step. Where the energies of a plant are small beside the tolerance of the integrator,
-its energy books close with a smaller tolerance.
+No exception of another package is raised, no number is NaN, and the books of air mass, of the air's
+energy and of the mechanism close. The tolerances of the books, relative to what was held or turned
+over, are chosen; that of the mass is not less than one rounding error a step. Where the energies of
+a plant are small beside the tolerance of the integrator, its energy books close with a smaller
+tolerance.
 """
 
 from __future__ import annotations
@@ -44,18 +46,28 @@ VALVE = Valve(1e-8, 0.3)
 def gaps(run):
     """The largest gap of each book, relative to what was held or turned over."""
     mechanical = run["kinetic_energy"] + run["potential_energy"]
-    losses, work = run["mechanism_loss"], run["work_of_tension"]
-    flow, heat, expansion = run["energy_of_flow"], run["heat_to_air"], run["work_of_air"]
+    losses = run["mechanism_loss"]
+    work = run["work_of_tension"]
+    flow = run["energy_of_flow"]
+    heat = run["heat_to_air"]
+    expansion = run["work_of_air"]
     books = {
         "mass": (
             run["air_total"],
             run["air_supplied"] - run["air_exhausted"],
             run["air_total"].max() + turnover(run["air_supplied"], run["air_exhausted"]),
         ),
-        "air": (run["air_energy"], flow + heat - expansion, run["air_energy"].max() + turnover(flow, heat, expansion)),
+        "air": (
+            run["air_energy"],
+            flow + heat - expansion,
+            run["air_energy"].max() + turnover(flow, heat, expansion),
+        ),
         "mechanical": (mechanical, work - losses, turnover(mechanical, work, losses) + 1e-3),
     }
-    return {name: np.abs(held - held[0] - brought).max() / size for name, (held, brought, size) in books.items()}
+    return {
+        name: np.abs(held - held[0] - brought).max() / size
+        for name, (held, brought, size) in books.items()
+    }
 
 
 def turnover(*columns):
@@ -67,7 +79,8 @@ def outcome(seed):
     composer = Composer(seed)
     try:
         plant = composer.plant()
-        start, command = composer.state(plant), composer.command(plant, DURATION)
+        start = composer.state(plant)
+        command = composer.command(plant, DURATION)
     except AirmuscleError as refusal:
         return type(refusal).__name__
     metered = WithEnergyMeters(plant)
@@ -97,7 +110,9 @@ def energies_close(run, plant):
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(2), *(pytest.param(range(n, n + 20), marks=pytest.mark.slow) for n in (2, 22))], ids=str
+    "seeds",
+    [range(2), *(pytest.param(range(n, n + 20), marks=pytest.mark.slow) for n in (2, 22))],
+    ids=str,
 )
 def test_a_plant_composed_at_random_runs_or_ends_with_a_reason_or_is_refused(seeds):
     outcomes = collections.Counter(outcome(seed) for seed in seeds)
@@ -105,7 +120,9 @@ def test_a_plant_composed_at_random_runs_or_ends_with_a_reason_or_is_refused(see
 
 
 def test_the_energy_of_a_mechanism_with_a_residual_closes():
-    """Two joints without tension and gravity, which the torques of the residual alone move: friction takes their work."""
+    """Two joints without tension and gravity, which the torques of the residual alone move:
+    friction takes their work.
+    """
     plant = Composer(2364).plant()
     assert any(isinstance(part, GaussianResidual) for part in models_in(plant.mechanism))
     assert outcome(2364) is Status.DONE
@@ -114,7 +131,9 @@ def test_the_energy_of_a_mechanism_with_a_residual_closes():
 @pytest.mark.slow
 @pytest.mark.parametrize("part", range(20))
 def test_so_do_two_thousand(part):
-    outcomes = collections.Counter(outcome(seed) for seed in range(1000 + 100 * part, 1100 + 100 * part))
+    outcomes = collections.Counter(
+        outcome(seed) for seed in range(1000 + 100 * part, 1100 + 100 * part)
+    )
     assert outcomes[Status.DONE] >= 33, outcomes
 
 
@@ -141,5 +160,7 @@ def test_a_supply_below_absolute_vacuum_is_refused_with_its_plant(supply):
     muscle = next(thing for thing in STOCK if thing.__name__ == "Muscle")
     parts = STOCK[muscle][0], FillDischarge(supply, VALVE, VALVE), HangingMass(10.0), Isothermal()
     assert Plant(*parts).circuits
-    with pytest.raises(ParameterError, match=r"Supply.pressure .* is -90 kPa, .* allowed range: above -58 kPa"):
+    with pytest.raises(
+        ParameterError, match=r"Supply.pressure .* is -90 kPa, .* allowed range: above -58 kPa"
+    ):
         Plant(*parts, Ambient(pressure=5.8e4))

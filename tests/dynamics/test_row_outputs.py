@@ -18,9 +18,19 @@ from airmuscle.engine.run.solution import RowRecorder
 from airmuscle.physics import HangingMass
 
 BY_DEFAULT = {
-    "surface", "stand-in", "circle", "tondu-lopez", "sarosi", "Catenary", "stop, lagging wall", "Maxwell slip", "heat",
-    "real gas", "polytropic", "Serres",
-}  # fmt: skip
+    "surface",
+    "stand-in",
+    "circle",
+    "tondu-lopez",
+    "sarosi",
+    "Catenary",
+    "stop, lagging wall",
+    "Maxwell slip",
+    "heat",
+    "real gas",
+    "polytropic",
+    "Serres",
+}
 """Laws with and without branches and functions of the C library."""
 TOLERANCE = 1e-11
 """Rounding, relative to the largest value of a column: differences of forces lose digits."""
@@ -28,7 +38,8 @@ TOLERANCE = 1e-11
 
 def points(compiled, count):
     """States and inputs at random, about the nominal sizes of the states."""
-    rng, sizes = np.random.default_rng(5), compiled.sizes
+    rng = np.random.default_rng(5)
+    sizes = compiled.sizes
     states = compiled.nominal * rng.uniform(0.02, 1.5, (count, sizes.states))
     return np.ascontiguousarray(states), rng.integers(0, 2, (count, sizes.inputs)).astype(float)
 
@@ -71,14 +82,18 @@ def test_a_row_does_not_depend_on_how_many_there_are(count):
     everything = in_rows(compiled, states, inputs)
     for first in (0, 3):
         part = slice(first, first + count)
-        assert np.array_equal(in_rows(compiled, states[part].copy(), inputs[part]), everything[part])
+        assert np.array_equal(
+            in_rows(compiled, states[part].copy(), inputs[part]), everything[part]
+        )
 
 
 def test_many_outputs_are_computed_one_by_one():
     """Machine code of a large plant's outputs is not generated twice."""
     plant = EXAMPLES["surface"]
     muscles = tuple(dataclasses.replace(plant.muscles[0], name=f"muscle{i}") for i in range(12))
-    large = dataclasses.replace(plant, muscle=muscles, circuit=plant.circuits * 12, mechanism=HangingMass(60.0))
+    large = dataclasses.replace(
+        plant, muscle=muscles, circuit=plant.circuits * 12, mechanism=HangingMass(60.0)
+    )
     compiled = compile_system(large)
     assert compiled.program.outputs_at_rows == (compiled.address["outputs"], 1)
     states, inputs = points(compiled, 7)
@@ -92,11 +107,15 @@ def test_many_outputs_are_computed_one_by_one():
 )
 def test_the_inputs_of_a_row_are_those_of_the_segment_that_holds_or_begins_there(ends, times, seed):
     compiled = compile_system(EXAMPLES["surface"])
-    rng, sizes, times = np.random.default_rng(seed), compiled.sizes, np.sort(np.array(times, dtype=float))
+    rng = np.random.default_rng(seed)
+    sizes = compiled.sizes
+    times = np.sort(np.array(times, dtype=float))
     ends = np.sort(np.array(ends, dtype=float))
     values, slopes = rng.uniform(size=(2, len(ends), sizes.inputs))
     states, _ = points(compiled, len(times))
-    table = RowRecorder(compiled).evaluate(states, times, PiecewiseLinear(ends, values, slopes), 0.0)
+    table = RowRecorder(compiled).evaluate(
+        states, times, PiecewiseLinear(ends, values, slopes), 0.0
+    )
     held = np.minimum(np.searchsorted(ends, times, side="right"), len(ends) - 1)
     since = times - np.concatenate([[0.0], ends])[held]
     assert table.inputs == pytest.approx(values[held] + slopes[held] * since[:, None], rel=1e-14)

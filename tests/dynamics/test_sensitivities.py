@@ -1,7 +1,9 @@
-"""Forward sensitivities: the derivative of what a run gives by a parameter, d x/d theta, to a stated accuracy.
+"""Forward sensitivities: the derivative of what a run gives by a parameter, d x/d theta, to a
+stated accuracy.
 
-Against closed forms where there is one, against the law that `WithSensitivities` states, and against differences of runs. A run
-with fixed steps is differentiated step by step, so that there the differences agree to their own rounding.
+Against closed forms where there is one, against the law that `WithSensitivities` states, and
+against differences of runs. A run with fixed steps is differentiated step by step, so that there
+the differences agree to their own rounding.
 """
 
 from __future__ import annotations
@@ -15,7 +17,14 @@ from formulas import FORMULAS, Formula
 from widths import widened
 
 from airmuscle.core import StateVariable, System, model, ops, parameter, tree
-from airmuscle.engine import Rodas4, RungeKutta4, SampledSignal, Schedule, WithSensitivities, sensitivity
+from airmuscle.engine import (
+    Rodas4,
+    RungeKutta4,
+    SampledSignal,
+    Schedule,
+    WithSensitivities,
+    sensitivity,
+)
 from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 
@@ -78,7 +87,9 @@ def leaf_values(system):
 
 
 def with_leaf(system, path, value):
-    return tree.with_parameters(system, [value if p == path else v for p, v in leaf_values(system).items()])
+    return tree.with_parameters(
+        system, [value if p == path else v for p, v in leaf_values(system).items()]
+    )
 
 
 def rows(system, start, times, command, method):
@@ -90,12 +101,16 @@ def rows(system, start, times, command, method):
 
 def sensitive(system, paths):
     values = leaf_values(system)
-    return WithSensitivities(system, tuple((path,) for path in paths), tuple(abs(values[path]) for path in paths))
+    return WithSensitivities(
+        system, tuple((path,) for path in paths), tuple(abs(values[path]) for path in paths)
+    )
 
 
 @pytest.mark.parametrize("method", [Rodas4(1e-9), RungeKutta4(1e-3)], ids=["Rodas4", "RungeKutta4"])
 def test_a_linear_system_has_its_closed_form(method):
-    a, b, x0 = 1.5, 0.7, 2.0
+    a = 1.5
+    b = 0.7
+    x0 = 2.0
     times = np.linspace(0.0, 2.0, 21)
     system = WithSensitivities(Decay(a, b), (("a",), ("b",), ()), (a, b, x0))
     start = [x0, 0.0, *[0.0, 0.0, 1.0], *[0.0] * 3]  # the last column is the start's own value
@@ -108,13 +123,16 @@ def test_a_linear_system_has_its_closed_form(method):
 @pytest.mark.parametrize("method", [Rodas4(1e-9), RungeKutta4(1e-3)], ids=["Rodas4", "RungeKutta4"])
 def test_an_input_that_moves_is_carried(method):
     """x' = -a x + b t from x = 0: x = b (t/a - (1 - exp(-a t))/a^2)."""
-    a, b = 1.5, 0.7
+    a = 1.5
+    b = 0.7
     t = np.linspace(0.0, 2.0, 21)
     system = WithSensitivities(Decay(a, b), (("a",), ("b",)), (a, b))
     found = rows(system, [0.0] * 6, t, SampledSignal({"u": ((0.0, 0.0), (2.0, 2.0))}), method)
     e = np.exp(-a * t)
     by_a = b * (-t / a**2 - t * e / a**2 + 2 * (1 - e) / a**3)
-    np.testing.assert_allclose(found[:, 2:4], np.column_stack([by_a, t / a - (1 - e) / a**2]), atol=2e-9)
+    np.testing.assert_allclose(
+        found[:, 2:4], np.column_stack([by_a, t / a - (1 - e) / a**2]), atol=2e-9
+    )
 
 
 # What is printed is the law
@@ -122,8 +140,11 @@ def test_an_input_that_moves_is_carried(method):
 
 def point(system, vector, scatter, rng):
     """A state near a vector, with S of any size, by name."""
-    inner, further = system.inner.states, system.states[len(system.inner.states) :]
-    values = vector + scatter * np.array([s.nominal for s in inner]) * rng.standard_normal(len(inner))
+    inner = system.inner.states
+    further = system.states[len(system.inner.states) :]
+    values = vector + scatter * np.array([s.nominal for s in inner]) * rng.standard_normal(
+        len(inner)
+    )
     return dict(zip((s.name for s in inner), values, strict=True)) | {
         s.name: s.nominal * rng.standard_normal() for s in further
     }
@@ -140,25 +161,37 @@ def printed(system, state, inputs):
 
 def assert_the_law(system, state, inputs, relative):
     rates, outputs = printed(system, state, inputs)
-    law, seen = system.rates(state, inputs), system.outputs(state, inputs)
+    law = system.rates(state, inputs)
+    seen = system.outputs(state, inputs)
     sizes = np.array([s.nominal for s in system.states])
     expected = np.array([law[s.name] for s in system.states])
     np.testing.assert_allclose(
-        rates / sizes, expected / sizes, rtol=relative, atol=relative * np.abs(expected / sizes).max()
+        rates / sizes,
+        expected / sizes,
+        rtol=relative,
+        atol=relative * np.abs(expected / sizes).max(),
     )
     assert list(outputs) == list(seen)
     for name, value in seen.items():
-        assert outputs[name] == pytest.approx(value, rel=relative, abs=1e-12 * abs(value) + 1e-280), name
+        assert outputs[name] == pytest.approx(
+            value, rel=relative, abs=1e-12 * abs(value) + 1e-280
+        ), name
 
 
 @pytest.mark.parametrize(
     ("states", "columns"),
-    widened([(3, 3), (6, 5), (3, 1), (6, 8), (10, 11)], lambda states, columns: (states, columns) == (6, 5)),
+    widened(
+        [(3, 3), (6, 5), (3, 1), (6, 8), (10, 11)],
+        lambda states, columns: (states, columns) == (6, 5),
+    ),
 )
 def test_printed_columns_are_the_law(states, columns):
     """At random points with any valve open, any number of columns, whatever the registers hold."""
-    run, rng = runs()[states], np.random.default_rng(states)
-    paths = [leaf.path for leaf in tree.leaves(run.system) if leaf.value and "[" not in leaf.path][:columns]
+    run = runs()[states]
+    rng = np.random.default_rng(states)
+    paths = [leaf.path for leaf in tree.leaves(run.system) if leaf.value and "[" not in leaf.path][
+        :columns
+    ]
     assert len(paths) == columns
     system = sensitive(run.system, paths)
     for _ in range(6):
@@ -169,7 +202,10 @@ def test_printed_columns_are_the_law(states, columns):
 @pytest.mark.parametrize("name", FORMULAS)
 def test_every_operation_has_its_derivative(name):
     """Also the second derivatives, which `jac` of a differentiated system gives."""
-    system, rng = WithSensitivities(Formula(name), (("shift",), ()), (1.0, 1.0)), np.random.default_rng(2)
+    system, rng = (
+        WithSensitivities(Formula(name), (("shift",), ()), (1.0, 1.0)),
+        np.random.default_rng(2),
+    )
     for x, y in [*rng.uniform(-1.4, 1.4, (8, 2)), (0.75, 1.0), (-0.25, 0.0)]:
         state = {"x": x, "y": y, "d x/d 0": 0.3, "d x/d 1": -1.1, "d y/d 0": 0.7, "d y/d 1": 0.2}
         assert_the_law(system, state, {}, 1e-11)
@@ -178,21 +214,30 @@ def test_every_operation_has_its_derivative(name):
 @pytest.mark.parametrize("name", [n for n in FORMULAS if n not in ("choices", "extremes")])
 def test_the_change_of_the_jacobian_is_its_derivative(name):
     """dJ from `jac` against central differences of J along each column."""
-    system, at = WithSensitivities(Formula(name), (("shift",), ()), (1.0, 1.0)), np.array([0.4, 0.9])
+    system, at = (
+        WithSensitivities(Formula(name), (("shift",), ()), (1.0, 1.0)),
+        np.array([0.4, 0.9]),
+    )
     s = np.array([[0.3, -1.1], [0.7, 0.2]])
 
     def matrix(z, shift, rows):
         ready = compile_system(dataclasses.replace(system, inner=Formula(name, shift)))
         f, found = np.empty(6), np.empty(ready.sizes.jacobian)
-        ready.call("jac", np.concatenate([z, rows.ravel()]), np.empty(0), ready.precomputed, f, found)
+        ready.call(
+            "jac", np.concatenate([z, rows.ravel()]), np.empty(0), ready.precomputed, f, found
+        )
         return found
 
-    whole, distinct = matrix(at, 0.25, s), compile_system(Formula(name)).sizes.jacobian
+    whole = matrix(at, 0.25, s)
+    distinct = compile_system(Formula(name)).sizes.jacobian
     moving = (whole.size - distinct) // 2
     changes = whole[distinct:].reshape(moving, 2)
     for k, by_shift in enumerate((1.0, 0.0)):
         e = 1e-5
-        up, down = (matrix(at + side * e * s[:, k], 0.25 + side * e * by_shift, 0 * s)[:distinct] for side in (1, -1))
+        up, down = (
+            matrix(at + side * e * s[:, k], 0.25 + side * e * by_shift, 0 * s)[:distinct]
+            for side in (1, -1)
+        )
         expected = (up - down) / (2 * e)
         expected = expected[np.abs(expected) > 1e-9]
         np.testing.assert_allclose(changes[np.abs(changes[:, k]) > 1e-9, k], expected, rtol=1e-6)
@@ -215,7 +260,9 @@ def test_a_group_shares_one_value():
     start = [*run.vector, *[0.0] * 9]
     found = rows(system, start, TIMES, COMMAND, Rodas4(1e-8))[:, 3:].reshape(TIMES.size, 3, 3)
     size = np.abs(found[:, :, 0]).max(axis=0)
-    np.testing.assert_allclose((found[:, :, 1] + found[:, :, 2]) / size, found[:, :, 0] / size, atol=1e-6)
+    np.testing.assert_allclose(
+        (found[:, :, 1] + found[:, :, 2]) / size, found[:, :, 0] / size, atol=1e-6
+    )
 
 
 def plant_case():
@@ -231,27 +278,35 @@ def difference(system, path, start, relative):
     return (up - down) / (2 * relative * value)
 
 
-@pytest.mark.parametrize("paths", [PATHS[::3], pytest.param(PATHS, marks=pytest.mark.slow)], ids=["few", "all"])
+@pytest.mark.parametrize(
+    "paths", [PATHS[::3], pytest.param(PATHS, marks=pytest.mark.slow)], ids=["few", "all"]
+)
 def test_a_plant_against_differences(paths):
     """Rodas4 at rtol 1e-10 is within 5e-7 of each derivative's greatest.
 
-    No one step of the differences serves all: 1e-4 has a truncation error of 1e-6 for a valve, 1e-5 a rounding error
-    of 1e-6 for a damper.
+    No one step of the differences serves all: 1e-4 has a truncation error of 1e-6 for a valve, 1e-5
+    a rounding error of 1e-6 for a damper.
     """
     system, start = plant_case()
-    exact = rows(sensitive(system, paths), [*start, *[0.0] * 3 * len(paths)], TIMES, COMMAND, Rodas4(1e-10))
+    exact = rows(
+        sensitive(system, paths), [*start, *[0.0] * 3 * len(paths)], TIMES, COMMAND, Rodas4(1e-10)
+    )
     for k, path in enumerate(paths):
         found = exact[:, 3 + k :: len(paths)]
-        size, errors = np.abs(found).max(axis=0), []
+        size = np.abs(found).max(axis=0)
+        errors = []
         for relative in (1e-3, 1e-4, 1e-5):
             errors.append((np.abs(found - difference(system, path, start, relative)) / size).max())
         assert min(errors) < 5e-7, path
 
 
 def test_the_default_tolerance_gives_three_digits():
-    """At rtol 1e-6 every derivative is within 5e-4 of its greatest; the states keep their own tolerance."""
+    """At rtol 1e-6 every derivative is within 5e-4 of its greatest; the states keep their own
+    tolerance.
+    """
     system, start = plant_case()
-    case, full = sensitive(system, PATHS), [*start, *[0.0] * 3 * len(PATHS)]
+    case = sensitive(system, PATHS)
+    full = [*start, *[0.0] * 3 * len(PATHS)]
     reference, found = (rows(case, full, TIMES, COMMAND, Rodas4(rtol)) for rtol in (1e-11, 1e-6))
     errors = np.abs(found - reference).max(axis=0) / np.abs(reference).max(axis=0)
     assert errors[3:].max() < 5e-4
@@ -262,22 +317,25 @@ def swings(columns=(("a",), ("b",), ("a", "b"), ())):
     """A pendulum started by hand, its own columns zero, that of the start one."""
     s = np.zeros((2, len(columns)))
     s[0, -1] = 1.0
-    return WithSensitivities(Swing(), columns, (1.0,) * len(columns)), np.array([1.0, 0.0, *s.ravel()])
+    return WithSensitivities(Swing(), columns, (1.0,) * len(columns)), np.array(
+        [1.0, 0.0, *s.ravel()]
+    )
 
 
 def test_fixed_steps_are_differentiated_themselves():
-    """Steps so long that the run errs by 1e-3 have the derivatives of that run, not of the solution."""
-    (system, start), times, command = (
-        swings(),
-        np.linspace(0.0, 6.0, 21),
-        SampledSignal({"u": ((1.0, 0.0), (5.0, 1.0))}),
-    )
+    """Steps so long that the run errs by 1e-3 have the derivatives of that run, not of the
+    solution.
+    """
+    system, start = swings()
+    times = np.linspace(0.0, 6.0, 21)
+    command = SampledSignal({"u": ((1.0, 0.0), (5.0, 1.0))})
     found, exact = (rows(system, start, times, command, RungeKutta4(h)) for h in (0.3, 1e-3))
     assert 1e-3 < np.abs(found - exact).max() < 0.1
     for k, paths in enumerate(system.columns):
         ends = []
         for e in (1e-3, -1e-3, 5e-4, -5e-4):
-            inner, at = system.inner, start[:2] + (e * np.array([1.0, 0.0]) if not paths else 0.0)
+            inner = system.inner
+            at = start[:2] + (e * np.array([1.0, 0.0]) if not paths else 0.0)
             for path in paths:
                 inner = with_leaf(inner, path, leaf_values(inner)[path] + e)
             ends.append(rows(inner, at, times, command, RungeKutta4(0.3)))
@@ -286,12 +344,12 @@ def test_fixed_steps_are_differentiated_themselves():
 
 
 def test_rodas4_keeps_its_order():
-    """Derivatives converge as the states do; without the change of the Jacobian they fall to order one."""
-    (system, start), times, command = (
-        swings(),
-        np.linspace(0.0, 6.0, 21),
-        SampledSignal({"u": ((1.0, 0.0), (5.0, 1.0))}),
-    )
+    """Derivatives converge as the states do; without the change of the Jacobian they fall to order
+    one.
+    """
+    system, start = swings()
+    times = np.linspace(0.0, 6.0, 21)
+    command = SampledSignal({"u": ((1.0, 0.0), (5.0, 1.0))})
     exact = rows(system, start, times, command, RungeKutta4(1e-3))
     for rtol in (1e-5, 1e-7, 1e-9):
         errors = np.abs(rows(system, start, times, command, Rodas4(rtol)) - exact).max(axis=0)
@@ -300,9 +358,12 @@ def test_rodas4_keeps_its_order():
 
 
 def test_columns_share_one_factorisation():
-    """The factors are those of the inner system; each column adds the changes of the Jacobian alone."""
+    """The factors are those of the inner system; each column adds the changes of the Jacobian
+    alone.
+    """
     system, _ = plant_case()
-    alone, together = compile_system(system).sizes, compile_system(sensitive(system, PATHS)).sizes
+    alone = compile_system(system).sizes
+    together = compile_system(sensitive(system, PATHS)).sizes
     assert together.states == 9 * alone.states
     assert together.jacobian <= 9 * alone.jacobian
     assert together.factors - alone.factors == together.jacobian - alone.jacobian
@@ -313,20 +374,30 @@ def test_only_what_is_observed_is_given():
     whole = sensitive(system, PATHS[:2])
     some = dataclasses.replace(whole, observed=("position", "pressure"))
     assert compile_system(some).output_names == (
-        "position", "pressure", "d position/d 0", "d position/d 1", "d pressure/d 0", "d pressure/d 1",
-        "position.rate", "pressure.rate",
-    )  # fmt: skip
+        "position",
+        "pressure",
+        "d position/d 0",
+        "d position/d 1",
+        "d pressure/d 0",
+        "d pressure/d 1",
+        "position.rate",
+        "pressure.rate",
+    )
     state = point(some, start, 0.3, np.random.default_rng(4))
     inputs = {"fill": 1.0, "discharge": 0.0}
     everything = whole.outputs(state, inputs)
     for name, value in printed(some, state, inputs)[1].items():
         assert value == pytest.approx(everything[name], rel=1e-10)
-    with pytest.raises(ParameterError, match=r"no state or output 'presure'.*Did you mean 'pressure'"):
+    with pytest.raises(
+        ParameterError, match=r"no state or output 'presure'.*Did you mean 'pressure'"
+    ):
         dataclasses.replace(whole, observed=("presure",))
 
 
 def test_unknown_paths_and_missing_scales_are_refused():
-    with pytest.raises(ParameterError, match=r"no parameter 'mechanism.mas'.*Did you mean 'mechanism.mass'"):
+    with pytest.raises(
+        ParameterError, match=r"no parameter 'mechanism.mas'.*Did you mean 'mechanism.mass'"
+    ):
         WithSensitivities(hanging(), (("mechanism.mas",),), (1.0,))
     with pytest.raises(ParameterError, match="2 columns need as many scales"):
         WithSensitivities(hanging(), (("mechanism.mass",), ()), (1.0,))
@@ -337,4 +408,7 @@ def test_unknown_paths_and_missing_scales_are_refused():
 def test_another_parameter_set_costs_no_program():
     system, _ = plant_case()
     heavier = dataclasses.replace(system, mechanism=dataclasses.replace(system.mechanism, mass=6.0))
-    assert compile_system(sensitive(system, PATHS)).program is compile_system(sensitive(heavier, PATHS)).program
+    assert (
+        compile_system(sensitive(system, PATHS)).program
+        is compile_system(sensitive(heavier, PATHS)).program
+    )

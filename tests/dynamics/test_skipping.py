@@ -1,8 +1,9 @@
 """What a zero makes superfluous is skipped, and nothing else changes.
 
-Law: where a gate is zero, whatever is multiplied by it does not matter. So code with branches gives what the same code
-gives without: on graphs drawn at random, on plants at shut valves, at and beyond the ends of a validity range, one by one and in
-lanes; it computes what it needs, and in lanes no plant sees its neighbour. Opponent: the instructions in their order.
+Law: where a gate is zero, whatever is multiplied by it does not matter. So code with branches gives
+what the same code gives without: on graphs drawn at random, on plants at shut valves, at and beyond
+the ends of a validity range, one by one and in lanes; it computes what it needs, and in lanes no
+plant sees its neighbour. Opponent: the instructions in their order.
 """
 
 from __future__ import annotations
@@ -53,11 +54,20 @@ MEANING: dict[int, Any] = {
 }
 """Every operation on numbers that stay small and finite."""
 GRAPHS = 2000
-LEAVES: list[Operand] = [("in", 0, 0), ("in", 0, 1), ("in", 1, 0), ("in", 2, 0), ("c", 0.0), ("c", 1.0)]
+LEAVES: list[Operand] = [
+    ("in", 0, 0),
+    ("in", 0, 1),
+    ("in", 1, 0),
+    ("in", 2, 0),
+    ("c", 0.0),
+    ("c", 1.0),
+]
 
 
 def drawn(rng: random.Random) -> Code:
-    """A graph of some dozen instructions, clamps, differences from them and choices among them; some of its results."""
+    """A graph of some dozen instructions, clamps, differences from them and choices among them;
+    some of its results.
+    """
     known, body = list(LEAVES), list[Instruction]()
 
     def put(operation: int, *arguments: Operand) -> Operand:
@@ -66,7 +76,9 @@ def drawn(rng: random.Random) -> Code:
         return known[-1]
 
     def pick() -> Operand:
-        return known[-rng.randint(1, min(8, len(known))) if rng.random() < 0.6 else rng.randrange(len(known))]
+        return known[
+            -rng.randint(1, min(8, len(known))) if rng.random() < 0.6 else rng.randrange(len(known))
+        ]
 
     for _ in range(rng.randint(6, 30)):
         kind = rng.randrange(10)
@@ -77,7 +89,8 @@ def drawn(rng: random.Random) -> Code:
         elif kind < 8:
             put(Operation.SELECT, put(Operation.LESS_EQUAL, pick(), pick()), pick(), pick())
         else:
-            number, ends = pick(), [("c", -1.0), ("c", 1.0)]
+            number = pick()
+            ends = [("c", -1.0), ("c", 1.0)]
             low = put(Operation.MAXIMUM, *rng.sample([number, ends[0]], 2))
             clamped = put(Operation.MINIMUM, *rng.sample([low, ends[1]], 2))
             put(Operation.SUBTRACT, *rng.sample([number, clamped], 2))
@@ -103,7 +116,8 @@ class Values(dict[Operand, float]):
 
 def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
     """The values of the results, and how many instructions were run."""
-    values, count = Values(leaves), 0
+    values = Values(leaves)
+    count = 0
     for item in items:
         if isinstance(item, ConditionalBlock) and not any(values[gate] for gate in item.gates):
             values.update({result: values[value] for result, value in item.instead})
@@ -111,19 +125,30 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
         inner = Values(values)
         for line in item.body if isinstance(item, ConditionalBlock) else [item]:
             number = MEANING[line.operation](*(inner[a] for a in line.arguments))
-            inner[line.result] = float(np.clip(number, -1e3, 1e3)) if line.operation == Operation.SQUARE else number
+            inner[line.result] = (
+                float(np.clip(number, -1e3, 1e3)) if line.operation == Operation.SQUARE else number
+            )
             count += 1
-        seen = [result for result, _ in item.instead] if isinstance(item, ConditionalBlock) else [item.result]
+        seen = (
+            [result for result, _ in item.instead]
+            if isinstance(item, ConditionalBlock)
+            else [item.result]
+        )
         values.update({result: inner[result] for result in seen})
     return values, count
 
 
 @pytest.mark.parametrize("graphs", [GRAPHS // 20, pytest.param(GRAPHS, marks=pytest.mark.slow)])
-def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch, graphs: int) -> None:
-    """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
+def test_random_code_gives_the_same_with_branches(
+    monkeypatch: pytest.MonkeyPatch, graphs: int
+) -> None:
+    """However little a branch saves; with part of the results early, as the rates of a stage are,
+    or none.
+    """
     monkeypatch.setattr("airmuscle.engine.compile.ir.skipped_blocks.WORTH", 1)
     monkeypatch.setattr("airmuscle.engine.compile.ir.skipped_blocks.WORTH_OF_CHOICES", 1)
-    rng, skipped = random.Random(1), 0
+    rng = random.Random(1)
+    skipped = 0
     for _ in range(graphs):
         code = drawn(rng)
         early = {rng.choice(code.body).result}  # with all that they need
@@ -132,14 +157,20 @@ def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatc
                 early.update(line.arguments)
         for ahead in (frozenset[Operand](), frozenset(early)):
             items = skipping(code, level, ahead)
-            pieces = [{line.result for line in item.body} for item in items if isinstance(item, ConditionalBlock)]
+            pieces = [
+                {line.result for line in item.body}
+                for item in items
+                if isinstance(item, ConditionalBlock)
+            ]
             assert all(piece <= ahead or not piece & ahead for piece in pieces)
             for _ in range(3):
                 leaves = {leaf: rng.choice([-2.0, -1.0, 0.0, 0.5, 1.0, 3.0]) for leaf in LEAVES[:4]}
                 expected, count = computed(code.body, leaves)
                 found, fewer = computed(items, leaves)
                 skipped += count - fewer
-                assert [found[o] for _, _, o in code.outputs] == [expected[o] for _, _, o in code.outputs]
+                assert [found[o] for _, _, o in code.outputs] == [
+                    expected[o] for _, _, o in code.outputs
+                ]
     assert skipped > graphs
 
 
@@ -149,7 +180,9 @@ def plant(circuit: Any) -> Plant:
 
 
 def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
-    """Of the rates of a plant, more than a third of all operations; with a valve open, its own come back."""
+    """Of the rates of a plant, more than a third of all operations; with a valve open, its own come
+    back.
+    """
     kept: list[Any] = []
     real = emission.skipping
     with pytest.MonkeyPatch.context() as patch:
@@ -164,13 +197,16 @@ def test_a_shut_valve_and_a_box_not_left_are_skipped() -> None:
 
 @pytest.mark.parametrize("circuit", [FillDischarge, ThreePositionValve])
 def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: Any) -> None:
-    """At shut and open valves, within the validity range of the surface, on its edges and beyond them."""
+    """At shut and open valves, within the validity range of the surface, on its edges and beyond
+    them.
+    """
     system = plant(circuit)
     new = compile_system(system)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(emission, "skipping", lambda code, *rest: list(code.body))
         old = Program(system)
-    held, sizes = old.precompute(new.parameters), new.sizes
+    held = old.precompute(new.parameters)
+    sizes = new.sizes
     names = [s.name for s in system.states]
     rng = np.random.default_rng(4)
     for openings in (
@@ -182,8 +218,11 @@ def test_plant_has_the_rates_and_slopes_that_it_has_without_branches(circuit: An
         for contraction in (-0.1, -0.05, 0.0, 0.1, 0.35, 0.5):
             state = system.state_at(pressure=rng.uniform(0, 9e5), position=0.3 * contraction)
             x = np.array([state[name] for name in names])
-            u, f, g = np.array(openings), np.empty(sizes.states), np.empty(sizes.states)
-            j, k = np.empty(sizes.jacobian), np.empty(sizes.jacobian)
+            u = np.array(openings)
+            f = np.empty(sizes.states)
+            g = np.empty(sizes.states)
+            j = np.empty(sizes.jacobian)
+            k = np.empty(sizes.jacobian)
             new.call("jac", x, u, new.precomputed, f, j)
             _call(old, "jac", x, u, held, g, k)
             np.testing.assert_allclose(f, g, rtol=1e-12, atol=1e-15 * np.abs(g).max())
@@ -227,7 +266,9 @@ def test_what_is_skipped_is_not_computed() -> None:
 
 
 def test_a_lane_that_skips_does_not_see_its_neighbours() -> None:
-    """Of sixteen plants in one register row every third opens; the others end where they end alone."""
+    """Of sixteen plants in one register row every third opens; the others end where they end
+    alone.
+    """
     opens = [n % 3 == 0 for n in range(16)]
     commands = [Schedule({"opening": ((0.1, 1.0 if opened else 0.0),)}) for opened in opens]
     batch = simulate_batch(

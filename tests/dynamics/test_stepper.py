@@ -1,5 +1,5 @@
-"""Claims about steps by hand: they are those of `simulate` to the last bit, a snapshot repeats them, a step that is
-impossible changes nothing, and no step allocates arrays."""
+"""Claims about steps by hand: they are those of `simulate` to the last bit, a snapshot repeats
+them, a step that is impossible changes nothing, and no step allocates arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from airmuscle.files import library
 from airmuscle.physics import WithEnergyMeters
 
 START = JOINT.state_at(pressure=2e5)
-FILL, SHUT = [0.5, 0.0, 0.0, 0.5], [0.0] * 4
+FILL = [0.5, 0.0, 0.0, 0.5]
+SHUT = [0.0] * 4
 
 
 def stepped(stepper, count=20):
@@ -30,7 +31,9 @@ def stepped(stepper, count=20):
 
 
 def repeat(stepper, inputs, dt):
-    """Equal steps until one fails: the message, and the snapshots before and after the step that failed."""
+    """Equal steps until one fails: the message, and the snapshots before and after the step that
+    failed.
+    """
     before = stepper.snapshot()
     try:
         for _ in range(100):
@@ -43,10 +46,14 @@ def repeat(stepper, inputs, dt):
 
 @pytest.mark.parametrize("integrator", [RungeKutta4(1e-3), Rodas4(1e-7)])
 def test_steps_by_hand_are_those_of_simulate(integrator):
-    """Rodas4 begins every step anew and so agrees to its tolerance; a fixed step agrees to the rounding of the instants."""
+    """Rodas4 begins every step anew and so agrees to its tolerance; a fixed step agrees to the
+    rounding of the instants.
+    """
     stepper = Stepper(JOINT, START, integrator=integrator)
     stepped(stepper)
-    opened = Schedule({"left.fill": ((0.0, 0.5), (0.1, 0.0)), "right.discharge": ((0.0, 0.5), (0.1, 0.0))})
+    opened = Schedule(
+        {"left.fill": ((0.0, 0.5), (0.1, 0.0)), "right.discharge": ((0.0, 0.5), (0.1, 0.0))}
+    )
     run = simulate(JOINT, opened, duration=0.2, initial_state=START, integrator=integrator)
     tolerance = 1e-11 if isinstance(integrator, RungeKutta4) else 1e-6
     for name in ("angle", "left.pressure", "right.force"):
@@ -55,7 +62,8 @@ def test_steps_by_hand_are_those_of_simulate(integrator):
 
 
 def test_equal_steps_give_equal_bits_and_a_snapshot_repeats_them():
-    first, second = Stepper(JOINT, START), Stepper(JOINT, START)
+    first = Stepper(JOINT, START)
+    second = Stepper(JOINT, START)
     expected = stepped(first)
     assert np.array_equal(expected, stepped(second))
     kept = pickle.loads(pickle.dumps(first.snapshot()))
@@ -80,9 +88,16 @@ def test_values_are_read_by_name_and_those_of_the_inputs_are_the_last_ones():
     values = stepper.values()
     assert values["left.fill"] == 0.5
     assert values["left.pressure"] == stepper["left.pressure"] > 2e5
-    assert set(values) == {"time", *stepper.state_names, *stepper.output_names, *stepper.input_names}
+    assert set(values) == {
+        "time",
+        *stepper.state_names,
+        *stepper.output_names,
+        *stepper.input_names,
+    }
     state = dict(zip(stepper.state_names, stepper.state.tolist(), strict=True))
-    exact = JOINT.outputs(state, dict(zip(stepper.input_names, stepper.inputs.tolist(), strict=True)))
+    exact = JOINT.outputs(
+        state, dict(zip(stepper.input_names, stepper.inputs.tolist(), strict=True))
+    )
     assert values["right.force"] == pytest.approx(exact["right.force"], rel=1e-12)
 
 
@@ -119,7 +134,11 @@ def test_impossible_inputs_are_refused_and_change_nothing(inputs, dt, message):
     stepper = Stepper(JOINT, START)
     with pytest.raises(ParameterError, match=message):
         stepper.step(inputs, dt)
-    assert (stepper.time, stepper.state.tolist(), stepper.inputs.tolist()) == (0.0, [*START.values()], SHUT)
+    assert (stepper.time, stepper.state.tolist(), stepper.inputs.tolist()) == (
+        0.0,
+        [*START.values()],
+        SHUT,
+    )
 
 
 def test_other_impossible_requests_are_refused():
@@ -146,7 +165,10 @@ def test_leaving_the_validity_range_is_an_error_where_it_is_wanted():
     start = plant.state_at(pressure=2e5)
     strict = Stepper(plant, start, check_validity=True)
     message, before, failed = repeat(strict, {"left.fill": 1.0, "right.discharge": 1.0}, 0.05)
-    assert "allowed range: 0.01333 to 0.25 (the validity range of right; check_validity=False continues" in message
+    assert (
+        "allowed range: 0.01333 to 0.25 (the validity range of right; check_validity=False"
+        " continues" in message
+    )
     assert failed == before
     strict.step({"left.fill": 0.0, "right.discharge": 0.0}, 0.01)
     tolerant = Stepper(plant)
@@ -159,7 +181,9 @@ def test_energy_meters_leave_the_check_of_the_validity_range_as_it_is():
     plant = library.load("joint-dmsp-20-matrix").plant
     metered = WithEnergyMeters(plant)
     assert list(metered.column_limits) == list(plant.column_limits)
-    strict = Stepper(metered, metered.extend_state(plant.state_at(pressure=2e5)), check_validity=True)
+    strict = Stepper(
+        metered, metered.extend_state(plant.state_at(pressure=2e5)), check_validity=True
+    )
     message, _, _ = repeat(strict, {"left.fill": 1.0, "right.discharge": 1.0}, 0.05)
     assert "the validity range of right" in message
 
@@ -175,7 +199,9 @@ def test_a_step_allocates_no_arrays():
     after, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert after - before < 1000
-    assert peak - before < 2000  # an array alone takes 112 bytes, a view of it too; the frames of Python some hundred
+    assert (
+        peak - before < 2000
+    )  # an array alone takes 112 bytes, a view of it too; the frames of Python some hundred
 
 
 def test_the_example_of_the_page_reaches_its_angle():

@@ -1,4 +1,5 @@
-"""Two stiffnesses: at constant pressure, k_p = -dF/deps, and with shut valves, where the pressure follows the gas.
+"""Two stiffnesses: at constant pressure, k_p = -dF/deps, and with shut valves, where the pressure
+follows the gas.
 
 polytropic:  dp/deps = -n p_abs/V dV/deps
 """
@@ -45,16 +46,26 @@ by_gas = pytest.mark.parametrize(("gas", "exponent"), EXPONENTS, ids=str)
 
 
 def pulled(gas, pressure=3e5, contraction=0.12):
-    """The tensions of a muscle that is slowly pulled by 0.5 mm on either side of a contraction, valves shut."""
+    """The tensions of a muscle that is slowly pulled by 0.5 mm on either side of a contraction,
+    valves shut.
+    """
     plant = Plant(MUSCLE, ClosedChamber(), PrescribedMotion(), gas)
-    middle, amplitude = contraction * 0.2, 5e-4
+    middle = contraction * 0.2
+    amplitude = 5e-4
     motion = spline_trajectory([0.0, 2.0, 4.0], [middle + amplitude, middle, middle - amplitude])
     start = plant.state_at(pressure=pressure, position=middle)
     start |= {"position": middle + amplitude, "speed": 0.0}
     if "internal_energy" in start:  # put there without heat, as its content in the middle is
         before, after = (BRAID.volume(x / 0.2) for x in (middle, middle + amplitude))
         start["internal_energy"] *= (before / after) ** (HEAT_CAPACITY_RATIO - 1)
-    run = simulate(plant, motion.input, duration=4.0, initial_state=start, integrator=Rodas4(1e-11), output_times=0.01)
+    run = simulate(
+        plant,
+        motion.input,
+        duration=4.0,
+        initial_state=start,
+        integrator=Rodas4(1e-11),
+        output_times=0.01,
+    )
     return plant, run
 
 
@@ -71,16 +82,21 @@ def test_the_stiffness_with_shut_valves_is_that_of_a_simulated_pull(gas, exponen
 
 @pytest.mark.parametrize("warmer", [0.9, 1.0, 1.3])
 def test_air_that_is_warmer_or_colder_than_its_wall_is_as_stiff_as_without_heat_transfer(warmer):
-    """A fast motion is adiabatic: dp/deps = -gamma p_abs/V dV/deps, whatever heat flows meanwhile."""
+    """A fast motion is adiabatic: dp/deps = -gamma p_abs/V dV/deps, whatever heat flows
+    meanwhile.
+    """
     found = []
     for heat_transfer in (0.0, 5.0):
         plant = Plant(MUSCLE, ClosedChamber(), Isometric(0.12), EnergyBalance(heat_transfer))
         state = plant.state_at(pressure=3e5)
         found.append(
-            stiffness(plant, {**state, "internal_energy": warmer * state["internal_energy"]}).muscles["muscle"]
+            stiffness(
+                plant, {**state, "internal_energy": warmer * state["internal_energy"]}
+            ).muscles["muscle"]
         )
     pressure = warmer * absolute_pressure(3e5, plant.ambient)
-    area, growth = VirtualWork(BRAID).effective_area(0.12), BRAID.volume_derivative(0.12)
+    area = VirtualWork(BRAID).effective_area(0.12)
+    growth = BRAID.volume_derivative(0.12)
     following = area * HEAT_CAPACITY_RATIO * pressure / BRAID.volume(0.12) * growth
     assert found[0].shut_valves - found[0].constant_pressure == pytest.approx(following, rel=1e-9)
     assert found[1] == pytest.approx(found[0], rel=1e-12)
@@ -92,11 +108,9 @@ def test_air_that_is_warmer_or_colder_than_its_wall_is_as_stiff_as_without_heat_
 def test_both_are_their_formulas(gas, exponent, pressure, contraction):
     plant = Plant(MUSCLE, ClosedChamber(), Isometric(contraction), gas)
     found = stiffness(plant, plant.state_at(pressure=pressure))
-    area, growth, volume = (
-        VirtualWork(BRAID).effective_area(contraction),
-        BRAID.volume_derivative(contraction),
-        BRAID.volume(contraction),
-    )
+    area = VirtualWork(BRAID).effective_area(contraction)
+    growth = BRAID.volume_derivative(contraction)
+    volume = BRAID.volume(contraction)
     at_pressure = MUSCLE.stiffness(pressure, contraction)
     following = area * exponent * absolute_pressure(pressure, plant.ambient) / volume * growth
     assert found.muscles["muscle"].constant_pressure == pytest.approx(at_pressure, rel=1e-9)
@@ -108,7 +122,8 @@ def test_both_are_their_formulas(gas, exponent, pressure, contraction):
 def test_a_series_spring_stands_in_series():
     """Against the static tension of the whole at two contractions, with the same air."""
     muscle = replace(chosen_muscle(), series=SeriesSpring(4e4))
-    gas, h = Polytropic(1.2), 1e-6
+    gas = Polytropic(1.2)
+    h = 1e-6
     middle = Plant(muscle, ClosedChamber(), Isometric(0.1), gas)
     state = middle.state_at(pressure=2e5)
     found = stiffness(middle, state).muscles["muscle"]
@@ -148,12 +163,17 @@ def test_that_of_a_coordinate_is_the_slope_of_the_pull_with_the_same_air(mechani
     found = stiffness(plant, state).coordinates
     assert set(found) == set(place)
     for c in mechanism.coordinates:
-        h, pulls = 1e-6 * c.nominal, []
+        h = 1e-6 * c.nominal
+        pulls = []
         for sign in (1, -1):
             moved = {**state, c.name: state[c.name] + sign * h}
             tensions = [float(port.tension) for port in plant.muscle_states(moved)]
-            pulls.append(mechanism.generalised_forces(moved, tensions, plant.resting_lengths)[c.name])
-        assert found[c.name].shut_valves == pytest.approx(-(pulls[0] - pulls[1]) / (2 * h), rel=1e-5)
+            pulls.append(
+                mechanism.generalised_forces(moved, tensions, plant.resting_lengths)[c.name]
+            )
+        assert found[c.name].shut_valves == pytest.approx(
+            -(pulls[0] - pulls[1]) / (2 * h), rel=1e-5
+        )
         assert found[c.name].shut_valves > found[c.name].constant_pressure
 
 

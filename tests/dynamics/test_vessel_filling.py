@@ -1,12 +1,15 @@
-"""A vessel of constant volume filled through an orifice: the simulated pressure is the one known in closed form.
+"""A vessel of constant volume filled through an orifice: the simulated pressure is the one known in
+closed form.
 
-Isothermal, p' = R T0/V qm with qm = C rho0 ps sqrt(1 - ((p/ps - b)/(1 - b))^2), and 1/tau = R T0 C rho0/V:
+Isothermal, p' = R T0/V qm with qm = C rho0 ps sqrt(1 - ((p/ps - b)/(1 - b))^2), and 1/tau = R T0 C
+rho0/V:
 
     b = 0              p = ps sin(arcsin(p0/ps) + t/tau), full at a finite time
     choked, p < b ps   p = p0 + ps t/tau, until b ps
     then               p = ps (b + (1 - b) sin(t'/((1 - b) tau)))
 
-b = 0 is the orifice of FONSim, whose restrictor takes the density at the mean of the two pressures: q^2 = k (p1^2 - p2^2).
+b = 0 is the orifice of FONSim, whose restrictor takes the density at the mean of the two pressures:
+q^2 = k (p1^2 - p2^2).
 """
 
 from __future__ import annotations
@@ -34,7 +37,9 @@ from airmuscle.physics import (
     Valve,
 )
 
-SOURCE, T0, CONDUCTANCE = 7e5, 293.15, 1e-9
+SOURCE = 7e5
+T0 = 293.15
+CONDUCTANCE = 1e-9
 AMBIENT = Ambient(100e3, T0)
 BRAID = Braid(0.01, 0.4363, 0.3)
 VOLUME = BRAID.volume(0.0)
@@ -42,9 +47,17 @@ TAU = VOLUME / (GAS_CONSTANT * T0 * CONDUCTANCE * REFERENCE_DENSITY)
 
 
 def filled(valve: Orifice, start: float, duration: float):
-    """Time [s] and absolute pressure [Pa] of a muscle held at zero contraction, whose volume is a vessel's."""
+    """Time [s] and absolute pressure [Pa] of a muscle held at zero contraction, whose volume is a
+    vessel's.
+    """
     circuit = FillDischarge(Supply(SOURCE - AMBIENT.pressure), valve, valve)
-    plant = Plant(Muscle(ChouHannaford1996(BRAID), BRAID), circuit, Isometric(0.0), gas=Isothermal(), ambient=AMBIENT)
+    plant = Plant(
+        Muscle(ChouHannaford1996(BRAID), BRAID),
+        circuit,
+        Isometric(0.0),
+        gas=Isothermal(),
+        ambient=AMBIENT,
+    )
     run = simulate(
         plant,
         Schedule({"fill": ((0.0, 1.0),)}),
@@ -60,10 +73,14 @@ def closed_form(b: float, start: float, time):
     choke_end = max(b * SOURCE - start, 0.0) / SOURCE * TAU
     begin = np.arcsin((max(start, b * SOURCE) / SOURCE - b) / (1 - b))
     angle = begin + (time - choke_end) / ((1 - b) * TAU)
-    return np.where(time < choke_end, start + SOURCE * time / TAU, SOURCE * (b + (1 - b) * np.sin(angle)))
+    return np.where(
+        time < choke_end, start + SOURCE * time / TAU, SOURCE * (b + (1 - b) * np.sin(angle))
+    )
 
 
-@pytest.mark.parametrize(("b", "start"), [(0.0, 1e5), (0.0, 4e5), (0.3, 1e5), (0.433, 1e5), (0.5, 6e5)])
+@pytest.mark.parametrize(
+    ("b", "start"), [(0.0, 1e5), (0.0, 4e5), (0.3, 1e5), (0.433, 1e5), (0.5, 6e5)]
+)
 def test_the_vessel_fills_as_the_closed_form_says(b: float, start: float):
     full = TAU * (max(b - start / SOURCE, 0.0) + (1 - b) * np.pi / 2)
     time, pressure = filled(Valve(CONDUCTANCE, b), start, full)
@@ -76,7 +93,8 @@ def test_the_vessel_fills_as_the_closed_form_says(b: float, start: float):
 
 def test_the_general_law_fills_it_alike():
     plain, general = (
-        filled(law, 1e5, 2.0)[1] for law in (Valve(CONDUCTANCE, 0.3), SubsonicIndexValve(CONDUCTANCE, 0.3))
+        filled(law, 1e5, 2.0)[1]
+        for law in (Valve(CONDUCTANCE, 0.3), SubsonicIndexValve(CONDUCTANCE, 0.3))
     )
     assert general == pytest.approx(plain, rel=1e-6)
 
@@ -92,7 +110,9 @@ def test_through_a_cracking_check_valve_it_stops_short_of_the_supply_and_does_no
 
 @pytest.mark.parametrize("b", [0.0, 0.3, 0.433])
 def test_the_closed_form_is_the_integral_of_the_printed_law(b: float):
-    """SciPy's quadrature of dp/p' from 1 to 6.9 bar gives the time at which the closed form is there."""
+    """SciPy's quadrature of dp/p' from 1 to 6.9 bar gives the time at which the closed form is
+    there.
+    """
 
     def slowness(p: float) -> float:
         ratio = p / SOURCE
@@ -103,7 +123,9 @@ def test_the_closed_form_is_the_integral_of_the_printed_law(b: float):
 
 
 def test_with_b_zero_the_square_of_the_flow_is_that_of_the_mean_density():
-    """FONSim's restrictor: dp = k q^2/rho(mean pressure); so q^2 over dp (p1 + p2) is one constant."""
+    """FONSim's restrictor: dp = k q^2/rho(mean pressure); so q^2 over dp (p1 + p2) is one
+    constant.
+    """
     valve = Valve(CONDUCTANCE, 0.0)
     for p1, p2 in ((7e5, 1e5), (7e5, 6e5), (2e5, 1e5)):
         assert valve.mass_flow(p1, p2, 1.0, T0) ** 2 / ((p1 - p2) * (p1 + p2)) == pytest.approx(

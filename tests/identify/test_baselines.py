@@ -1,7 +1,7 @@
 """A prediction is shown beside persistence and a linear ARX model that runs freely, with its skill.
 
-The ARX model of a record is fitted to the others, or to the other half of a single one: a linear process is then
-predicted to its noise. Skill is 1 - error/error of the better baseline.
+The ARX model of a record is fitted to the others, or to the other half of a single one: a linear
+process is then predicted to its noise. Skill is 1 - error/error of the better baseline.
 """
 
 from __future__ import annotations
@@ -19,17 +19,22 @@ from airmuscle.recording import Recording
 
 
 def linear_record(seed: int, rows: int = 400, step: float = 0.01) -> TimedRecord:
-    """x'' = u - 2 x' - 4 x, in exact steps of its matrix exponential, with a random staircase of u."""
+    """x'' = u - 2 x' - 4 x, in exact steps of its matrix exponential, with a random staircase of
+    u.
+    """
     from scipy.linalg import expm
 
     inputs = np.repeat(np.random.default_rng(seed).uniform(0.0, 1.0, rows // 20), 20)
     matrix = expm(step * np.array([[0.0, 1.0, 0.0], [-4.0, -2.0, 1.0], [0.0, 0.0, 0.0]]))
-    state, values = np.zeros(2), []
+    state = np.zeros(2)
+    values = []
     for u in inputs:
         values.append(state[0])
         state = (matrix @ [*state, u])[:2]
     time = step * np.arange(rows)
-    return TimedRecord(time, np.array(values)[:, None], inputs[:, None], np.ones((rows, 1), dtype=bool))
+    return TimedRecord(
+        time, np.array(values)[:, None], inputs[:, None], np.ones((rows, 1), dtype=bool)
+    )
 
 
 def test_skill_is_one_minus_the_error_over_that_of_the_better_baseline():
@@ -61,7 +66,9 @@ def test_rows_that_are_not_compared_do_not_count():
     spoiled[50] = np.nan
     compared = np.isfinite(spoiled)
     found = baseline_errors([record._replace(outputs=spoiled, compared=compared)])[0]
-    assert found[PERSISTENCE][0] == pytest.approx(np.sqrt(np.mean(record.outputs[compared[:, 0]] ** 2)))
+    assert found[PERSISTENCE][0] == pytest.approx(
+        np.sqrt(np.mean(record.outputs[compared[:, 0]] ** 2))
+    )
     assert np.isfinite(found[ARX][0])
 
 
@@ -82,10 +89,24 @@ def test_predict_shows_the_baselines_and_the_skill(tmp_path):
         pressure = 3e5 + 2e5 * np.sin(np.linspace(0.0, 6.0 + i, 300))
         contraction = np.full(300, held)
         force = 0.97 * np.asarray(law.force(pressure, contraction))
-        columns = {"time": 0.05 * np.arange(300), "pressure": pressure, "contraction": contraction, "force": force}
+        columns = {
+            "time": 0.05 * np.arange(300),
+            "pressure": pressure,
+            "contraction": contraction,
+            "force": force,
+        }
         files.append(tmp_path / f"{i}.csv")
         write(Recording(columns, f"{i}", {"resting_length": 0.3}), files[-1])
-    done = airmuscle("predict", "dmsp-20-300", *files, "--resting-length", "300 mm", "--out", tmp_path / "p", "--json")
+    done = airmuscle(
+        "predict",
+        "dmsp-20-300",
+        *files,
+        "--resting-length",
+        "300 mm",
+        "--out",
+        tmp_path / "p",
+        "--json",
+    )
     assert done.exit_code == 0, done.output
     for row in json.loads(done.stdout)["prediction"]["predictions"]:
         best = min(row["rms_error_of_persistence"], row["rms_error_of_an_ARX_of_depth_4"])

@@ -1,4 +1,6 @@
-"""The growth of friction with the load of a bearing is found from episodes: the other joint swings the link about."""
+"""The growth of friction with the load of a bearing is found from episodes: the other joint swings
+the link about.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ DRY = "mechanism.elements[1].coulomb_torque"
 
 
 def swung_arm():
-    """A vertical joint, and 0.3 m from it a joint about x whose bearing has a friction arm of 30 mm; all chosen."""
+    """A vertical joint, and 0.3 m from it a joint about x whose bearing has a friction arm of 30
+    mm; all chosen.
+    """
     arm = known_arm(2)
     links = (
         SpatialLink((0, 0, 1), rotor_inertia=0.01, damping=0.1),
@@ -30,7 +34,9 @@ def swung_arm():
 
 @pytest.mark.parametrize("dry", [0.1, 1.0])
 def test_the_search_finds_the_arm_of_the_bearing_from_zero(dry):
-    """From too little and from too much dry friction the search ends in the same place, that of the arm."""
+    """From too little and from too much dry friction the search ends in the same place, that of the
+    arm.
+    """
     truth = swung_arm()
     windows = episodes.cut(made_episodes(40, joints=2, arm=truth), 0, 40)
     started = descent.with_values(truth, [BEARING, DRY], [0.0, dry])

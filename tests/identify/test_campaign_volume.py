@@ -1,4 +1,6 @@
-"""The volume at rest of a campaign: s v_i = V(0) + dV(eps_i), with relative volumes v_i of fills at several lengths."""
+"""The volume at rest of a campaign: s v_i = V(0) + dV(eps_i), with relative volumes v_i of fills at
+several lengths.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ from airmuscle.bench.identify.campaign import VolumeChange, relate_volumes
 
 CONTRACTIONS = np.array([0.0, 0.1, 0.2])
 CHANGE = VolumeChange((1.5e-4, -1.2e-4), 0.3, 0.2)
-SCALE, AT_REST = 2.0, 1e-4
+SCALE = 2.0
+AT_REST = 1e-4
 RELATIVE = (AT_REST + CHANGE(CONTRACTIONS)) / SCALE
 
 
@@ -19,12 +22,17 @@ def test_exact_volumes_give_the_scale_and_the_volume_at_rest():
     assert relate_volumes(RELATIVE, 1e-3 * RELATIVE, CONTRACTIONS / 20, CHANGE) is None
 
 
-@pytest.mark.parametrize("relative_errors", [(2e-3, 2e-3, 2e-3), (2e-3, 2e-3, 1e-2), (2e-3, 1e-2, 2e-3)])
+@pytest.mark.parametrize(
+    "relative_errors", [(2e-3, 2e-3, 2e-3), (2e-3, 2e-3, 1e-2), (2e-3, 1e-2, 2e-3)]
+)
 def test_the_standard_errors_are_those_of_repeated_campaigns(relative_errors):
     """Also where one fill is less certain than the others."""
-    deviations, random = np.array(relative_errors) * RELATIVE, np.random.default_rng(1)
+    deviations = np.array(relative_errors) * RELATIVE
+    random = np.random.default_rng(1)
     found = [
-        relate_volumes(RELATIVE + deviations * random.standard_normal(3), deviations, CONTRACTIONS, CHANGE)
+        relate_volumes(
+            RELATIVE + deviations * random.standard_normal(3), deviations, CONTRACTIONS, CHANGE
+        )
         for _ in range(1500)
     ]
     for value, error in (("scale", "scale_stderr"), ("volume_at_rest", "volume_stderr")):

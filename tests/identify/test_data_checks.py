@@ -1,4 +1,5 @@
-"""Every static fit names the mistakes of a bench in its data; clean benches with friction, noise and rounding get none.
+"""Every static fit names the mistakes of a bench in its data; clean benches with friction, noise
+and rounding get none.
 
 The laboratories are those of tests/laboratories.py; each check has a variant that it must name.
 """
@@ -34,7 +35,16 @@ from laboratories import (
     write,
 )
 
-from airmuscle.bench import Candidate, ColumnMapping, Fit, StaticStage, classify_records, compare, fit, read
+from airmuscle.bench import (
+    Candidate,
+    ColumnMapping,
+    Fit,
+    StaticStage,
+    classify_records,
+    compare,
+    fit,
+    read,
+)
 from airmuscle.bench.identify import blank_surface
 from airmuscle.bench.identify.campaign import fit_static_stage
 from airmuscle.bench.identify.data_checks import check_data
@@ -63,7 +73,14 @@ def fitted(folder: Path, tables: dict[str, Table]) -> Fit:
 
 @pytest.mark.parametrize(
     "tables",
-    [sweeps(), ramps(), by_hand(), sweeps(OTHER), ramps(duration=1.0, sample_time=0.01), sweeps() | ramps()],
+    [
+        sweeps(),
+        ramps(),
+        by_hand(),
+        sweeps(OTHER),
+        ramps(duration=1.0, sample_time=0.01),
+        sweeps() | ramps(),
+    ],
     ids=["sweeps", "ramps", "by hand", "another muscle", "fast ramps", "both"],
 )
 def test_a_clean_bench_has_no_remark(tmp_path, tables):
@@ -71,16 +88,38 @@ def test_a_clean_bench_has_no_remark(tmp_path, tables):
 
 
 def cycles(
-    pressure: float, *, scale=1.0, period=10.0, count=1, friction=20.0, viscous=0.0, drift=0.0, noise=1.0, begin=0.0
+    pressure: float,
+    *,
+    scale=1.0,
+    period=10.0,
+    count=1,
+    friction=20.0,
+    viscous=0.0,
+    drift=0.0,
+    noise=1.0,
+    begin=0.0,
 ):
-    """Columns of isobaric cycles of 20 % with friction, damping and drift of the force, from `begin` [s] on."""
+    """Columns of isobaric cycles of 20 % with friction, damping and drift of the force, from
+    `begin` [s] on.
+    """
     random = np.random.default_rng(int(pressure) + int(begin))
     time = np.arange(0.0, count * period, period / 100.0)
     contraction = 0.1 - 0.1 * np.cos(2.0 * np.pi * time / period)
     speed = np.gradient(contraction, time)
-    force = scale * pressure * 1.5e-3 * (1.0 - contraction / 0.25) ** 1.3 * (1.0 + drift * (time + begin) / 40.0)
+    force = (
+        scale
+        * pressure
+        * 1.5e-3
+        * (1.0 - contraction / 0.25) ** 1.3
+        * (1.0 + drift * (time + begin) / 40.0)
+    )
     force += random.normal(0.0, noise, time.size) - friction * np.sign(speed) - viscous * speed
-    return {"time": time + begin, "pressure": np.full(time.size, pressure), "contraction": contraction, "force": force}
+    return {
+        "time": time + begin,
+        "pressure": np.full(time.size, pressure),
+        "contraction": contraction,
+        "force": force,
+    }
 
 
 def group_notes(*parts: dict[str, float]) -> str:
@@ -89,14 +128,19 @@ def group_notes(*parts: dict[str, float]) -> str:
     for pressure in (1e5, 2e5, 3e5, 4e5, 5e5):
         tables = [cycles(pressure, **part) for part in parts]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
-        recordings.append(Recording(columns, f"{pressure / 1e3:.0f}.csv", {"resting_length": RESTING_LENGTH}))
+        recordings.append(
+            Recording(columns, f"{pressure / 1e3:.0f}.csv", {"resting_length": RESTING_LENGTH})
+        )
     return "\n".join(note for note in check_data(recordings).notes if "two groups" in note)
 
 
 def test_two_muscles_in_files_without_a_column_are_named():
     notes = group_notes({}, {"scale": 1.15, "begin": 15.0})
     assert re.search(r"forces differ by 1\d % .*, and agree to 0.\d+ % within a group", notes)
-    assert re.search(r"\(100.csv rows 1 to 10\d, .* more; 500.csv rows 10\d to 200.*\)\. Are they two muscles", notes)
+    assert re.search(
+        r"\(100.csv rows 1 to 10\d, .* more; 500.csv rows 10\d to 200.*\)\. Are they two muscles",
+        notes,
+    )
     assert "columns={'muscle': 'specimen'}" in notes
 
 
@@ -117,35 +161,51 @@ def test_what_is_no_second_muscle_gives_no_two_groups(parts):
 
 @pytest.mark.parametrize("values", [("A", "B"), (1, 2)], ids=["text", "numbers"])
 def test_two_muscles_in_one_file_are_named_with_the_column_that_tells_them_apart(tmp_path, values):
-    notes = notes_of(tmp_path, one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=values))
+    notes = notes_of(
+        tmp_path, one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=values)
+    )
     assert "Rows contradict each other" in notes
     assert "both.csv, row" in notes
     assert (
-        "To state it as the specimen, use columns={'muscle': 'specimen'} of ColumnMapping. Fit each specimen" in notes
+        "To state it as the specimen, use columns={'muscle': 'specimen'} of ColumnMapping. Fit each"
+        " specimen" in notes
     )
 
 
 def force_map(muscle, shift):
-    """Static points without time on a grid of pressures and contractions; the shift is a fraction of a step of each."""
+    """Static points without time on a grid of pressures and contractions; the shift is a fraction
+    of a step of each.
+    """
     p, c = np.linspace(1e5, 5e5, 5) + shift[0] * 1e5, np.linspace(0.0, 0.2, 11) + shift[1] * 0.02
     pressure, contraction = (grid.ravel() for grid in np.meshgrid(p, c, indexing="ij"))
     return {"map": measured(np.arange(55.0), pressure, contraction, np.zeros(55), 7, muscle)}
 
 
-@pytest.mark.parametrize("shift", [(0.5, 0.0), (0.0, 0.5), (0.3, 0.4)], ids=["pressures", "lengths", "both"])
-def test_force_maps_of_two_muscles_without_time_and_without_a_common_point_contradict_each_other(tmp_path, shift):
+@pytest.mark.parametrize(
+    "shift", [(0.5, 0.0), (0.0, 0.5), (0.3, 0.4)], ids=["pressures", "lengths", "both"]
+)
+def test_force_maps_of_two_muscles_without_time_and_without_a_common_point_contradict_each_other(
+    tmp_path, shift
+):
     two = one_file(force_map(MUSCLE, (0.0, 0.0)), force_map(OTHER, shift))
     notes = notes_of(tmp_path / "two", two)
     assert "Rows contradict each other: apart from a smooth dependence on both quantities" in notes
     one = one_file(force_map(MUSCLE, (0.0, 0.0)), force_map(MUSCLE, shift))
     assert notes_of(tmp_path / "one", one) == ""
-    repeated = {"both": {name: np.concatenate([column[:8], column]) for name, column in two["both"].items()}}
-    assert "apart from a smooth dependence" in notes_of(tmp_path / "repeated", repeated), "points that agree"
+    repeated = {
+        "both": {name: np.concatenate([column[:8], column]) for name, column in two["both"].items()}
+    }
+    assert "apart from a smooth dependence" in notes_of(tmp_path / "repeated", repeated), (
+        "points that agree"
+    )
 
 
 def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):
     tables = one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=("A", "B"))
-    found = read(write(tables, tmp_path), ColumnMapping(columns={"muscle": "specimen"}, resting_length=RESTING_LENGTH))
+    found = read(
+        write(tables, tmp_path),
+        ColumnMapping(columns={"muscle": "specimen"}, resting_length=RESTING_LENGTH),
+    )
     assert [run.constants["specimen"] for run in found] == ["A", "B"]
     assert [run.origin for run in found] == ["both.csv, specimen A", "both.csv, specimen B"]
     assert found[1]["force"].max() > 1.3 * found[0]["force"].max()
@@ -166,13 +226,19 @@ def test_isobars_of_absolute_pressure_among_others_are_named(tmp_path):
 
 
 def test_a_fit_that_contradictory_rows_prevent_names_them(tmp_path):
-    """Absolute pressures leave four of six levels, too few for degree 4; more levels would be no remedy."""
+    """Absolute pressures leave four of six levels, too few for degree 4; more levels would be no
+    remedy.
+    """
     runs = read_all(tmp_path, every_other(sweeps(), PRESSURE, ATMOSPHERE))
-    with pytest.raises(IdentificationError, match=r"4 of pressure.* isobar_400\.csv are probably absolute") as refused:
+    with pytest.raises(
+        IdentificationError, match=r"4 of pressure.* isobar_400\.csv are probably absolute"
+    ) as refused:
         fit(blank_surface(4, 1e5), runs)
     assert refused.value.cause.startswith("the data cannot separate")
     (isobar,) = read_all(tmp_path / "one", {"one": sweeps()["isobar_300"]})
-    with pytest.raises(IdentificationError, match=r"use degree=\d of [\w.]+$|law with fewer parameters\.[^.]*\.$"):
+    with pytest.raises(
+        IdentificationError, match=r"use degree=\d of [\w.]+$|law with fewer parameters\.[^.]*\.$"
+    ):
         fit(blank_surface(4, 1e5), isobar)
 
 
@@ -187,7 +253,9 @@ def test_isobars_of_absolute_pressure_throughout_are_named(tmp_path):
     assert "The pressures are probably absolute, but read as gauge" in notes
 
 
-@pytest.mark.parametrize(("tables", "text"), [(ramps(), "40.2 N at zero pressure"), (sweeps(), "N at zero pressure")])
+@pytest.mark.parametrize(
+    ("tables", "text"), [(ramps(), "40.2 N at zero pressure"), (sweeps(), "N at zero pressure")]
+)
 def test_a_force_zero_is_named(tmp_path, tables, text):
     notes = notes_of(tmp_path, changed(tables, FORCE, lambda f: f + 40.0))
     assert text in notes
@@ -195,22 +263,31 @@ def test_a_force_zero_is_named(tmp_path, tables, text):
 
 
 def test_a_negative_force_zero_is_named_unless_it_is_the_limit_of_the_sensor(tmp_path):
-    """A slack muscle reads the same negative force at several lengths; a sensor that ends there reads no more."""
+    """A slack muscle reads the same negative force at several lengths; a sensor that ends there
+    reads no more.
+    """
     low = changed(ramps(), FORCE, lambda f: f - 25.0)
-    assert re.search(r"-2\d(\.\d)? N at zero pressure.*zero of the force sensor is wrong", notes_of(tmp_path, low))
+    assert re.search(
+        r"-2\d(\.\d)? N at zero pressure.*zero of the force sensor is wrong",
+        notes_of(tmp_path, low),
+    )
     ended = changed(ramps(), FORCE, lambda f: np.maximum(f, 4.0) - 25.0)
     assert "zero of the force sensor" not in notes_of(tmp_path / "ended", ended)
 
 
 def test_a_length_in_cm_under_mm_is_refused(tmp_path):
     with pytest.raises(
-        ColumnError, match=r"pulls at a contraction of 90 to 92\.4 %, but no pneumatic muscle pulls bey"
+        ColumnError,
+        match=r"pulls at a contraction of 90 to 92\.4 %, but no pneumatic muscle pulls bey",
     ):
         read_all(tmp_path, changed(sweeps(), LENGTH, lambda length: length / 10.0))
 
 
 def test_a_fit_refuses_contractions_of_no_muscle(tmp_path):
-    runs = [run.with_columns(contraction=0.6 + run["contraction"]) for run in read_all(tmp_path, sweeps())]
+    runs = [
+        run.with_columns(contraction=0.6 + run["contraction"])
+        for run in read_all(tmp_path, sweeps())
+    ]
     with pytest.raises(ColumnError, match="no pneumatic muscle pulls beyond 55 %"):
         fit(blank_surface(4, 1e4), runs)
 
@@ -254,17 +331,24 @@ def test_a_pressure_that_is_read_late_is_not_called_friction(tmp_path):
         time = table["time [s]"]
         table[PRESSURE] = np.interp(time - 0.04, time, table[PRESSURE])
     notes = notes_of(tmp_path, tables)
-    assert "the pressure follows the force by 3" in notes or "the pressure follows the force by 4" in notes
+    assert (
+        "the pressure follows the force by 3" in notes
+        or "the pressure follows the force by 4" in notes
+    )
     assert "shift the pressure by this time" in notes
 
 
 @pytest.mark.parametrize("offset", [-50.0, 50.0])
 def test_the_zero_of_the_force_is_read_where_an_isobar_is_slack(tmp_path, offset):
-    """At 60 and 80 kPa the muscle is slack from 15 % on; no reading without pressure and no line of the force shows it."""
+    """At 60 and 80 kPa the muscle is slack from 15 % on; no reading without pressure and no line of
+    the force shows it.
+    """
     time = 0.05 * np.arange(181)
     contraction = 0.24 * (1.0 - np.abs(1.0 - time / 4.5))
     runs = {
-        f"isobar_{p / 1e3:.0f}": measured(time, np.full(181, p), contraction, -np.sign(np.gradient(contraction)), i)
+        f"isobar_{p / 1e3:.0f}": measured(
+            time, np.full(181, p), contraction, -np.sign(np.gradient(contraction)), i
+        )
         for i, p in enumerate((60e3, 80e3, 5e5, 6e5))
     }
     assert notes_of(tmp_path / "right", runs) == ""
@@ -274,9 +358,11 @@ def test_the_zero_of_the_force_is_read_where_an_isobar_is_slack(tmp_path, offset
 
 @pytest.mark.parametrize(
     ("tables", "level"),
-    [({"isobar_400": sweeps()["isobar_400"]}, "pressure was measured at one level, 400 kPa"),
-     ({"held_8": ramps()["held_8"]}, "contraction was measured at one level, 8 %")],
-)  # fmt: skip
+    [
+        ({"isobar_400": sweeps()["isobar_400"]}, "pressure was measured at one level, 400 kPa"),
+        ({"held_8": ramps()["held_8"]}, "contraction was measured at one level, 8 %"),
+    ],
+)
 def test_a_fit_to_one_level_says_that_the_rest_is_the_form_of_the_law(tmp_path, tables, level):
     (recording,) = read_all(tmp_path, tables)
     law = TonduLopez2000(Braid(0.011, np.radians(25.0), RESTING_LENGTH), 1.15)
@@ -288,13 +374,17 @@ def test_a_fit_to_one_level_says_that_the_rest_is_the_form_of_the_law(tmp_path, 
 def test_a_pressure_sensor_at_its_limit_is_named(tmp_path):
     tables = ramps()
     assert notes_of(tmp_path / "right", tables) == ""
-    notes = notes_of(tmp_path / "wrong", changed(tables, PRESSURE, lambda pressure: np.minimum(pressure, 480.0)))
+    notes = notes_of(
+        tmp_path / "wrong", changed(tables, PRESSURE, lambda pressure: np.minimum(pressure, 480.0))
+    )
     assert "The pressure sensor saturates at 480 kPa" in notes
     assert "where the force still changes" in notes
 
 
 def test_a_gauge_pressure_below_zero_is_named_and_a_vacuum_is_not(tmp_path):
-    notes = notes_of(tmp_path / "zero", changed(ramps(), PRESSURE, lambda pressure: pressure - 12.0))
+    notes = notes_of(
+        tmp_path / "zero", changed(ramps(), PRESSURE, lambda pressure: pressure - 12.0)
+    )
     assert re.search(r"the gauge pressure is down to -(9|1\d)", notes)
     assert "Unless the rig draws a vacuum" in notes
     vacuum = changed(ramps(), PRESSURE, lambda pressure: np.maximum(pressure, 2.0) - 60.0)
@@ -308,14 +398,18 @@ def test_the_command_hysteresis_states_a_delay(tmp_path):
     result = airmuscle("hysteresis", *map(str, paths), *options)
     assert result.exit_code == 0, result.output
     assert "note: The loops of the ramps" in result.output
-    assert "those of a delay between the sensors" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "those of a delay between the sensors" in (tmp_path / "out" / "report.html").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_friction_is_not_called_a_delay(tmp_path):
     rough = dataclasses.replace(MUSCLE, friction=40.0)
     result = fitted(tmp_path, ramps(rough, duration=1.0, sample_time=0.005))
     assert not any("delay" in note for note in result.notes)
-    assert any("two branches" in note and "inflating and deflating" in note for note in result.notes)
+    assert any(
+        "two branches" in note and "inflating and deflating" in note for note in result.notes
+    )
 
 
 def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
@@ -326,12 +420,17 @@ def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
 
 
 def test_one_gross_outlier_is_reported_by_its_share_in_the_rms_error(tmp_path):
-    """One row of 1100 is below the least share of rows, yet 600 N of it are 18 N of the rms error."""
-    (name, *others) = sorted(tables := sweeps())
+    """One row of 1100 is below the least share of rows, yet 600 N of it are 18 N of the rms
+    error.
+    """
+    name, *others = sorted(tables := sweeps())
     glitch = with_glitches({name: tables[name]}, 0.0, (600.0, 601.0))
     notes = notes_of(tmp_path, {**tables, **glitch})
     rows = sum(table[FORCE].size for table in tables.values())
-    assert f"Suspected outliers of the force pull the law: 1 of {rows} rows, in 1 of {1 + len(others)} files" in notes
+    assert (
+        f"Suspected outliers of the force pull the law: 1 of {rows} rows, in 1 of {1 + len(others)}"
+        " files" in notes
+    )
     assert f"an rms error of {600 / rows**0.5:.2g} N" in notes
     assert "Suspected outliers" not in notes_of(
         tmp_path, {**tables, **with_glitches({name: tables[name]}, 0.0, (40.0, 41.0))}
@@ -349,11 +448,16 @@ def test_a_fit_states_the_scatter_of_its_data_and_a_law_that_does_not_follow_the
     good, poor = (fit(blank_surface(degree, 1e4), runs) for degree in (4, 1))
     assert good.scatter is not None
     assert good.scatter.noise == pytest.approx(1.0, rel=0.5)
-    assert 1.0 < good.scatter.repeatability < 2.0, "noise of force, pressure and length, and the distance of the rows"
+    assert 1.0 < good.scatter.repeatability < 2.0, (
+        "noise of force, pressure and length, and the distance of the rows"
+    )
     assert "noise of the data" in str(good)
     assert not any("does not follow" in note for note in good.notes)
     (misfit,) = [note for note in poor.notes if "does not follow" in note]
-    assert re.search(r"times the scatter of the data \(noise of the data [\d.]+ N, difference of repeated runs", misfit)
+    assert re.search(
+        r"times the scatter of the data \(noise of the data [\d.]+ N, difference of repeated runs",
+        misfit,
+    )
 
 
 def test_a_comparison_states_the_remarks_of_a_fit(tmp_path):
@@ -377,7 +481,9 @@ def test_a_ramp_held_at_rest_is_not_taken_for_ratios_as_percent(tmp_path):
 
 def test_a_repeated_run_within_the_tolerance_of_a_bench_is_no_contradiction(tmp_path):
     again = changed(sweeps(seed=30), FORCE, lambda f: 1.03 * f)
-    assert "contradict" not in notes_of(tmp_path, sweeps() | {f"again_{n}": t for n, t in again.items()})
+    assert "contradict" not in notes_of(
+        tmp_path, sweeps() | {f"again_{n}": t for n, t in again.items()}
+    )
 
 
 def test_a_campaign_states_what_it_finds_in_its_static_records(tmp_path):

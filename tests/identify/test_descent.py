@@ -1,5 +1,5 @@
-"""Levenberg-Marquardt within bounds ends where the sum of squares has no slope that a bound does not hold: where SciPy's
-trf ends too. Starts found by Newton's method meet their conditions exactly.
+"""Levenberg-Marquardt within bounds ends where the sum of squares has no slope that a bound does
+not hold: where SciPy's trf ends too. Starts found by Newton's method meet their conditions exactly.
 """
 
 from __future__ import annotations
@@ -21,20 +21,25 @@ def minimise(residuals, start, low, high, evaluations):
 
 def rosenbrock(x):
     """Minimum 0 at (1, 1), at the end of a curved valley."""
-    return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]), np.array([[-20 * x[0], 10.0], [-1.0, 0.0]])
+    return np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]), np.array(
+        [[-20 * x[0], 10.0], [-1.0, 0.0]]
+    )
 
 
 def decay(x, t=np.linspace(0, 3, 40)):
     """Two rates that are hard to tell apart, and noise: the sum of squares does not vanish."""
     noise = 1e-2 * np.random.default_rng(1).standard_normal(t.size)
-    first, second = np.exp(-x[0] * t), np.exp(-x[1] * t)
+    first = np.exp(-x[0] * t)
+    second = np.exp(-x[1] * t)
     measured = np.exp(-t) + np.exp(-2.5 * t) + noise
     return first + second - measured, np.column_stack([-t * first, -t * second])
 
 
 def valley(x):
     """Only the sum counts: every point of a line is as good."""
-    return np.array([x[0] + x[1] - 3.0, 2 * (x[0] + x[1]) - 6.5]), np.array([[1.0, 1.0], [2.0, 2.0]])
+    return np.array([x[0] + x[1] - 3.0, 2 * (x[0] + x[1]) - 6.5]), np.array(
+        [[1.0, 1.0], [2.0, 2.0]]
+    )
 
 
 @pytest.mark.parametrize("begin", [(-1.2, 1.0), (3.0, -2.0), (0.1, 0.1)])
@@ -45,11 +50,14 @@ def test_a_curved_valley_is_followed_to_its_end(begin):
 
 
 @pytest.mark.parametrize(
-    ("low", "high"), [(-np.inf, np.inf), (0.0, 2.0), (1.2, 2.0), (0.0, 0.8)], ids=["free", "one", "both", "other"]
+    ("low", "high"),
+    [(-np.inf, np.inf), (0.0, 2.0), (1.2, 2.0), (0.0, 0.8)],
+    ids=["free", "one", "both", "other"],
 )
 def test_the_optimum_is_that_of_trf(low, high):
     """With no bound, one, or both unknowns on a bound."""
-    begin, ends = np.array([1.4, 1.5]).clip(low, high), (np.full(2, low), np.full(2, high))
+    begin = np.array([1.4, 1.5]).clip(low, high)
+    ends = (np.full(2, low), np.full(2, high))
     asked = []
 
     def counted(x):
@@ -60,7 +68,13 @@ def test_the_optimum_is_that_of_trf(low, high):
     assert ended
     assert len(asked) <= 12
     expected = least_squares(
-        lambda x: decay(x)[0], begin, lambda x: decay(x)[1], ends, ftol=1e-14, xtol=1e-14, gtol=1e-14
+        lambda x: decay(x)[0],
+        begin,
+        lambda x: decay(x)[1],
+        ends,
+        ftol=1e-14,
+        xtol=1e-14,
+        gtol=1e-14,
     )
     np.testing.assert_allclose(found, expected.x, atol=3e-5)
     assert cost == pytest.approx(2 * expected.cost, rel=1e-8)
@@ -100,7 +114,8 @@ def test_no_more_is_asked_than_allowed():
 
 def test_what_hardly_matters_does_not_keep_the_others_from_going():
     """A step of a hundred times its size for the one unknown, of half its size for the others."""
-    t, asked = np.linspace(0.0, 1.0, 30), []
+    t = np.linspace(0.0, 1.0, 30)
+    asked = []
     columns = np.column_stack([np.ones_like(t), t, 1e-4 * t**2])
 
     def residuals(x):
@@ -121,7 +136,9 @@ def _place(x, seed):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_jumps_of_the_sum_do_not_hinder_its_end(seed):
-    """RunSplit of adaptive steps: the sum jumps by a millionth from place to place, while the slopes are right."""
+    """RunSplit of adaptive steps: the sum jumps by a millionth from place to place, while the
+    slopes are right.
+    """
     asked = []
 
     def jumping(x):
@@ -132,7 +149,9 @@ def test_jumps_of_the_sum_do_not_hinder_its_end(seed):
     found, _, ended = minimise(jumping, np.array([0.8, 3.0]), *FREE, 200)
     assert ended
     assert len(asked) <= 6
-    np.testing.assert_allclose(found, minimise(decay, np.array([0.8, 3.0]), *FREE, 200)[0], atol=1e-8)
+    np.testing.assert_allclose(
+        found, minimise(decay, np.array([0.8, 3.0]), *FREE, 200)[0], atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -150,7 +169,9 @@ def test_nor_do_jumps_of_the_place_where_it_is_least(seed):
 
 
 def test_a_place_much_worse_than_promised_is_not_taken_for_a_jump():
-    """The last step of the search, which promises less than a millionth, finds twice the residuals."""
+    """The last step of the search, which promises less than a millionth, finds twice the
+    residuals.
+    """
     asked = []
 
     def residuals(x):
@@ -170,7 +191,9 @@ def test_slopes_too_steep_to_be_squared_end_the_search():
 
 
 def test_what_was_refused_is_not_asked_again():
-    """Both unknowns stop at how far they may go, whatever the damping: a place that cannot be run is asked once."""
+    """Both unknowns stop at how far they may go, whatever the damping: a place that cannot be run
+    is asked once.
+    """
     asked = []
 
     def residuals(x):
@@ -182,14 +205,22 @@ def test_what_was_refused_is_not_asked_again():
 
 
 def test_a_step_onto_a_bound_is_the_best_within_it():
-    """Of a quadratic of three unknowns: what a bound stops stands on it, and the others have no slope there."""
+    """Of a quadratic of three unknowns: what a bound stops stands on it, and the others have no
+    slope there.
+    """
     rng = np.random.default_rng(3)
     a = rng.standard_normal((8, 3))
-    normal, gradient, x = a.T @ a, a.T @ rng.standard_normal(8), np.zeros(3)
+    normal = a.T @ a
+    gradient = a.T @ rng.standard_normal(8)
+    x = np.zeros(3)
     whole = np.linalg.solve(normal, -gradient)
-    low, high = np.full(3, -9.0), np.full(3, 9.0)
-    high[np.argmax(np.abs(whole))] = low[np.argmax(np.abs(whole))] = 0.3 * whole[np.argmax(np.abs(whole))]
-    low, high = np.where(whole < 0, low, -9.0), np.where(whole < 0, 9.0, high)
+    low = np.full(3, -9.0)
+    high = np.full(3, 9.0)
+    high[np.argmax(np.abs(whole))] = low[np.argmax(np.abs(whole))] = (
+        0.3 * whole[np.argmax(np.abs(whole))]
+    )
+    low = np.where(whole < 0, low, -9.0)
+    high = np.where(whole < 0, 9.0, high)
     found = bounded_step(normal, gradient, np.zeros(3), x, low, high)
     held = np.argmax(np.abs(whole))
     assert found[held] == pytest.approx(0.3 * whole[held])

@@ -1,4 +1,6 @@
-"""Episodes of an arm: every format gives the same numbers, and what a record hides or contradicts is named."""
+"""Episodes of an arm: every format gives the same numbers, and what a record hides or contradicts
+is named.
+"""
 
 from __future__ import annotations
 
@@ -41,12 +43,19 @@ columns = ["p1", "p2"]
 
 
 def by_columns(run):
-    return {"t": STEP * np.arange(len(run)), "q1": run.angle[:, 0], "p1": run.pressure[:, 0], "p2": run.pressure[:, 1]}
+    return {
+        "t": STEP * np.arange(len(run)),
+        "q1": run.angle[:, 0],
+        "p1": run.pressure[:, 0],
+        "p2": run.pressure[:, 1],
+    }
 
 
 def write_csv(folder, run, number):
     table = by_columns(run)
-    rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*table.values(), strict=True))
+    rows = "\n".join(
+        ",".join(map(repr, map(float, row))) for row in zip(*table.values(), strict=True)
+    )
     (folder / f"{number}.csv").write_text(",".join(table) + "\n" + rows + "\n")
 
 
@@ -55,7 +64,9 @@ def write_npz(folder, run, number):
 
 
 def write_json(folder, run, number):
-    (folder / f"{number}.json").write_text(json.dumps({n: c.tolist() for n, c in by_columns(run).items()}))
+    (folder / f"{number}.json").write_text(
+        json.dumps({n: c.tolist() for n, c in by_columns(run).items()})
+    )
 
 
 def write_hdf5(folder, run, number):
@@ -98,13 +109,19 @@ def test_a_folder_with_one_file_for_each_episode(tmp_path, mapping, write):
 def steps_of(run):
     """The steps of an episode as RLDS has them: an observation and an action each, and flags."""
     return [
-        {"observation": {"q": a.tolist(), "p": p.tolist()}, "action": p.tolist(), "is_first": k == 0}
+        {
+            "observation": {"q": a.tolist(), "p": p.tolist()},
+            "action": p.tolist(),
+            "is_first": k == 0,
+        }
         for k, (a, p) in enumerate(zip(run.angle, run.pressure, strict=True))
     ]
 
 
 def write_steps(folder, run, number):
-    (folder / f"{number}.json").write_text(json.dumps({"steps": steps_of(run), "episode_metadata": {"name": "x"}}))
+    (folder / f"{number}.json").write_text(
+        json.dumps({"steps": steps_of(run), "episode_metadata": {"name": "x"}})
+    )
 
 
 def write_step_lines(folder, run, number):
@@ -112,14 +129,19 @@ def write_step_lines(folder, run, number):
 
 
 def write_step_arrays(folder, run, number):
-    arrays = {"steps/observation/q": run.angle, "steps/observation/p": run.pressure, "steps/action": run.pressure}
+    arrays = {
+        "steps/observation/q": run.angle,
+        "steps/observation/p": run.pressure,
+        "steps/action": run.pressure,
+    }
     np.savez(folder / f"{number}.npz", **arrays)
 
 
 def write_step_groups(folder, run, number):
     h5py = pytest.importorskip("h5py")
     with h5py.File(folder / f"{number}.h5", "w") as file:
-        file["steps/observation/q"], file["steps/observation/p"] = run.angle, run.pressure
+        file["steps/observation/q"] = run.angle
+        file["steps/observation/p"] = run.pressure
         file["steps/action"] = run.pressure
 
 
@@ -158,24 +180,36 @@ def test_a_folder_of_steps_with_observation_and_action(tmp_path, mapping, write)
 
 def test_flags_of_first_steps_split_one_table(tmp_path, mapping):
     np.savez(
-        tmp_path / "all.npz", q=MADE.rows("angle"), p=MADE.rows("pressure"),
+        tmp_path / "all.npz",
+        q=MADE.rows("angle"),
+        p=MADE.rows("pressure"),
         is_first=np.concatenate([np.arange(len(run)) == 0 for run in MADE.runs]),
-    )  # fmt: skip
-    text = 'sample_time = "10 ms"\nstarts = "is_first"\n[angles]\ncolumns = "q"\n[pressures]\ncolumns = "p"\n'
+    )
+    text = (
+        'sample_time = "10 ms"\nstarts = "is_first"\n[angles]\ncolumns = "q"\n[pressures]\ncolumns'
+        ' = "p"\n'
+    )
     read = read_episodes(tmp_path / "all.npz", mapping(text))
     assert [len(run) for run in read.runs] == [len(run) for run in MADE.runs]
 
 
 @pytest.fixture
 def bags(tmp_path):
-    """A folder with one ROS 2 bag for each episode: joint states and pressures, whose messages come unevenly."""
+    """A folder with one ROS 2 bag for each episode: joint states and pressures, whose messages come
+    unevenly.
+    """
     rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
     typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    state, several = (store.types[n] for n in ("sensor_msgs/msg/JointState", "std_msgs/msg/Float64MultiArray"))
+    state, several = (
+        store.types[n] for n in ("sensor_msgs/msg/JointState", "std_msgs/msg/Float64MultiArray")
+    )
     layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
-    header = store.types["std_msgs/msg/Header"](store.types["builtin_interfaces/msg/Time"](1, 0), "")
-    rng, folder = np.random.default_rng(0), tmp_path / "bags"
+    header = store.types["std_msgs/msg/Header"](
+        store.types["builtin_interfaces/msg/Time"](1, 0), ""
+    )
+    rng = np.random.default_rng(0)
+    folder = tmp_path / "bags"
     folder.mkdir()
     for number, run in enumerate(MADE.runs):
         with rosbag2.Writer(folder / f"episode{number}", version=9) as writer:
@@ -185,7 +219,11 @@ def bags(tmp_path):
                 stamp = 10**9 + k * 10**7 + int(rng.uniform(-1e6, 1e6))
                 message = state(header, ["elbow"], a, v, np.array([]))
                 writer.write(joints, stamp, store.serialize_cdr(message, state.__msgtype__))
-                writer.write(pressures, stamp - 10**5, store.serialize_cdr(several(layout, p), several.__msgtype__))
+                writer.write(
+                    pressures,
+                    stamp - 10**5,
+                    store.serialize_cdr(several(layout, p), several.__msgtype__),
+                )
     return folder
 
 
@@ -196,10 +234,16 @@ def test_a_folder_of_bags_is_read_by_its_proposed_mapping(bags, mapping):
     assert len(read) == 3
     assert read.sample_time == STEP
     for one, other in zip(read.runs, MADE.runs, strict=True):
-        rows = min(len(one), len(other) - 1) - 1  # the first message, of the pressures, has no angle before it
+        rows = (
+            min(len(one), len(other) - 1) - 1
+        )  # the first message, of the pressures, has no angle before it
         assert rows > len(other) - 4
-        assert np.abs(one.angle - other.angle[1 : 1 + len(one)])[:rows].max() < 0.05 * np.ptp(other.angle)
-        assert np.abs(one.pressure - other.pressure[1 : 1 + len(one)])[:rows].max() < 0.1 * np.ptp(other.pressure)
+        assert np.abs(one.angle - other.angle[1 : 1 + len(one)])[:rows].max() < 0.05 * np.ptp(
+            other.angle
+        )
+        assert np.abs(one.pressure - other.pressure[1 : 1 + len(one)])[:rows].max() < 0.1 * np.ptp(
+            other.pressure
+        )
     assert "intervals of messages differ by" in "".join(read.notes)
     alone = read_episodes(bags / "episode1", mapping(text))
     np.testing.assert_array_equal(alone.runs[0].angle, read.runs[1].angle)
@@ -207,29 +251,41 @@ def test_a_folder_of_bags_is_read_by_its_proposed_mapping(bags, mapping):
 
 def test_a_mapping_is_proposed_from_names_and_sizes(tmp_path, mapping):
     np.savez(
-        tmp_path / "all.npz", start=np.cumsum([0, *map(len, MADE.runs)]), joint_angle=np.degrees(MADE.rows("angle")),
-        joint_speed=np.degrees(MADE.rows("speed")), pressure=MADE.rows("pressure") / 1e5, valve_command=MADE.rows("pressure"),
+        tmp_path / "all.npz",
+        start=np.cumsum([0, *map(len, MADE.runs)]),
+        joint_angle=np.degrees(MADE.rows("angle")),
+        joint_speed=np.degrees(MADE.rows("speed")),
+        pressure=MADE.rows("pressure") / 1e5,
+        valve_command=MADE.rows("pressure"),
         note=np.zeros(3),
-    )  # fmt: skip
+    )
     text = propose_mapping(tmp_path / "all.npz")
     read = read_episodes(tmp_path / "all.npz", mapping(text))
-    assert read.sample_time == pytest.approx(STEP, rel=0.05)  # with which the angles move as fast as the speeds
+    assert read.sample_time == pytest.approx(
+        STEP, rel=0.05
+    )  # with which the angles move as fast as the speeds
     for name in ("angle", "speed", "pressure"):
         np.testing.assert_allclose(read.rows(name), MADE.rows(name), rtol=1e-9, atol=1e-12)
     assert read.runs[0].command is not None
     assert "note (3,)" in text
     shown = airmuscle("fit-joint", str(tmp_path / "all.npz"), "--inspect")
     assert shown.exit_code != 0
-    assert "a mapping file is needed, which states what the columns are" in " ".join(shown.output.split())
+    assert "a mapping file is needed, which states what the columns are" in " ".join(
+        shown.output.split()
+    )
     assert 'unit = "deg"' in shown.output
 
 
 def test_one_file_for_all_with_starts_scales_and_divisors(tmp_path, mapping):
     lengths = np.cumsum([0, *map(len, MADE.runs)])
     np.savez(
-        tmp_path / "all.npz", start=lengths, q=np.degrees(MADE.rows("angle")), v=MADE.rows("speed") / 10,
-        counts=MADE.rows("pressure") * 2, divisors=np.array([2e3, 2e3]),
-    )  # fmt: skip
+        tmp_path / "all.npz",
+        start=lengths,
+        q=np.degrees(MADE.rows("angle")),
+        v=MADE.rows("speed") / 10,
+        counts=MADE.rows("pressure") * 2,
+        divisors=np.array([2e3, 2e3]),
+    )
     read = read_episodes(tmp_path / "all.npz", mapping(ONE_FILE))
     assert [len(run) for run in read.runs] == [len(run) for run in MADE.runs]
     for name in ("angle", "speed", "pressure"):
@@ -243,7 +299,10 @@ def test_speeds_are_those_of_each_episode_where_one_file_holds_all(tmp_path, map
         "p": MADE.rows("pressure"),
     }
     np.savez(tmp_path / "all.npz", **table)
-    text = 'sample_time = "10 ms"\nstarts = "start"\n[angles]\ncolumns = "q"\nunit = "deg"\n[pressures]\ncolumns = "p"\nunit = "kPa"\n'
+    text = (
+        'sample_time = "10 ms"\nstarts = "start"\n[angles]\ncolumns = "q"\nunit ='
+        ' "deg"\n[pressures]\ncolumns = "p"\nunit = "kPa"\n'
+    )
     read = read_episodes(tmp_path / "all.npz", mapping(text))
     for run, made in zip(read.runs, MADE.runs, strict=True):
         np.testing.assert_allclose(run.speed, speed_of(made.angle, STEP), rtol=1e-9)
@@ -251,17 +310,24 @@ def test_speeds_are_those_of_each_episode_where_one_file_holds_all(tmp_path, map
     for starts in ([0, 5000, 10], [0, 95.5], [0, 400], []):
         np.savez(tmp_path / "bad.npz", **{**table, "start": np.array(starts)})
         with pytest.raises(
-            ColumnError, match=r"starts, column 'start', must be the first rows .* rising below 285 rows"
+            ColumnError,
+            match=r"starts, column 'start', must be the first rows .* rising below 285 rows",
         ):
             read_episodes(tmp_path / "bad.npz", mapping(text))
 
 
 def test_a_sample_time_that_contradicts_the_column_of_times_is_named(tmp_path, mapping):
-    np.savez(tmp_path / "0.npz", **{**by_columns(MADE.runs[0]), "t": 1e3 * STEP * np.arange(len(MADE.runs[0]))})
+    np.savez(
+        tmp_path / "0.npz",
+        **{**by_columns(MADE.runs[0]), "t": 1e3 * STEP * np.arange(len(MADE.runs[0]))},
+    )
     stated = COLUMNS.replace('time = "t"', 'sample_time = "10 ms"')
-    assert read_episodes(tmp_path / "0.npz", mapping(stated)).sample_time == STEP  # the times are ms
+    assert (
+        read_episodes(tmp_path / "0.npz", mapping(stated)).sample_time == STEP
+    )  # the times are ms
     with pytest.raises(
-        ColumnError, match="column 't' advances by 10 in a row, the mapping file states a sample time of 20 ms"
+        ColumnError,
+        match="column 't' advances by 10 in a row, the mapping file states a sample time of 20 ms",
     ):
         read_episodes(tmp_path / "0.npz", mapping(stated.replace("10", "20")))
 
@@ -271,7 +337,9 @@ def test_json_holds_a_list_of_episodes(tmp_path, mapping):
     (tmp_path / "all.json").write_text(json.dumps(tables))
     assert len(read_episodes(tmp_path / "all.json", mapping(COLUMNS))) == 3
     (tmp_path / "all.json").write_text("[1, 2]")
-    with pytest.raises(FileError, match="an object of lists is expected, or a list of such objects"):
+    with pytest.raises(
+        FileError, match="an object of lists is expected, or a list of such objects"
+    ):
         read_episodes(tmp_path / "all.json", mapping(COLUMNS))
 
 
@@ -280,15 +348,30 @@ def test_json_holds_a_list_of_episodes(tmp_path, mapping):
     [
         ('[angles]\ncolumns=["q1"]\n', r"no table \[pressures\]; name its columns"),
         (COLUMNS.replace('time = "t"', ""), "state either sample_time"),
-        (COLUMNS + "[arm]\npairs = [[1, 1]]\n", "give for each joint the numbers of two muscles, each muscle once"),
+        (
+            COLUMNS + "[arm]\npairs = [[1, 1]]\n",
+            "give for each joint the numbers of two muscles, each muscle once",
+        ),
         (COLUMNS + '[arm]\naxes = ["w"]\n', "arm.axes holds 'w'; allowed: x, "),
-        (COLUMNS.replace("[angles]\n", '[angles]\nunit = "turn"\n'), "angles.unit is 'turn'; allowed: rad, deg"),
-        (COLUMNS.replace("[pressures]\n", '[pressures]\nunit = "mm"\n'), "pressures.unit is 'mm'; allowed: Pa, hPa"),
+        (
+            COLUMNS.replace("[angles]\n", '[angles]\nunit = "turn"\n'),
+            "angles.unit is 'turn'; allowed: rad, deg",
+        ),
+        (
+            COLUMNS.replace("[pressures]\n", '[pressures]\nunit = "mm"\n'),
+            "pressures.unit is 'mm'; allowed: Pa, hPa",
+        ),
         (COLUMNS + "[commands]\nunit = 3\ncolumns = 'p1'", "commands.unit is '3'; allowed: none"),
         (COLUMNS + "[arm]\npairs = 3\n", "arm.pairs is 3; give for each joint"),
-        (COLUMNS + "[arm]\npairs = [['a', 'b']]\n", "give for each joint the numbers of two muscles"),
+        (
+            COLUMNS + "[arm]\npairs = [['a', 'b']]\n",
+            "give for each joint the numbers of two muscles",
+        ),
         (COLUMNS + "[arm]\naxes = [[0, 0, 1]]\n", r"arm.axes holds '\[0, 0, 1\]'; allowed: x, "),
-        (COLUMNS.replace('columns = ["q1"]', "columns = 3"), "angles.columns must be a name or a list of names"),
+        (
+            COLUMNS.replace('columns = ["q1"]', "columns = 3"),
+            "angles.columns must be a name or a list of names",
+        ),
         ("tim = 3\n" + COLUMNS, "unknown key 'tim'"),
     ],
 )
@@ -321,7 +404,8 @@ def test_a_folder_without_episodes_and_a_foreign_format_are_refused(tmp_path, ma
         read_episodes(tmp_path / "empty", mapping(COLUMNS))
     (tmp_path / "empty" / "arm-train.tfrecord-00000-of-00001").write_bytes(b"x")
     with pytest.raises(
-        FileError, match=r"TFRecord files are not read\. Write each episode with the package that made them"
+        FileError,
+        match=r"TFRecord files are not read\. Write each episode with the package that made them",
     ):
         read_episodes(tmp_path / "empty", mapping(COLUMNS))
     (tmp_path / "a.doc").write_text("x")
@@ -358,7 +442,8 @@ def test_pressures_without_an_effect_are_not_assigned():
     rng = np.random.default_rng(1)
     found = inspect_episodes(changed(JOINT, pressure=lambda p: rng.uniform(0.0, 3e5, p.shape)))
     with pytest.raises(
-        IdentificationError, match="joint 1: 0 pressures with certainty for raising its angle, 0 for lowering it; one"
+        IdentificationError,
+        match="joint 1: 0 pressures with certainty for raising its angle, 0 for lowering it; one",
     ):
         _ = found.pairs
 
@@ -377,13 +462,34 @@ def dead(pressure):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"angle": jumped}, r"episode 1: angle 1 jumps from .* at row 51, as an encoder does that wraps"),
-        ({"pressure": lambda p: p * [1.0, 0.0]}, "pressure 2 never varies, it is 0 to 0 Pa in 98 % of"),
-        ({"pressure": dead}, r"pressure 2 never varies, it is 9.\d+e\+04 to 1.00\d+e\+05 Pa in 98 % of the rows"),
-        ({"angle": lambda q: 0.1 + 0 * q}, "angle 1 never varies, it is 0.1 to 0.1 rad in 98 % of the rows"),
-        ({"angle": np.degrees}, r"angle 1 reaches .* rad, further than a joint turns: state its unit .* \[angles\]"),
-        ({"pressure": lambda p: 1e3 * p}, r"pressure 1 reaches .* Pa, more than a muscle bears: .* \[pressures\]"),
-        ({"speed": np.degrees}, 'speeds multiplied by 0.0174., as speeds in degrees have: unit = "deg/s". State'),
+        (
+            {"angle": jumped},
+            r"episode 1: angle 1 jumps from .* at row 51, as an encoder does that wraps",
+        ),
+        (
+            {"pressure": lambda p: p * [1.0, 0.0]},
+            "pressure 2 never varies, it is 0 to 0 Pa in 98 % of",
+        ),
+        (
+            {"pressure": dead},
+            r"pressure 2 never varies, it is 9.\d+e\+04 to 1.00\d+e\+05 Pa in 98 % of the rows",
+        ),
+        (
+            {"angle": lambda q: 0.1 + 0 * q},
+            "angle 1 never varies, it is 0.1 to 0.1 rad in 98 % of the rows",
+        ),
+        (
+            {"angle": np.degrees},
+            r"angle 1 reaches .* rad, further than a joint turns: state its unit .* \[angles\]",
+        ),
+        (
+            {"pressure": lambda p: 1e3 * p},
+            r"pressure 1 reaches .* Pa, more than a muscle bears: .* \[pressures\]",
+        ),
+        (
+            {"speed": np.degrees},
+            'speeds multiplied by 0.0174., as speeds in degrees have: unit = "deg/s". State',
+        ),
         (
             {"speed": lambda v: v / 1.5},
             r"angles move 1\.(49\d?|5) times as fast as the speeds say: the sample time of 10 ms",
@@ -397,19 +503,25 @@ def test_what_forbids_a_fit_is_named(change, message):
 
 def test_the_t_values_of_one_episode_are_no_certainty():
     """They were 4e14, because one cluster of errors has no scatter."""
-    assert all(2.0 < action.t_value < 100.0 for action in inspect_episodes(made_episodes(1, rows=400)).actions)
+    assert all(
+        2.0 < action.t_value < 100.0
+        for action in inspect_episodes(made_episodes(1, rows=400)).actions
+    )
 
 
 def test_exchanged_muscles_are_named():
     found = inspect_episodes(JOINT, pairs=((2, 1),))
     assert (
-        "the mapping says that pressure 2 raises angle 1, the record that pressure 2 lowers angle 1" in found.errors[0]
+        "the mapping says that pressure 2 raises angle 1, the record that pressure 2 lowers angle 1"
+        in found.errors[0]
     )
     assert not inspect_episodes(JOINT, pairs=((1, 2),)).errors
 
 
 def test_saturated_readings_and_counts_are_remarked():
-    (saturated,) = inspect_episodes(changed(JOINT, pressure=lambda p: np.minimum(p, [2e5, 1e9]))).remarks
+    (saturated,) = inspect_episodes(
+        changed(JOINT, pressure=lambda p: np.minimum(p, [2e5, 1e9]))
+    ).remarks
     assert "pressure 1 is 2e+05 Pa in 752 of 1900 rows (40 %)" in saturated
     assert "its reading saturates there" in saturated
     (counts,) = inspect_episodes(changed(JOINT, pressure=lambda p: np.round(p / 10.0))).remarks
@@ -428,12 +540,15 @@ def test_angles_whose_range_is_that_of_another_unit_are_remarked():
 
 
 def test_noise_and_outliers_of_the_readings_are_no_wrong_sample_time():
-    """One joint of a measured arm, whose angle has wrong readings, was refused by itself: its slopes said 0.86."""
+    """One joint of a measured arm, whose angle has wrong readings, was refused by itself: its
+    slopes said 0.86.
+    """
     rng = np.random.default_rng(0)
     noisy = changed(
-        JOINT, speed=lambda v: v + rng.normal(0.0, 0.5 * np.std(v), v.shape),
+        JOINT,
+        speed=lambda v: v + rng.normal(0.0, 0.5 * np.std(v), v.shape),
         angle=lambda q: np.where(rng.random(q.shape) < 0.01, q + 1.0, q),
-    )  # fmt: skip
+    )
     assert not inspect_episodes(noisy).errors
     assert "angles move 1.4" in inspect_episodes(changed(noisy, speed=lambda v: v / 1.5)).errors[0]
 
@@ -445,7 +560,9 @@ def test_a_sample_time_that_nothing_confirms_is_remarked(tmp_path, mapping):
     assert not inspect_episodes(with_times).remarks
     np.savez(tmp_path / "0.npz", **{n: c for n, c in by_columns(JOINT.runs[0]).items() if n != "t"})
     (remark,) = inspect_episodes(read_episodes(tmp_path / "0.npz", mapping(stated))).remarks
-    assert remark.startswith("the sample time of 10 ms cannot be checked, because the record has neither times nor")
+    assert remark.startswith(
+        "the sample time of 10 ms cannot be checked, because the record has neither times nor"
+    )
 
 
 def test_episodes_shorter_than_a_window_are_refused():
@@ -455,16 +572,23 @@ def test_episodes_shorter_than_a_window_are_refused():
     mixed = replace(JOINT, runs=(*JOINT.runs[:4], *made_episodes(2, rows=45).runs))
     kept, (remark,) = long_enough(mixed, 40)
     assert kept.runs == JOINT.runs[:4]
-    assert remark == (
-        "2 of 6 episodes, shorter than a window of 52 rows, left out: episode 1 (45 rows), episode 2 (45 rows)"
+    assert (
+        remark
+        == "2 of 6 episodes, shorter than a window of 52 rows, left out: episode 1 (45 rows),"
+        " episode 2 (45 rows)"
     )
     assert remark in inspect_episodes(mixed).remarks
     assert not inspect_episodes(mixed, rows=30).remarks
-    assert "the longest has 45 rows, a window needs 52" in inspect_episodes(made_episodes(20, rows=45)).errors[0]
+    assert (
+        "the longest has 45 rows, a window needs 52"
+        in inspect_episodes(made_episodes(20, rows=45)).errors[0]
+    )
 
 
 def test_a_window_reads_no_pressure_after_its_end():
-    """With a delay of the sensors the last reading is held, so that a prediction uses nothing from beyond."""
+    """With a delay of the sensors the last reading is held, so that a prediction uses nothing from
+    beyond.
+    """
     ramp = changed(MADE, pressure=lambda p: np.tile(np.arange(len(p), dtype=float)[:, None], 2))
     windows = cut(ramp, delay=3)
     assert windows.pressure[0, 10, 0] == windows.first[0] + 3

@@ -1,7 +1,8 @@
-"""Fitting k = k_max (1 - exp v(p, F)) returns the surface behind the data, by logarithm and by least squares on k.
+"""Fitting k = k_max (1 - exp v(p, F)) returns the surface behind the data, by logarithm and by
+least squares on k.
 
-What the data cannot determine is refused with the rank; a monotone fit never rises with F nor falls with p,
-between the points as on them; the correlation index exists or says that it does not.
+What the data cannot determine is refused with the rank; a monotone fit never rises with F nor falls
+with p, between the points as on them; the correlation index exists or says that it does not.
 """
 
 import dataclasses
@@ -40,10 +41,15 @@ FITS = [fit_linearised, fit_nonlinear]
 def other_muscle(points: int = 400, seed: int = 1) -> Recording:
     """A muscle of the user: other sizes, other k_max, scattered points, noise."""
     rng = np.random.default_rng(seed)
-    pressure, force = rng.uniform(0, 6e5, points), rng.uniform(0, 1500, points)
-    contraction = 0.3 * (1 - np.exp(-((pressure / 1e5) ** 1.5) / (4 + force / 150))) - 0.02 * force / 1500
+    pressure = rng.uniform(0, 6e5, points)
+    force = rng.uniform(0, 1500, points)
+    contraction = (
+        0.3 * (1 - np.exp(-((pressure / 1e5) ** 1.5) / (4 + force / 150))) - 0.02 * force / 1500
+    )
     noise = 0.004 * rng.standard_normal(points)
-    return Recording({"pressure": pressure, "force": force, "contraction": contraction + noise}, origin="bench")
+    return Recording(
+        {"pressure": pressure, "force": force, "contraction": contraction + noise}, origin="bench"
+    )
 
 
 @pytest.mark.parametrize("procedure", FITS)
@@ -58,11 +64,15 @@ def test_undisturbed_curves_give_back_the_exact_surface(procedure):
 
 # Plane curves rounded to 0.5 %, and with normal noise of 0.5 % (numpy's default generator, seed 0):
 # rms in per cent of contraction, computed apart from this program.
-@pytest.mark.parametrize(("disturbance", "by_log", "by_k"), [("rounded", 0.1118, 0.1076), ("noise", 0.322, 0.319)])
+@pytest.mark.parametrize(
+    ("disturbance", "by_log", "by_k"), [("rounded", 0.1118, 0.1076), ("noise", 0.322, 0.319)]
+)
 def test_disturbed_curves_tell_the_procedures_apart(disturbance, by_log, by_k):
     k = CURVES["contraction"]
     noise = 0.005 * np.random.default_rng(0).standard_normal(45)
-    data = CURVES.with_columns(contraction=np.round(k * 200) / 200 if disturbance == "rounded" else k + noise)
+    data = CURVES.with_columns(
+        contraction=np.round(k * 200) / 200 if disturbance == "rounded" else k + noise
+    )
     digits = 0.00005 if disturbance == "rounded" else 0.0005
     assert 100 * fit_linearised(data, 0.40).rmse == pytest.approx(by_log, abs=digits)
     assert 100 * fit_nonlinear(data, 0.40).rmse == pytest.approx(by_k, abs=digits)
@@ -72,20 +82,30 @@ def test_least_squares_on_k_has_no_slope_left_in_any_coefficient():
     data = other_muscle()
     found = fit_nonlinear(data, 0.3)
     errors = found.model.contraction(data["pressure"], data["force"]) - data["contraction"]
-    _, by_parameters = autodiff.jacobian(found.model, "contraction", data["pressure"], data["force"])
+    _, by_parameters = autodiff.jacobian(
+        found.model, "contraction", data["pressure"], data["force"]
+    )
     by_coefficients = by_parameters[:, :15]
-    cosines = errors @ by_coefficients / (np.linalg.norm(errors) * np.linalg.norm(by_coefficients, axis=0))
+    cosines = (
+        errors
+        @ by_coefficients
+        / (np.linalg.norm(errors) * np.linalg.norm(by_coefficients, axis=0))
+    )
     assert np.abs(cosines).max() < 1e-7
     assert found.rmse < fit_linearised(data, 0.3).rmse
 
 
 def test_the_derivatives_by_the_coefficients_are_exact():
     problem = SurfaceProblem.from_recording(CURVES, 0.40, 4, 2)
-    start, step = np.linspace(-0.5, 0.5, 15), 1e-6
+    start = np.linspace(-0.5, 0.5, 15)
+    step = 1e-6
     differences = [
-        (problem.residuals(start + step * e) - problem.residuals(start - step * e)) / (2 * step) for e in np.eye(15)
+        (problem.residuals(start + step * e) - problem.residuals(start - step * e)) / (2 * step)
+        for e in np.eye(15)
     ]
-    assert problem.jacobian(start) == pytest.approx(np.column_stack(differences), rel=1e-7, abs=1e-8)
+    assert problem.jacobian(start) == pytest.approx(
+        np.column_stack(differences), rel=1e-7, abs=1e-8
+    )
 
 
 @pytest.mark.parametrize("procedure", FITS)
@@ -98,7 +118,8 @@ def test_any_degrees_and_any_saturation_are_returned(procedure):
     law = BorzikovaExponential(tuple(plain), *validity_range, 5, 3, saturation=0.28)
     pressure, force = (v.ravel() for v in validity_range.grid(12, 7))
     data = Recording(
-        {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}, origin="law"
+        {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)},
+        origin="law",
     )
     found = procedure(data, 0.28, pressure_degree=5, force_degree=3)
     assert found.max_error < 1e-12
@@ -124,14 +145,17 @@ def test_two_loads_determine_ten_of_fifteen_coefficients():
     assert conditioning(two, Chebyshev(LoadRange.from_recording(two))).rank == 10
     for procedure in (*FITS, fit_monotone):
         with pytest.raises(
-            IdentificationError, match=r"at loads of 45, 130 N determine 10 of the 15 .* Measure at 3 or more loads"
+            IdentificationError,
+            match=r"at loads of 45, 130 N determine 10 of the 15 .* Measure at 3 or more loads",
         ):
             procedure(two, 0.40)
     assert fit_linearised(two, 0.40, force_degree=1).max_error < 1e-13
 
 
 def test_too_few_points_below_saturation_are_refused():
-    with pytest.raises(IdentificationError, match="9 points at loads of 45, 130, 260 N determine 9 of the 15"):
+    with pytest.raises(
+        IdentificationError, match="9 points at loads of 45, 130, 260 N determine 9 of the 15"
+    ):
         fit_linearised(CURVES, 0.02)
 
 
@@ -140,7 +164,10 @@ def test_too_few_points_below_saturation_are_refused():
     [
         (lambda r: r.rows(slice(0, 14)), "14 points cannot determine 15 coefficients"),
         (lambda r: r.with_columns(force=np.full(45, 45.0)), "force is 45 N in every row"),
-        (lambda r: r.with_columns(contraction=np.where(np.arange(45) == 6, np.nan, 0.1)), "row 7: contraction is not"),
+        (
+            lambda r: r.with_columns(contraction=np.where(np.arange(45) == 6, np.nan, 0.1)),
+            "row 7: contraction is not",
+        ),
     ],
 )
 def test_unusable_recordings_are_refused(change, message):
@@ -148,8 +175,9 @@ def test_unusable_recordings_are_refused(change, message):
         fit_nonlinear(change(CURVES), 0.40)
 
 
-# Condition numbers of the 15 coefficients on 15 even pressures and three loads, to the digits given; that in
-# pascal and newton was computed with 150 decimal digits, where double precision alone finds 1.6e27.
+# Condition numbers of the 15 coefficients on 15 even pressures and three loads, to the digits
+# given; that in pascal and newton was computed with 150 decimal digits, where double precision
+# alone finds 1.6e27.
 @pytest.mark.parametrize(
     ("basis", "condition", "digit"),
     [
@@ -177,8 +205,13 @@ def test_breaks_are_named_with_their_places():
     assert falls_at_the_end.second_argument == pytest.approx((94, 249), abs=1.5)
     assert falls_at_the_end.pressure == pytest.approx((3.22e5, 3.5e5), abs=0.02e5)
     assert rises.worst_slope > 0 > falls.worst_slope
-    assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1 % of the validity range)" in str(rises)
-    assert "(less than 0.1 % of the validity range)" in str(dataclasses.replace(rises, area_fraction=1e-4))
+    assert (
+        "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1 % of the validity range)"
+        in str(rises)
+    )
+    assert "(less than 0.1 % of the validity range)" in str(
+        dataclasses.replace(rises, area_fraction=1e-4)
+    )
 
 
 def test_a_box_without_a_break_has_none():
@@ -199,7 +232,9 @@ def test_the_monotone_fit_holds_between_its_cells(degrees):
 
 
 def test_the_monotone_fit_is_the_best_of_the_monotone():
-    """Nothing gains that a general solver finds with the slopes on a grid, where it is freer than on all the validity range."""
+    """Nothing gains that a general solver finds with the slopes on a grid, where it is freer than
+    on all the validity range.
+    """
     from scipy.optimize import minimize
 
     found = fit_monotone(CURVES, 0.40, cells=(32, 24))
@@ -228,14 +263,18 @@ def test_the_monotone_fit_is_the_best_of_the_monotone():
 @pytest.mark.parametrize("degrees", [(1, 0), (0, 1), (0, 0)])
 def test_a_surface_that_does_not_depend_on_an_argument_is_monotone_in_it(degrees):
     settings = dict(zip(("pressure_degree", "force_degree"), degrees, strict=True))
-    free, found = fit_nonlinear(CURVES, 0.40, **settings), fit_monotone(CURVES, 0.40, **settings)
+    free = fit_nonlinear(CURVES, 0.40, **settings)
+    found = fit_monotone(CURVES, 0.40, **settings)
     assert found.rmse == pytest.approx(free.rmse, rel=1e-6)
 
 
 def test_data_that_are_monotone_are_fitted_as_if_free():
     pressure, force = (v.ravel() for v in LoadRange(0.0, 3e5, 50.0, 250.0).grid(9, 5))
     exponent = -1e-5 * pressure * (1 - force / 500)
-    data = Recording({"pressure": pressure, "force": force, "contraction": 0.3 * (1 - np.exp(exponent))}, origin="law")
+    data = Recording(
+        {"pressure": pressure, "force": force, "contraction": 0.3 * (1 - np.exp(exponent))},
+        origin="law",
+    )
     # level at zero pressure, so the margin of the monotone fit costs its 1e-9
     assert fit_monotone(data, 0.3).max_error < 1e-8
 
@@ -244,7 +283,9 @@ def test_the_index_is_the_root_of_the_explained_part():
     measured = np.array([0.0, 1.0, 2.0, 3.0])
     assert correlation_index(measured, measured).value == 1.0
     # SSE = 4 * 0.25, SST = 2.25 + 0.25 + 0.25 + 2.25
-    assert correlation_index(measured, measured + 0.5).value == pytest.approx(math.sqrt(1 - 1.0 / 5.0))
+    assert correlation_index(measured, measured + 0.5).value == pytest.approx(
+        math.sqrt(1 - 1.0 / 5.0)
+    )
 
 
 def test_the_mean_is_that_of_the_measured_values():

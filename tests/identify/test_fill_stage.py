@@ -1,6 +1,6 @@
-"""The stage of fills of a campaign finds what its own model has simulated, within three standard errors: with a fill and
-its discharge in one file, with different critical ratios, and in any ambient air that the records state. What the
-records do not show or state is supposed, and said.
+"""The stage of fills of a campaign finds what its own model has simulated, within three standard
+errors: with a fill and its discharge in one file, with different critical ratios, and in any
+ambient air that the records state. What the records do not show or state is supposed, and said.
 """
 
 from __future__ import annotations
@@ -26,7 +26,12 @@ from airmuscle.bench import (
     stated_ambient,
     write,
 )
-from airmuscle.bench.identify.campaign import fit_fill_stage, fit_release_stage, stage_result, volume_change
+from airmuscle.bench.identify.campaign import (
+    fit_fill_stage,
+    fit_release_stage,
+    stage_result,
+    volume_change,
+)
 from airmuscle.engine import Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError
 from airmuscle.physics import (
@@ -56,7 +61,8 @@ CONTRACTIONS = (0.0, 0.1, 0.2)
 NOISE = 150.0
 STANDARD = Ambient()
 BOTH = {"fill": ((0.5, 1.0), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
-FILL, DISCHARGE = {"fill": ((0.5, 1.0),)}, {"discharge": ((0.5, 1.0),)}
+FILL = {"fill": ((0.5, 1.0),)}
+DISCHARGE = {"discharge": ((0.5, 1.0),)}
 
 
 SINKING = Tank(Supply(6e5), Valve(5e-9, 0.3), 4e-4)
@@ -67,19 +73,41 @@ def true_plant(contraction, ratio, ambient, supply=Supply(6e5)):
     return Plant(Muscle.ideal(BRAID), valves, Isometric(contraction), EnergyBalance(0.4), ambient)
 
 
-def record(contraction, command, seed, *, ratio=0.35, ambient=STANDARD, begin=0.0, stated=True, duration=6.0,
+def record(
+    contraction,
+    command,
+    seed,
+    *,
+    ratio=0.35,
+    ambient=STANDARD,
+    begin=0.0,
+    stated=True,
+    duration=6.0,
     supply=Supply(6e5),
-):  # fmt: skip
-    plant, times = true_plant(contraction, ratio, ambient, supply), np.arange(0.0, duration, 0.008)
+):
+    plant = true_plant(contraction, ratio, ambient, supply)
+    times = np.arange(0.0, duration, 0.008)
     run = simulate(
-        plant, Schedule(command), duration=duration, initial_state=plant.state_at(pressure=begin), output_times=times,
+        plant,
+        Schedule(command),
+        duration=duration,
+        initial_state=plant.state_at(pressure=begin),
+        output_times=times,
         integrator=Rodas4(1e-8),
-    )  # fmt: skip
+    )
     noise = np.random.default_rng(seed).normal(0.0, NOISE, times.size)
     pressure = np.interp(times, run["time"], run["pressure"])
-    columns = {"time": times, "pressure": pressure + noise, "contraction": np.full(times.size, contraction)}
-    constants = {"ambient": ambient.pressure, "ambient_temperature": ambient.temperature} if stated else {}
-    return Recording(columns, f"fill {contraction:g} {min(command)}", {"resting_length": 0.3, **constants})
+    columns = {
+        "time": times,
+        "pressure": pressure + noise,
+        "contraction": np.full(times.size, contraction),
+    }
+    constants = (
+        {"ambient": ambient.pressure, "ambient_temperature": ambient.temperature} if stated else {}
+    )
+    return Recording(
+        columns, f"fill {contraction:g} {min(command)}", {"resting_length": 0.3, **constants}
+    )
 
 
 def tube_record(contraction, segments, seed):
@@ -87,20 +115,33 @@ def tube_record(contraction, segments, seed):
     plant = true_plant(contraction, 0.35, STANDARD)
     tube = Tube(Valve(4e-9, 0.0 if segments > 1 else 0.3), 8e-5, segments)
     plant = dataclasses.replace(plant, circuit=WithTubes(plant.circuit, tube))
-    times, sensed = np.arange(0.0, 3.0, 0.004), f"{tube.prefixes[0]}pressure"
+    times = np.arange(0.0, 3.0, 0.004)
+    sensed = f"{tube.prefixes[0]}pressure"
     run = simulate(
-        plant, Schedule({"fill": ((0.2, 1.0),)}), duration=3.0, initial_state=plant.state_at(pressure=0.0),
-        output_times=times, integrator=Rodas4(1e-8),
-    )  # fmt: skip
-    pressure = np.interp(times, run["time"], run[sensed]) + np.random.default_rng(seed).normal(0.0, NOISE, times.size)
+        plant,
+        Schedule({"fill": ((0.2, 1.0),)}),
+        duration=3.0,
+        initial_state=plant.state_at(pressure=0.0),
+        output_times=times,
+        integrator=Rodas4(1e-8),
+    )
+    pressure = np.interp(times, run["time"], run[sensed]) + np.random.default_rng(seed).normal(
+        0.0, NOISE, times.size
+    )
     columns = {"time": times, "pressure": pressure, "contraction": np.full(times.size, contraction)}
-    constants = {"resting_length": 0.3, "ambient": STANDARD.pressure, "ambient_temperature": STANDARD.temperature}
+    constants = {
+        "resting_length": 0.3,
+        "ambient": STANDARD.pressure,
+        "ambient_temperature": STANDARD.temperature,
+    }
     return Recording(columns, f"fill {contraction:g}", constants)
 
 
 def test_the_scenario_of_a_fill_through_a_tube_predicts_the_recorded_pressure(tmp_path):
     """By the commands: the sensor is in the tube, and the records name its pressure `pressure`."""
-    files = [write(tube_record(c, 1, i), tmp_path / f"fill{i}.csv") for i, c in enumerate(CONTRACTIONS)]
+    files = [
+        write(tube_record(c, 1, i), tmp_path / f"fill{i}.csv") for i, c in enumerate(CONTRACTIONS)
+    ]
     braid = ("--braid", "radius=10 mm, angle=25 deg", "--resting-length", "300 mm")
     done = airmuscle("campaign", *files, *braid, "--out", tmp_path / "out")
     said = " ".join(done.stdout.split())
@@ -108,7 +149,9 @@ def test_the_scenario_of_a_fill_through_a_tube_predicts_the_recorded_pressure(tm
     assert (tmp_path / "out" / "figures" / "campaign-fills.png").exists()
     scenario = tmp_path / "out" / "scenarios" / "fill0.toml"
     start = ("--start-time", "200 ms", "--start-margin", "20 ms")
-    done = airmuscle("predict", scenario, files[0], *start, "--out", tmp_path / "prediction", "--json")
+    done = airmuscle(
+        "predict", scenario, files[0], *start, "--out", tmp_path / "prediction", "--json"
+    )
     assert done.exit_code == 0, done.output
     (row,) = json.loads(done.stdout)["prediction"]["predictions"]
     assert row["quantity"] == "tube.pressure"
@@ -137,9 +180,13 @@ def stage_of(recordings, geometry=BRAID, change=None):
 
 def true_values(ratio=0.35):
     return {
-        "gas.heat_transfer": 0.4, "circuit.fill.critical_ratio": 0.35, "circuit.discharge.critical_ratio": ratio,
-        "circuit.fill.conductance": 3e-9, "circuit.discharge.conductance": 3.6e-9, "circuit.supply.pressure": 6e5,
-    }  # fmt: skip
+        "gas.heat_transfer": 0.4,
+        "circuit.fill.critical_ratio": 0.35,
+        "circuit.discharge.critical_ratio": ratio,
+        "circuit.fill.conductance": 3e-9,
+        "circuit.discharge.conductance": 3.6e-9,
+        "circuit.supply.pressure": 6e5,
+    }
 
 
 def assert_true(stage, ratio=0.35):
@@ -154,14 +201,20 @@ def assert_true(stage, ratio=0.35):
 def test_a_fill_and_its_discharge_in_one_file(seed):
     stage = stage_of([record(c, BOTH, 10 * seed + i) for i, c in enumerate(CONTRACTIONS)])
     assert_true(stage)
-    assert not isinstance(stage.fit.plant().circuit, WithTubes)  # the muscle alone explains the records
-    switch = stage.commands(stage.records[2])["discharge"][0][0] + stage.fit["start time of record 3"].value
+    assert not isinstance(
+        stage.fit.plant().circuit, WithTubes
+    )  # the muscle alone explains the records
+    switch = (
+        stage.commands(stage.records[2])["discharge"][0][0]
+        + stage.fit["start time of record 3"].value
+    )
     assert switch == pytest.approx(3.2, abs=1e-3)
     assert stage.records[2].steps[1].start < 3.196  # what is detected is early
 
 
 @pytest.mark.parametrize(
-    "ambient", widened([Ambient(8e4, 303.0), Ambient(9.5e4)], lambda ambient: ambient.pressure < 9e4)
+    "ambient",
+    widened([Ambient(8e4, 303.0), Ambient(9.5e4)], lambda ambient: ambient.pressure < 9e4),
 )
 def test_the_plants_have_the_ambient_air_of_their_records(ambient):
     stage = stage_of([record(c, BOTH, i, ambient=ambient) for i, c in enumerate(CONTRACTIONS)])
@@ -170,21 +223,34 @@ def test_the_plants_have_the_ambient_air_of_their_records(ambient):
 
 
 def test_a_fit_of_segments_needs_a_tube():
-    with pytest.raises(ParameterError, match="fit_tube: the plant has no Tube between valves and muscle"):
+    with pytest.raises(
+        ParameterError, match="fit_tube: the plant has no Tube between valves and muscle"
+    ):
         fit_tube(true_plant(0.0, 0.35, STANDARD), lambda plant, sensor: None)
 
 
 def test_records_in_different_ambient_air():
     airs = (Ambient(8e4), Ambient(9e4, 303.0), STANDARD)
-    stage = stage_of([record(c, BOTH, i, ambient=a) for i, (c, a) in enumerate(zip(CONTRACTIONS, airs, strict=True))])
+    stage = stage_of(
+        [
+            record(c, BOTH, i, ambient=a)
+            for i, (c, a) in enumerate(zip(CONTRACTIONS, airs, strict=True))
+        ]
+    )
     assert_true(stage)
     assert [stage.fit.plant(i).ambient for i in range(3)] == list(airs)
     assert "ambient" not in stage.verdict
 
 
-def test_standard_errors_contain_the_scatter_of_records_from_rooms_of_unstated_temperature(monkeypatch):
-    """The rooms are 3 K warmer than supposed on average: conductances are wrong by many standard errors of the rows."""
-    monkeypatch.setattr("airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1)  # for the time of the test
+def test_standard_errors_contain_the_scatter_of_records_from_rooms_of_unstated_temperature(
+    monkeypatch,
+):
+    """The rooms are 3 K warmer than supposed on average: conductances are wrong by many standard
+    errors of the rows.
+    """
+    monkeypatch.setattr(
+        "airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1
+    )  # for the time of the test
     rooms = (Ambient(temperature=each) for each in (290.15, 296.15, 302.15))
     recordings = [
         record(c, BOTH, i, ambient=room, stated=False)
@@ -209,7 +275,9 @@ def test_an_ambient_pressure_that_no_record_states_is_said():
 
 def test_fills_and_discharges_in_separate_files_with_different_critical_ratios():
     recordings = [record(c, FILL, i, ratio=0.15) for i, c in enumerate(CONTRACTIONS)]
-    recordings += [record(c, DISCHARGE, 3 + i, ratio=0.15, begin=6e5) for i, c in enumerate(CONTRACTIONS)]
+    recordings += [
+        record(c, DISCHARGE, 3 + i, ratio=0.15, begin=6e5) for i, c in enumerate(CONTRACTIONS)
+    ]
     assert_true(stage_of(recordings), ratio=0.15)
 
 
@@ -223,12 +291,14 @@ def test_the_volume_follows_from_fills_also_with_separate_discharges():
 
 
 @pytest.mark.parametrize(
-    ("command", "begin", "missing", "shown"), [(FILL, 0.0, "discharge", "fill"), (DISCHARGE, 6e5, "fill", "discharge")]
+    ("command", "begin", "missing", "shown"),
+    [(FILL, 0.0, "discharge", "fill"), (DISCHARGE, 6e5, "fill", "discharge")],
 )
 def test_a_valve_that_no_record_shows_is_supposed_to_be_the_other(command, begin, missing, shown):
     stage = stage_of([record(c, command, i, begin=begin) for i, c in enumerate(CONTRACTIONS)])
     assert (
-        f"No record is a {missing}: the {missing} valve is supposed to be equal to the {shown} valve" in stage.verdict
+        f"No record is a {missing}: the {missing} valve is supposed to be equal to the {shown}"
+        " valve" in stage.verdict
     )
     valves = stage.circuit
     assert valves.fill == valves.discharge
@@ -240,7 +310,10 @@ def test_a_critical_ratio_that_is_not_determined_is_supposed_to_be_the_other():
     recordings = [record(c, FILL, i) for i, c in enumerate(CONTRACTIONS)]
     recordings.append(record(0.1, BOTH, 9, duration=3.45))
     stage = stage_of(recordings)
-    assert "do not determine the critical ratio of the discharge valve (it has no effect on them)" in stage.verdict
+    assert (
+        "do not determine the critical ratio of the discharge valve (it has no effect on them)"
+        in stage.verdict
+    )
     assert stage.circuit.fill.critical_ratio == stage.circuit.discharge.critical_ratio
 
 
@@ -249,16 +322,25 @@ def test_the_release_has_the_ambient_air_of_its_record():
     damped = dataclasses.replace(muscle, damper=LinearDamper(150.0))
     plant = Plant(damped, ClosedChamber(), WithLatch(HangingMass(15.0)), Polytropic(1.2), ambient)
     run = simulate(
-        plant, Schedule({"latched": ((0.0, 1.0), (0.4, 0.0))}), duration=2.0, output_times=times,
-        initial_state=plant.state_at(pressure=2.5e5, position=0.012), integrator=Rodas4(1e-8),
-    )  # fmt: skip
+        plant,
+        Schedule({"latched": ((0.0, 1.0), (0.4, 0.0))}),
+        duration=2.0,
+        output_times=times,
+        initial_state=plant.state_at(pressure=2.5e5, position=0.012),
+        integrator=Rodas4(1e-8),
+    )
     random = np.random.default_rng(1)
-    pressure, path, force = (np.interp(times, run["time"], run[name]) for name in ("pressure", "position", "force"))
+    pressure, path, force = (
+        np.interp(times, run["time"], run[name]) for name in ("pressure", "position", "force")
+    )
     path = path + random.normal(0.0, 1e-5, times.size)
     columns = {
-        "time": times, "pressure": pressure + random.normal(0.0, 100.0, times.size),
-        "contraction": path / 0.3, "length": 0.3 - path, "force": force,
-    }  # fmt: skip
+        "time": times,
+        "pressure": pressure + random.normal(0.0, 100.0, times.size),
+        "contraction": path / 0.3,
+        "length": 0.3 - path,
+        "force": force,
+    }
     released = Recording(columns, "release", {"resting_length": 0.3, "mass": 15.0, "ambient": 8e4})
     fit = fit_release_stage(classify_records([released]), damped).fit
     for name, true in (("gas.exponent", 1.2), ("muscle.damper.damping", 150.0)):
@@ -271,14 +353,25 @@ def test_a_stage_of_releases_without_a_record_has_its_own_name():
 
 
 def test_a_record_in_other_ambient_air_than_its_plant_is_refused():
-    measured, plant = record(0.1, FILL, 0, ambient=Ambient(8e4)), true_plant(0.1, 0.35, STANDARD)
+    measured = record(0.1, FILL, 0, ambient=Ambient(8e4))
+    plant = true_plant(0.1, 0.35, STANDARD)
     experiment = Experiment(measured, Schedule(FILL), InitialConditions.at_rest(plant, 0.0))
-    with pytest.raises(ParameterError, match=r"states an ambient pressure of 80 kPa, but its plant has 101\.3 kPa"):
-        fit_dynamic(plant, [experiment], free=("circuit.fill.conductance",), observed={"pressure": NOISE})
+    with pytest.raises(
+        ParameterError, match=r"states an ambient pressure of 80 kPa, but its plant has 101\.3 kPa"
+    ):
+        fit_dynamic(
+            plant, [experiment], free=("circuit.fill.conductance",), observed={"pressure": NOISE}
+        )
     warm = true_plant(0.1, 0.35, Ambient(8e4, 310.0))
-    experiment = Experiment(measured, Schedule(FILL), InitialConditions.at_rest(warm, 0.0), plant=warm)
-    with pytest.raises(ParameterError, match=r"an ambient temperature of 293\.1 K, but its plant has 310 K"):
-        fit_dynamic(warm, [experiment], free=("circuit.fill.conductance",), observed={"pressure": NOISE})
+    experiment = Experiment(
+        measured, Schedule(FILL), InitialConditions.at_rest(warm, 0.0), plant=warm
+    )
+    with pytest.raises(
+        ParameterError, match=r"an ambient temperature of 293\.1 K, but its plant has 310 K"
+    ):
+        fit_dynamic(
+            warm, [experiment], free=("circuit.fill.conductance",), observed={"pressure": NOISE}
+        )
 
 
 def test_what_a_record_does_not_state_is_that_of_the_default():
@@ -310,30 +403,53 @@ def test_a_supply_whose_pressure_sinks_is_found_where_the_records_need_it():
 @pytest.mark.slow
 def test_the_volume_of_the_muscle_follows_also_where_the_supply_sinks():
     change = volume_change(VirtualWork(BRAID), 0.3, (1e5, 6e5), (0.0, 0.25))
-    stage = stage_of([record(c, BOTH, i, supply=SINKING) for i, c in enumerate(CONTRACTIONS)], None, change)
-    assert abs(stage.estimate.volume_at_rest - float(BRAID.volume(0.0))) < 3.0 * stage.estimate.volume_stderr
+    stage = stage_of(
+        [record(c, BOTH, i, supply=SINKING) for i, c in enumerate(CONTRACTIONS)], None, change
+    )
+    assert (
+        abs(stage.estimate.volume_at_rest - float(BRAID.volume(0.0)))
+        < 3.0 * stage.estimate.volume_stderr
+    )
     assert stage.fit["circuit.supply.volume"].value == pytest.approx(4e-4, rel=0.05)
 
 
 def test_the_air_of_a_tank_at_rest_follows_its_supply_in_every_iterate():
-    """A fit that starts from a wrong volume and a wrong supply pressure finds both, and predicts its own record."""
+    """A fit that starts from a wrong volume and a wrong supply pressure finds both, and predicts
+    its own record.
+    """
     plant = true_plant(0.0, 0.35, STANDARD, Tank(Supply(5.9e5), Valve(5e-9, 0.3), 8e-4))
-    experiment = Experiment(record(0.0, FILL, 3, supply=SINKING), Schedule({"fill": ((0.0, 1.0),)}),
-                            InitialConditions.at_rest(plant, 0.0), 0.5)  # fmt: skip
+    experiment = Experiment(
+        record(0.0, FILL, 3, supply=SINKING),
+        Schedule({"fill": ((0.0, 1.0),)}),
+        InitialConditions.at_rest(plant, 0.0),
+        0.5,
+    )
     assert experiment.initial_conditions.settled == ("supply.air_mass",)
     fit = fit_dynamic(
-        plant, [experiment], free=("circuit.supply.volume", "circuit.supply.supply.pressure"),
+        plant,
+        [experiment],
+        free=("circuit.supply.volume", "circuit.supply.supply.pressure"),
         observed={"pressure": NOISE},
-    )  # fmt: skip
-    assert abs(fit["circuit.supply.volume"].value - 4e-4) < 3.0 * fit["circuit.supply.volume"].stderr < 2e-5
-    again = Experiment(experiment.recording, experiment.command, InitialConditions.at_rest(fit.plant(), 0.0), 0.5)
-    predicted = fit_dynamic(fit.plant(), [again], free=("circuit.fill.critical_ratio",), observed={"pressure": NOISE})
+    )
+    assert (
+        abs(fit["circuit.supply.volume"].value - 4e-4)
+        < 3.0 * fit["circuit.supply.volume"].stderr
+        < 2e-5
+    )
+    again = Experiment(
+        experiment.recording, experiment.command, InitialConditions.at_rest(fit.plant(), 0.0), 0.5
+    )
+    predicted = fit_dynamic(
+        fit.plant(), [again], free=("circuit.fill.critical_ratio",), observed={"pressure": NOISE}
+    )
     assert predicted.rms("pressure") == pytest.approx(NOISE, rel=0.1)
 
 
 def test_records_that_the_model_does_not_follow_are_reported_as_a_misfit(monkeypatch):
     """The valve closes to a third while the muscle fills; the model has one conductance."""
-    monkeypatch.setattr("airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1)  # for the time of the test
+    monkeypatch.setattr(
+        "airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1
+    )  # for the time of the test
     throttled = {"fill": ((0.5, 1.0), (0.7, 0.3), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
     stage = stage_of([record(c, throttled, i) for i, c in enumerate(CONTRACTIONS[:2])])
     assert "times the noise of the pressure sensor" in stage.misfit

@@ -1,8 +1,9 @@
 """A fit returns what made the data, says how sure it is, and refuses what the data cannot tell.
 
-Noise-free points give the parameters back. Standard deviations are those of repeated experiments. Points cut
-off at the ends of the range of force bound the law and do not bend it. Where nothing is cut off the answers
-are those of scipy and lmfit. Neither units nor scales change them. What cannot be told apart is named.
+Noise-free points give the parameters back. Standard deviations are those of repeated experiments.
+Points cut off at the ends of the range of force bound the law and do not bend it. Where nothing is
+cut off the answers are those of scipy and lmfit. Neither units nor scales change them. What cannot
+be told apart is named.
 """
 
 from __future__ import annotations
@@ -57,10 +58,13 @@ MUSCLE = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
 """Near to what the measured map of the DMSP-20-300 gives."""
 
 
-def points(force, *, n: int = 200, seed: int = 1, noise: float = 0.0, high: float = 0.25) -> Recording:
+def points(
+    force, *, n: int = 200, seed: int = 1, noise: float = 0.0, high: float = 0.25
+) -> Recording:
     """Scattered points of a law, with noise [N] on the force."""
     random = np.random.default_rng(seed)
-    pressure, contraction = random.uniform(0.5e5, 6e5, n), random.uniform(-0.02, high, n)
+    pressure = random.uniform(0.5e5, 6e5, n)
+    contraction = random.uniform(-0.02, high, n)
     measured = force(pressure, contraction) + noise * random.standard_normal(n)
     return Recording({"pressure": pressure, "contraction": contraction, "force": measured}, "bench")
 
@@ -92,7 +96,9 @@ def test_a_surface_gives_its_forces_back(degree: int):
     found = fit(ContractileSurface.blank(degree, **WIDE), recording)
     assert found.rank == len(exponents(degree))
     assert np.abs(found.residuals).max() < 1e-9
-    boxed = truth.with_validity_range(found.validity_range.pressure, found.validity_range.contraction)
+    boxed = truth.with_validity_range(
+        found.validity_range.pressure, found.validity_range.contraction
+    )
     refitted = fit(boxed, points(boxed.force))
     assert refitted.values == pytest.approx(boxed.coefficients, abs=1e-8)
 
@@ -102,7 +108,9 @@ def test_laws_that_are_not_linear_give_their_parameters_back():
     start = Clamped(Sarosi2012(1e-3, 200.0, -30.0, -1e-3, 1e-3, -200.0))
     found = fit(start, recording)
     assert found.names == tuple(f"inner.a{i}" for i in range(1, 7))
-    assert found.values == pytest.approx([MUSCLE.a1, MUSCLE.a2, MUSCLE.a3, MUSCLE.a4, MUSCLE.a5, MUSCLE.a6], rel=1e-7)
+    assert found.values == pytest.approx(
+        [MUSCLE.a1, MUSCLE.a2, MUSCLE.a3, MUSCLE.a4, MUSCLE.a5, MUSCLE.a6], rel=1e-7
+    )
     assert found.model == start.__class__(dataclasses.replace(found.model.inner))
 
 
@@ -120,7 +128,9 @@ def test_what_is_fixed_stays():
 class HungLoad(ContractionLaw):
     """eps = m (1 - exp(-p/p_0)) - c F, for these tests."""
 
-    most: float = parameter("1", "m", "contraction without load at full pressure", bounds=(0.0, 1.0))
+    most: float = parameter(
+        "1", "m", "contraction without load at full pressure", bounds=(0.0, 1.0)
+    )
     knee: float = parameter("Pa", "p_0", "pressure of two thirds of it")
     compliance: float = parameter("1/N", "c", "contraction lost to a newton")
 
@@ -148,9 +158,12 @@ class NeededPressure(PressureLaw):
 
 def hung(law: HungLoad, noise: float = 0.0) -> Recording:
     random = np.random.default_rng(5)
-    pressure, force = random.uniform(1e4, 6e5, 80), random.uniform(0, 300, 80)
+    pressure = random.uniform(1e4, 6e5, 80)
+    force = random.uniform(0, 300, 80)
     contraction = law.contraction(pressure, force) + noise * random.standard_normal(80)
-    return Recording({"pressure": pressure, "contraction": contraction, "force": force}, "hung loads")
+    return Recording(
+        {"pressure": pressure, "contraction": contraction, "force": force}, "hung loads"
+    )
 
 
 @pytest.mark.parametrize("kind", [HungLoad, Untraced])
@@ -171,9 +184,12 @@ def test_exact_derivatives_and_differences_agree_on_the_uncertainty():
 def test_a_law_in_pressure_is_fitted_in_pressure():
     truth = NeededPressure(6e4, 5e6, 700.0)
     random = np.random.default_rng(5)
-    contraction, force = random.uniform(0, 0.2, 60), random.uniform(0, 300, 60)
+    contraction = random.uniform(0, 0.2, 60)
+    force = random.uniform(0, 300, 60)
     pressure = truth.pressure(contraction, force)
-    recording = Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
+    recording = Recording(
+        {"pressure": pressure, "contraction": contraction, "force": force}, "bench"
+    )
     found = fit(NeededPressure(0.0, 1e6, 1.0), recording)
     assert found.fitted_quantity.name == "pressure"
     assert found.values == pytest.approx([6e4, 5e6, 700.0], rel=1e-9)
@@ -194,7 +210,9 @@ def repeats(count: int, noise: float) -> list[Fit]:
     clean = points(truth.force, n=60)
     random = np.random.default_rng(11)
     noisy = (clean["force"] + noise * random.standard_normal(60) for _ in range(count))
-    return [fit(ContractileSurface.blank(2, **WIDE), clean.with_columns(force=force)) for force in noisy]
+    return [
+        fit(ContractileSurface.blank(2, **WIDE), clean.with_columns(force=force)) for force in noisy
+    ]
 
 
 @pytest.mark.slow
@@ -227,14 +245,17 @@ def test_a_fit_equals_lmfit():
     lmfit = pytest.importorskip("lmfit")
     recording = points(surface(3).force, n=80, noise=3.0)
     found = fit(ContractileSurface.blank(3, **WIDE), recording)
-    matrix, measured = sheet(3, recording), recording["force"]
+    matrix = sheet(3, recording)
+    measured = recording["force"]
     names = [f"a{i}" for i in range(10)]
     start = lmfit.Parameters()
     for name in names:
         start.add(name, value=0.0)
     peer = lmfit.minimize(lambda p: matrix @ [p[name].value for name in names] - measured, start)
     assert found.values == pytest.approx([peer.params[name].value for name in names], rel=1e-6)
-    assert found.standard_errors == pytest.approx([peer.params[name].stderr for name in names], rel=1e-5)
+    assert found.standard_errors == pytest.approx(
+        [peer.params[name].stderr for name in names], rel=1e-5
+    )
     assert found.correlations[0, 9] == pytest.approx(peer.params["a0"].correl["a9"], abs=1e-6)
     assert found.sigma == pytest.approx(np.sqrt(peer.redchi), rel=1e-9)
 
@@ -250,7 +271,12 @@ def test_a_weighted_fit_equals_curve_fit():
     start = [1e-4, 400.0, -50.0, -8e-3, 3e-3, -300.0]
     scale = np.abs(start)
     peer, covariance = curve_fit(
-        lambda x, *u: law(x, *(u * scale)), *measured, p0=start / scale, sigma=sigma, xtol=1e-13, ftol=1e-13
+        lambda x, *u: law(x, *(u * scale)),
+        *measured,
+        p0=start / scale,
+        sigma=sigma,
+        xtol=1e-13,
+        ftol=1e-13,
     )
     found = fit(Sarosi2012(*start), recording, sigma=sigma, censoring=UNCENSORED)
     assert found.values == pytest.approx(peer * scale, rel=1e-5)
@@ -264,12 +290,17 @@ def test_figures_of_quality_are_their_formulas():
     errors = sheet(1, recording) @ np.linalg.lstsq(sheet(1, recording), measured)[0] - measured
     assert found.rmse == pytest.approx(np.sqrt(np.mean(errors**2)))
     assert found.sigma == pytest.approx(np.sqrt(np.sum(errors**2) / 37))
-    assert found.r2 == pytest.approx(1 - np.sum(errors**2) / np.sum((measured - measured.mean()) ** 2))
+    assert found.r2 == pytest.approx(
+        1 - np.sum(errors**2) / np.sum((measured - measured.mean()) ** 2)
+    )
     assert found.ik == pytest.approx(np.sqrt(found.r2))
     worst = int(np.argmax(np.abs(errors)))
     extreme = found.max_error
     assert extreme.error == pytest.approx(errors[worst])
-    assert (extreme.pressure, extreme.contraction) == (recording["pressure"][worst], recording["contraction"][worst])
+    assert (extreme.pressure, extreme.contraction) == (
+        recording["pressure"][worst],
+        recording["contraction"][worst],
+    )
 
 
 def test_a_law_worse_than_the_mean_has_no_correlation_index():
@@ -308,18 +339,23 @@ def test_with_noise_too_the_cut_off_points_are_better_left_to_bound():
     taut = truth.polynomial(recording["pressure"], recording["contraction"]) > 0
     right = truth.force(recording["pressure"], recording["contraction"])
     off = [
-        np.sqrt(np.mean((fit(start, recording, censoring=c).modelled - right)[taut] ** 2)) for c in (None, UNCENSORED)
+        np.sqrt(np.mean((fit(start, recording, censoring=c).modelled - right)[taut] ** 2))
+        for c in (None, UNCENSORED)
     ]
     assert off[0] < 2.0
     assert off[1] > 3 * off[0]
 
 
 def test_slack_points_forbid_a_pull_where_nothing_else_was_measured():
-    """Taut points at low contraction alone leave the slope open; slack ones beyond hold the surface down."""
+    """Taut points at low contraction alone leave the slope open; slack ones beyond hold the surface
+    down.
+    """
     contraction = np.concatenate([np.full(4, 0.0), np.full(4, 0.01), np.full(8, 0.2)])
     pressure = np.tile([1e5, 2e5, 3e5, 4e5], 4)
     force = np.where(contraction < 0.1, 100.0 + 50 * contraction / 0.01, 0.0)
-    recording = Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
+    recording = Recording(
+        {"pressure": pressure, "contraction": contraction, "force": force}, "bench"
+    )
     bounded = fit(ContractileSurface.blank(1), recording)
     free = fit(ContractileSurface.blank(1), recording.rows(force > 0))
     assert free.model.polynomial(2e5, 0.2) > 100.0
@@ -333,7 +369,9 @@ def test_points_at_the_upper_clamp_are_bounds_too():
     recording = clean.with_columns(force=np.minimum(clean["force"], limit))
     found = fit(ContractileSurface.blank(2, max_force=limit), recording)
     assert found.rows_censored == 40
-    assert found.model.polynomial(clean["pressure"], clean["contraction"]) == pytest.approx(clean["force"], abs=1e-8)
+    assert found.model.polynomial(clean["pressure"], clean["contraction"]) == pytest.approx(
+        clean["force"], abs=1e-8
+    )
 
 
 def test_a_blank_surface_does_not_limit_the_force_of_a_strong_muscle_and_a_limited_one_says_so():
@@ -357,20 +395,31 @@ def test_the_meaning_of_a_list_of_coefficients_is_stated_once():
 
 def test_the_resolution_of_the_sensor_may_be_where_it_is_cut_off():
     truth, recording = slack_and_taut()
-    offset = recording.with_columns(force=np.where(recording["force"] < 2.0, 1.3, recording["force"]))
+    offset = recording.with_columns(
+        force=np.where(recording["force"] < 2.0, 1.3, recording["force"])
+    )
     found = fit(ContractileSurface.blank(2), offset, censoring=Censoring(min_force=2.0))
     right = truth.force(recording["pressure"], recording["contraction"])
     assert np.abs(found.modelled - right).max() < 1e-8
-    assert abs(found.max_error.error) < 1e-8  # 1.3 N read where the muscle hangs slack is no error of the law
+    assert (
+        abs(found.max_error.error) < 1e-8
+    )  # 1.3 N read where the muscle hangs slack is no error of the law
 
 
 def test_slack_points_bound_laws_in_contraction_and_pressure_too():
-    """A slack muscle is shorter than its free contraction, or under less pressure than would tighten it."""
-    hanging, needed = HungLoad(0.25, 1.4e5, 3e-4), NeededPressure(6e4, 5e6, 700.0)
+    """A slack muscle is shorter than its free contraction, or under less pressure than would
+    tighten it.
+    """
+    hanging = HungLoad(0.25, 1.4e5, 3e-4)
+    needed = NeededPressure(6e4, 5e6, 700.0)
     random = np.random.default_rng(5)
     force = np.where(np.arange(60) < 20, 0.0, random.uniform(1, 300, 60))
-    given, more = random.uniform(0.02, 0.2, 60), np.where(force == 0, random.uniform(0.01, 0.1, 60), 0.0)
-    shorter = {"pressure": 3e6 * given, "contraction": hanging.contraction(3e6 * given, force) + more}
+    given = random.uniform(0.02, 0.2, 60)
+    more = np.where(force == 0, random.uniform(0.01, 0.1, 60), 0.0)
+    shorter = {
+        "pressure": 3e6 * given,
+        "contraction": hanging.contraction(3e6 * given, force) + more,
+    }
     softer = {"pressure": needed.pressure(given, force) - 1e5 * more, "contraction": given}
     for start, columns, truth in (
         (HungLoad(0.1, 5e4, 1e-4), shorter, [0.25, 1.4e5, 3e-4]),
@@ -380,16 +429,23 @@ def test_slack_points_bound_laws_in_contraction_and_pressure_too():
         assert fit(start, recording, censoring=Censoring()).values == pytest.approx(truth, rel=1e-8)
         unbound = fit(start, recording)
         assert unbound.values != pytest.approx(truth, rel=1e-3)
-        assert any("20 rows at zero force or below are treated as measured values" in note for note in unbound.notes)
+        assert any(
+            "20 rows at zero force or below are treated as measured values" in note
+            for note in unbound.notes
+        )
 
 
 @given(st.integers(0, 10_000), st.integers(1, 3), st.sampled_from([LeastSquares(), Huber(0.5)]))
 def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
-    """At the least of a convex sum its gradient vanishes, however wild the data and however many rows are cut off."""
+    """At the least of a convex sum its gradient vanishes, however wild the data and however many
+    rows are cut off.
+    """
     random = np.random.default_rng(seed)
     columns = {name: random.uniform(0, 1, 40) for name in ("pressure", "contraction")}
     force = np.maximum(random.normal(0, 1, 40), 0)
-    found = fit(ContractileSurface.blank(degree), Recording({**columns, "force": force}, "noise"), loss=loss)
+    found = fit(
+        ContractileSurface.blank(degree), Recording({**columns, "force": force}, "noise"), loss=loss
+    )
     errors = found.model.polynomial(columns["pressure"], columns["contraction"]) - force
     errors = np.where(found.censoring * errors < 0, 0.0, errors)
     influence = errors * loss.rho((errors / loss.scale) ** 2)[1]
@@ -398,7 +454,9 @@ def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
 
 @pytest.mark.parametrize("loss", [LeastSquares(), Huber(5.0)])
 @given(z=st.floats(0.0, 30.0).filter(lambda z: abs(z - 1.0) > 1e-3))
-def test_a_loss_is_the_squared_residual_near_zero_and_its_derivatives_are_consistent(loss: Loss, z: float):
+def test_a_loss_is_the_squared_residual_near_zero_and_its_derivatives_are_consistent(
+    loss: Loss, z: float
+):
     """rho(0) = 0 and rho'(0) = 1; beyond, rho' and rho'' are the slopes of rho and rho'."""
     assert loss.rho(np.zeros(1))[:2, 0] == pytest.approx([0.0, 1.0])
     step = 1e-4
@@ -427,7 +485,8 @@ def test_a_robust_fit_forgets_gross_errors():
     spoilt = recording.with_columns(force=force)
     right = truth.force(recording["pressure"], recording["contraction"])
     start = ContractileSurface.blank(2, **WIDE)
-    plain, robust = fit(start, spoilt), fit(start, spoilt, loss=Huber(3.0))
+    plain = fit(start, spoilt)
+    robust = fit(start, spoilt, loss=Huber(3.0))
     assert np.sqrt(np.mean((robust.modelled - right) ** 2)) < 0.6
     assert np.sqrt(np.mean((plain.modelled - right) ** 2)) > 20.0
     assert any("Huber(scale=3.0), in N" in note for note in robust.notes)
@@ -448,7 +507,9 @@ def differs_in_kind(name: str, degree: int, scale: float) -> bool:
     ("name", "degree", "scale"),
     widened(((*each, scale) for each in MAPS.items() for scale in SCALES), differs_in_kind),
 )
-def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, degree: int, scale: float):
+def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(
+    name: str, degree: int, scale: float
+):
     """Maps with slack rows, of which the shortest length of the DMSP-20-300 has nothing else."""
     recording = read_csv(DATA / f"{name}.csv")
     loss = Huber(scale)
@@ -456,9 +517,14 @@ def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, deg
     assert found.rank == len(exponents(degree))
 
     def total(values: np.ndarray) -> float:
-        return float(np.sum(loss.rho((found.problem.residuals(found.problem.predict(values)) / scale) ** 2)[0]))
+        return float(
+            np.sum(
+                loss.rho((found.problem.residuals(found.problem.predict(values)) / scale) ** 2)[0]
+            )
+        )
 
-    random, least = np.random.default_rng(3), total(found.values)
+    random = np.random.default_rng(3)
+    least = total(found.values)
     for size in (1e-3, 1e-2, 0.1, 1.0):
         changes = size * random.standard_normal((20, found.values.size)) * np.abs(found.values)
         assert min(total(found.values + change) for change in changes) > least * (1 - 1e-6)
@@ -467,14 +533,17 @@ def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, deg
 def test_a_wide_robust_loss_is_least_squares_for_slack_rows_too():
     recording = read_csv(DATA / "dmsp-20-300.csv")
     start = ContractileSurface.blank(5, max_force=2000.0)
-    plain, robust = fit(start, recording), fit(start, recording, loss=Huber(1000.0))
+    plain = fit(start, recording)
+    robust = fit(start, recording, loss=Huber(1000.0))
     assert robust.values == pytest.approx(plain.values, rel=1e-6, abs=1e-6)
 
 
 def test_a_loss_narrower_than_the_noise_is_noted():
     recording = points(surface(2).force, noise=5.0)
     start = ContractileSurface.blank(2, **WIDE)
-    assert any("standard errors are too small" in n for n in fit(start, recording, loss=Huber(0.5)).notes)
+    assert any(
+        "standard errors are too small" in n for n in fit(start, recording, loss=Huber(0.5)).notes
+    )
     assert not any("too small" in n for n in fit(start, recording, loss=Huber(15.0)).notes)
 
 
@@ -482,7 +551,9 @@ def test_a_loss_narrower_than_the_noise_is_noted():
 
 
 @given(st.floats(1e-3, 1e3), st.floats(1e-6, 1e3), st.floats(-1e5, 1e5), st.floats(0.1, 10.0))
-def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: float, shift: float, stretch: float):
+def test_units_and_scales_change_nothing(
+    force_scale: float, pressure_scale: float, shift: float, stretch: float
+):
     recording = points(surface(3).force, n=60, noise=3.0)
     start = ContractileSurface.blank(3, min_force=-1e9, max_force=1e9)
     found = fit(start, recording)
@@ -494,7 +565,9 @@ def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: flo
             contraction=stretch * recording["contraction"],
         ),
     )
-    assert other.values == pytest.approx(force_scale * found.values, rel=1e-6, abs=1e-7 * force_scale)
+    assert other.values == pytest.approx(
+        force_scale * found.values, rel=1e-6, abs=1e-7 * force_scale
+    )
     assert other.standard_errors == pytest.approx(force_scale * found.standard_errors, rel=1e-6)
     assert (other.r2, other.condition) == pytest.approx((found.r2, found.condition), rel=1e-6)
 
@@ -523,11 +596,16 @@ def refused(law, recording, **options) -> str:
 
 def grid(contractions: int, pressures: int) -> Recording:
     c, p = np.meshgrid(np.linspace(0, 0.2, contractions), np.linspace(1e5, 6e5, pressures))
-    return Recording({"pressure": p.ravel(), "contraction": c.ravel(), "force": 900 - 3000 * c.ravel()}, "map.csv")
+    return Recording(
+        {"pressure": p.ravel(), "contraction": c.ravel(), "force": 900 - 3000 * c.ravel()},
+        "map.csv",
+    )
 
 
 def test_too_few_levels_are_named_with_the_powers_they_leave_open():
-    """(x + 1)(x + 1/2) x (x - 1/2)(x - 1), which vanishes at five even levels, holds odd powers only."""
+    """(x + 1)(x + 1/2) x (x - 1/2)(x - 1), which vanishes at five even levels, holds odd powers
+    only.
+    """
     said = refused(ContractileSurface.blank(5), grid(5, 12))
     assert "map.csv: the data cannot separate a(x), a(x^3), a(x^5) of ContractileSurface" in said
     assert "rank 20 of 21" in said
@@ -539,8 +617,14 @@ def test_too_few_levels_are_named_with_the_powers_they_leave_open():
 
 def test_parameters_that_only_act_together_are_named_and_may_be_held():
     law = Saga2007(StraightFibre(0.072, 0.012, meridian=Parabola()), LINE_A, 0.002)
-    contraction, force = (x.ravel() for x in np.meshgrid(np.linspace(0.02, 0.3, 6), np.linspace(20.0, 200.0, 5)))
-    columns = {"contraction": contraction, "force": force, "pressure": law.pressure(contraction, force)}
+    contraction, force = (
+        x.ravel() for x in np.meshgrid(np.linspace(0.02, 0.3, 6), np.linspace(20.0, 200.0, 5))
+    )
+    columns = {
+        "contraction": contraction,
+        "force": force,
+        "pressure": law.pressure(contraction, force),
+    }
     recording = Recording(columns, "bench")
     said = refused(law, recording)
     assert "cannot separate" in said
@@ -602,7 +686,9 @@ def test_an_infinite_value_is_refused_and_a_missing_one_left_out():
 @pytest.mark.parametrize("name", ["pressure", "contraction", "force"])
 def test_a_missing_value_of_one_of_two_recordings_is_left_out_of_the_checks_too(name: str):
     recording = points(surface(2).force, n=50)
-    gap = recording.with_columns(**{name: np.where(np.arange(50) == 7, np.nan, recording[name] + 1e-6)})
+    gap = recording.with_columns(
+        **{name: np.where(np.arange(50) == 7, np.nan, recording[name] + 1e-6)}
+    )
     found = fit(ContractileSurface.blank(2, **WIDE), [gap, recording])
     assert "1 rows with a missing value (NaN) were dropped." in found.notes
 
@@ -619,9 +705,14 @@ def test_points_beyond_the_reach_of_a_law_are_named():
 
 def test_an_unknown_name_to_hold():
     with pytest.raises(
-        ParameterError, match=r"no parameter 'end_corection' to be fixed.*Did you mean 'end_correction'"
+        ParameterError,
+        match=r"no parameter 'end_corection' to be fixed.*Did you mean 'end_correction'",
     ):
-        fit(TonduLopez2000(Braid(0.01, 0.45, 0.3)), points(surface(2).force), fixed=("end_corection",))
+        fit(
+            TonduLopez2000(Braid(0.01, 0.45, 0.3)),
+            points(surface(2).force),
+            fixed=("end_corection",),
+        )
 
 
 def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
@@ -635,11 +726,15 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
     assert np.isfinite(found["geometry.braid_angle"].stderr)
     assert "end_correction is on its bound; its value is not determined by the data." in found.notes
     known = fit(
-        dataclasses.replace(found.model, end_correction=1.0), shorter, fixed=("geometry.radius", "end_correction")
+        dataclasses.replace(found.model, end_correction=1.0),
+        shorter,
+        fixed=("geometry.radius", "end_correction"),
     )
     places = points(truth.force, high=0.2, n=5)
     bands = [confidence_band(each, places) for each in (found, known)]
-    ratios = np.divide(*(band.high - band.low for band in bands))  # far beyond its bound, its error adds little
+    ratios = np.divide(
+        *(band.high - band.low for band in bands)
+    )  # far beyond its bound, its error adds little
     assert (ratios >= 1).all()
     assert 1.01 < ratios.max() < 1.03
 
@@ -647,17 +742,19 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
 def test_as_many_points_as_parameters_leave_the_deviations_unknown():
     found = fit(ContractileSurface.blank(1, **WIDE), points(surface(1).force, n=3))
     assert np.isnan(found.standard_errors).all()
-    assert "There are as many rows as parameters, so the standard errors are unknown." in found.notes
+    assert (
+        "There are as many rows as parameters, so the standard errors are unknown." in found.notes
+    )
 
 
 def test_a_recording_of_another_specimen_is_noted():
-    recording = points(TonduLopez2000(Braid(0.0095, 0.42, 0.3), 1.3).force, high=0.2).with_constants(
-        resting_length=0.25
-    )
+    recording = points(
+        TonduLopez2000(Braid(0.0095, 0.42, 0.3), 1.3).force, high=0.2
+    ).with_constants(resting_length=0.25)
     found = fit(TonduLopez2000(Braid(0.0095, 0.5, 0.3), 1.1), recording, fixed=("geometry.radius",))
     assert (
-        "The muscle in the recording has a resting length of 0.25 m, but geometry.resting_length is 0.3 m."
-        in found.notes
+        "The muscle in the recording has a resting length of 0.25 m, but geometry.resting_length is"
+        " 0.3 m." in found.notes
     )
 
 
@@ -671,14 +768,18 @@ def test_the_measured_map_of_the_dmsp_20_determines_21_coefficients():
     assert (found.rank, found.rows_used, found.rows_censored) == (21, 126, 66)
     assert found.rmse == pytest.approx(2.07, abs=0.01)
     assert found.condition == pytest.approx(757, abs=5)
-    bare = found.model.polynomial(recording["pressure"], recording["contraction"])[recording["force"] == 0]
+    bare = found.model.polynomial(recording["pressure"], recording["contraction"])[
+        recording["force"] == 0
+    ]
     assert bare.max() < 2.0
 
 
 def test_what_only_bounds_determine_stays_near_to_them_and_is_noted():
-    """At the shortest length that map holds no pull at all: five levels are left for the fifth power of x.
+    """At the shortest length that map holds no pull at all: five levels are left for the fifth
+    power of x.
 
-    Any multiple of the quintic that vanishes at the five levels meets the points as well, if it points downward.
+    Any multiple of the quintic that vanishes at the five levels meets the points as well, if it
+    points downward.
     """
     recording = read_csv(DATA / "dmsp-20-300.csv")
     assert recording["force"][recording["length"] == 0.222].max() == 0
@@ -686,13 +787,17 @@ def test_what_only_bounds_determine_stays_near_to_them_and_is_noted():
     found = fit(start, recording)
     assert "The uncensored rows determine 20 of 21 parameters" in " ".join(found.notes)
     at_shortest = found.recording["contraction"] == found.recording["contraction"].max()
-    bare = found.model.polynomial(found.recording["pressure"], found.recording["contraction"])[at_shortest]
+    bare = found.model.polynomial(found.recording["pressure"], found.recording["contraction"])[
+        at_shortest
+    ]
     assert bare.max() == pytest.approx(0.0, abs=1e-3)
     again = fit(start, recording.rows(np.random.default_rng(1).permutation(126)))
     assert again.values == pytest.approx(found.values, abs=1e-3)
     taut = recording.rows(recording["force"] > 0)
     assert "rank 20 of 21" in refused(start, taut)
-    assert "determine 20 of 21" not in " ".join(fit(ContractileSurface.blank(4, max_force=2e3), recording).notes)
+    assert "determine 20 of 21" not in " ".join(
+        fit(ContractileSurface.blank(4, max_force=2e3), recording).notes
+    )
 
 
 @pytest.mark.parametrize(("name", "rms"), [("10", 2.7), ("20", 8.4), ("40", 30.0)])
@@ -713,7 +818,10 @@ def test_a_fit_prints_its_parameters_and_figures():
     assert f"{found['end_correction'].value:.4g}" in text
     assert f"{found['end_correction'].stderr:.3g}" in text
     parameters = next(table for table in found.chapter().tables if table.name == "parameters")
-    assert "contraction of the middle relative to that of the whole muscle" in parameters.columns["meaning"]
+    assert (
+        "contraction of the middle relative to that of the whole muscle"
+        in parameters.columns["meaning"]
+    )
     for said in (
         "rms error",
         " N  ",
@@ -724,7 +832,9 @@ def test_a_fit_prints_its_parameters_and_figures():
         "rank",
     ):
         assert said in text
-    assert {"residual standard deviation", "condition", "contraction of the data"} <= {v.name for v in found.goodness()}
+    assert {"residual standard deviation", "condition", "contraction of the data"} <= {
+        v.name for v in found.goodness()
+    }
     assert "<table>" in found._repr_html_()
 
 

@@ -1,6 +1,8 @@
-"""Friction from loops: what made a loop is found again, and no friction is claimed where there was none.
+"""Friction from loops: what made a loop is found again, and no friction is claimed where there was
+none.
 
-The verdict rests on AICc and the F test over rows that are independent, and on a second run where there is one.
+The verdict rests on AICc and the F test over rows that are independent, and on a second run where
+there is one.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ def name(law):
 
 
 def isobaric(friction, noise=0.2, seed=1, pressure=3e5):
-    """A loop of contraction with inner loops at constant pressure, its forces falling with contraction."""
+    """A loop of contraction with inner loops at constant pressure, its forces falling with
+    contraction.
+    """
     turns = (0.0, 0.12, 0.08, 0.11, 0.06, 0.12, 0.0)
     contraction = np.concatenate([np.linspace(a, b, 60) for a, b in itertools.pairwise(turns)])
     rng = np.random.default_rng(seed)
@@ -107,8 +111,14 @@ def test_the_parameters_of_dahl_and_of_the_slips_come_back():
 def test_a_given_characteristic_takes_the_place_of_the_curve():
     law = VirtualWork(Braid(0.01, 0.4363, LENGTH))
     run = isobaric(SLIP)
-    force = law.force(run["pressure"], run["contraction"]) + 3.0 - SLIP.force_along(run["contraction"] * LENGTH)
-    fit = fit_hysteresis(start_of(SLIP), run.with_columns(force=force), static_curve=FixedCharacteristic(law))
+    force = (
+        law.force(run["pressure"], run["contraction"])
+        + 3.0
+        - SLIP.force_along(run["contraction"] * LENGTH)
+    )
+    fit = fit_hysteresis(
+        start_of(SLIP), run.with_columns(force=force), static_curve=FixedCharacteristic(law)
+    )
     assert fit.coefficients == pytest.approx([3.0], abs=1e-6)
     assert fit.friction.stiffnesses == pytest.approx(SLIP.stiffnesses, rel=1e-6)
 
@@ -119,32 +129,46 @@ def test_an_isometric_ramp_shows_friction_on_the_pressure():
     friction = MaxwellSlip((3e3, 1e3), (4e-4, 2e-3))
     force = 5e-4 * pressure - friction.force_along(slide.displacement_per_pressure * pressure)
     run = Recording({"pressure": pressure, "force": force}, "ramp")
-    fit = fit_hysteresis(MaxwellSlip((1.0, 1.0), friction.limits), run, static_curve=PolynomialCurve("pressure", 1),
-                         friction_path=slide)  # fmt: skip
+    fit = fit_hysteresis(
+        MaxwellSlip((1.0, 1.0), friction.limits),
+        run,
+        static_curve=PolynomialCurve("pressure", 1),
+        friction_path=slide,
+    )
     assert fit.friction.stiffnesses == pytest.approx(friction.stiffnesses, rel=1e-3)
 
 
 def test_lugre_uses_the_time_of_the_rows():
     law = LuGre(3e4, 10.0, 10.0, 0.003)
     run = isobaric(None, 0.0)
-    path, time = run["contraction"] * LENGTH, np.cumsum(np.repeat([0.02, 0.1, 1.0, 0.05, 0.1, 0.5], 60))
+    path = run["contraction"] * LENGTH
+    time = np.cumsum(np.repeat([0.02, 0.1, 1.0, 0.05, 0.1, 0.5], 60))
     rng = np.random.default_rng(2)
     force = run["force"] - law.force_along(path, time) + 0.1 * rng.standard_normal(time.size)
-    fit = fit_hysteresis(LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static_curve=CURVE)
+    fit = fit_hysteresis(
+        LuGre(1e4, 20.0, 3.0, 0.01), run.with_columns(time=time, force=force), static_curve=CURVE
+    )
     assert fit.rmse < 0.15
     assert fit.friction.coulomb_force == pytest.approx(10.0, rel=0.1)
-    slow = fit_hysteresis(Dahl(1e4, 20.0), run.with_columns(time=time, force=force), static_curve=CURVE)
+    slow = fit_hysteresis(
+        Dahl(1e4, 20.0), run.with_columns(time=time, force=force), static_curve=CURVE
+    )
     assert slow.rmse > 3 * fit.rmse
 
 
 def test_without_friction_none_is_claimed():
-    """At most one of 60 loops of noise is taken for friction: the F test alone would let through 1 %."""
+    """At most one of 60 loops of noise is taken for friction: the F test alone would let through 1
+    %.
+    """
     claims = 0
     for seed in range(60):
         run = isobaric(None, noise=1.0, seed=seed)
         claims += fit_hysteresis(start_of(SLIP), run, static_curve=CURVE).justified
     assert claims <= 1
-    assert "do not justify" in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static_curve=CURVE).verdict
+    assert (
+        "do not justify"
+        in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static_curve=CURVE).verdict
+    )
 
 
 def test_a_law_without_a_parameter_is_compared_like_the_others():
@@ -156,7 +180,8 @@ def test_a_law_without_a_parameter_is_compared_like_the_others():
 
 def test_drifting_errors_count_as_few_rows():
     rng = np.random.default_rng(3)
-    white, steps = rng.standard_normal(4000), rng.standard_normal(4000)
+    white = rng.standard_normal(4000)
+    steps = rng.standard_normal(4000)
     drifting = np.zeros(4000)
     for i in range(1, 4000):
         drifting[i] = 0.8 * drifting[i - 1] + steps[i]
@@ -165,7 +190,9 @@ def test_drifting_errors_count_as_few_rows():
 
 
 def test_a_friction_that_does_not_carry_over_to_the_second_run_is_not_justified():
-    first, same, without = isobaric(SLIP, seed=1), isobaric(SLIP, seed=2), isobaric(None, seed=3)
+    first = isobaric(SLIP, seed=1)
+    same = isobaric(SLIP, seed=2)
+    without = isobaric(None, seed=3)
     good = fit_hysteresis(start_of(SLIP), first, static_curve=CURVE, repeat=(same, None))
     assert good.justified
     assert good.repeat_rmse == pytest.approx(0.2, rel=0.15)
@@ -180,12 +207,15 @@ def test_the_gap_between_branches_and_between_runs_is_measured_place_by_place():
     loop = np.where(np.arange(400) < 200, -2.0, 3.0)
     way = motion_direction(path)
     assert branch_gap(path, loop, way).values == pytest.approx(5.0 * np.ones(24), abs=0.2)
-    assert repeat_difference(path, loop, way, path, loop + 1.5, way).values == pytest.approx(1.5 * np.ones(48))
+    assert repeat_difference(path, loop, way, path, loop + 1.5, way).values == pytest.approx(
+        1.5 * np.ones(48)
+    )
 
 
 def test_a_bin_weighs_by_its_rows():
     """Fifty rows per bin without a gap, and one row of another value in a bin of its own."""
-    rising, falling = np.linspace(0.0, 1.0, 1200), np.linspace(0.95, 0.0, 1140)
+    rising = np.linspace(0.0, 1.0, 1200)
+    falling = np.linspace(0.95, 0.0, 1140)
     path = np.concatenate([rising, [1.0], falling])
     way = np.concatenate([np.ones(1200), [-1.0], -np.ones(1140)])
     gap = branch_gap(path, np.where(np.arange(len(path)) == 1200, 10.0, 0.0), way)
@@ -220,18 +250,23 @@ def test_a_speed_of_a_friction_driven_by_pressure_is_in_pascals_per_second():
 
 
 def test_an_inner_loop_belongs_to_both_branches():
-    """Up, half back, up, down: both falling ways lie 5 N above the rising ones, at every place they share."""
+    """Up, half back, up, down: both falling ways lie 5 N above the rising ones, at every place they
+    share.
+    """
     path = np.concatenate([np.linspace(a, b, 100) for a, b in ((0, 1), (1, 0.5), (0.5, 1), (1, 0))])
     way = motion_direction(path)
     assert [int(s) for s in way[[50, 150, 250, 350]]] == [1, -1, 1, -1]
-    assert branch_gap(path, np.where(way > 0, -2.0, 3.0), way).values == pytest.approx(5.0 * np.ones(24))
+    assert branch_gap(path, np.where(way > 0, -2.0, 3.0), way).values == pytest.approx(
+        5.0 * np.ones(24)
+    )
     assert not motion_direction(np.ones(20)).any()
 
 
 def test_the_criteria_meet_their_definitions():
     assert aicc(2.0, 50.0, 3) == pytest.approx(50 * np.log(2.0) + 8 + 40 / 45)
     assert aicc(2.0, 5.0, 3) == np.inf
-    # F = (100/80 - 1)/2 / (1/(40 - 5)) = 4.375 with 2 and 35 degrees: 0.020 (tables: 3.27 is 5 %, 5.27 is 1 %)
+    # F = (100/80 - 1)/2 / (1/(40 - 5)) = 4.375 with 2 and 35 degrees: 0.020 (tables: 3.27 is 5 %,
+    # 5.27 is 1 %)
     assert f_test_p_value(100.0, 80.0, 40.0, 5, 2) == pytest.approx(0.0201, abs=3e-4)
     assert f_test_p_value(80.0, 80.0, 40.0, 5, 2) == 1.0
 
@@ -239,8 +274,17 @@ def test_the_criteria_meet_their_definitions():
 def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
     run = isobaric(SLIP)
     path = run["contraction"] * LENGTH
-    fits = [fit_hysteresis(f, run, static_curve=CURVE) for f in initial_friction_laws(path, SLIP.force_along(path))]
-    assert {name(f.friction) for f in fits} == {"Dahl", "LuGre", "BoucWen", "MaxwellSlip", "PrandtlIshlinskii"}
+    fits = [
+        fit_hysteresis(f, run, static_curve=CURVE)
+        for f in initial_friction_laws(path, SLIP.force_along(path))
+    ]
+    assert {name(f.friction) for f in fits} == {
+        "Dahl",
+        "LuGre",
+        "BoucWen",
+        "MaxwellSlip",
+        "PrandtlIshlinskii",
+    }
     assert all(f.rmse < 0.35 * f.rmse_without_friction for f in fits)
     best = min(fits, key=lambda f: f.rmse)
     assert name(best.friction) in ("MaxwellSlip", "PrandtlIshlinskii")
@@ -257,20 +301,27 @@ def test_runs_that_cannot_tell_are_refused():
     run = isobaric(SLIP)
     with pytest.raises(IdentificationError, match="4 fitted rows along a path of"):
         fit_hysteresis(SLIP, run, static_curve=CURVE, fitted_rows=np.arange(len(run)) < 4)
-    with pytest.raises(IdentificationError, match="friction against shortening needs the resting length"):
+    with pytest.raises(
+        IdentificationError, match="friction against shortening needs the resting length"
+    ):
         fit_hysteresis(SLIP, Recording(run.columns, "loop"), static_curve=CURVE)
     with pytest.raises(IdentificationError, match="0 fitted rows along a path of 0 m"):
         fit_hysteresis(SLIP, run.rows(slice(0, 0)), static_curve=CURVE)
-    gap = run.with_columns(contraction=np.where(np.arange(len(run)) == 60, np.nan, run["contraction"]))
+    gap = run.with_columns(
+        contraction=np.where(np.arange(len(run)) == 60, np.nan, run["contraction"])
+    )
     with pytest.raises(IdentificationError, match="loop, row 61: the displacement is missing"):
         fit_hysteresis(SLIP, gap, static_curve=CURVE)
     with pytest.raises(
-        IdentificationError, match="the displacement of the friction is constant, so it cannot be identified"
+        IdentificationError,
+        match="the displacement of the friction is constant, so it cannot be identified",
     ):
         initial_friction_laws(np.ones(9), np.ones(9))
 
 
-@pytest.mark.parametrize("parts", [((), ()), ((0.02,), (3.0,)), ((0.01, 0.02), (1.0, 15.0))], ids=len)
+@pytest.mark.parametrize(
+    "parts", [((), ()), ((0.02,), (3.0,)), ((0.01, 0.02), (1.0, 15.0))], ids=len
+)
 def test_creep_with_none_one_or_two_time_constants_is_told_apart(parts):
     creep = Creep(0.1, *parts)
     time = np.arange(0.0, 60.0, 0.1)
@@ -286,10 +337,14 @@ def test_creep_with_none_one_or_two_time_constants_is_told_apart(parts):
 
 @pytest.mark.slow
 def test_creep_is_not_claimed_of_noise():
-    """At most four of 100 holds of noise: 1 % by the F test, somewhat more because the time constant is searched."""
+    """At most four of 100 holds of noise: 1 % by the F test, somewhat more because the time
+    constant is searched.
+    """
     time = np.arange(0.0, 20.0, 0.2)
     noise = (np.random.default_rng(seed).standard_normal(time.size) for seed in range(100))
-    fits = [fit_creep(Recording({"time": time, "force": values}, "hold"), "force") for values in noise]
+    fits = [
+        fit_creep(Recording({"time": time, "force": values}, "hold"), "force") for values in noise
+    ]
     assert sum(bool(fit.creep.amplitudes) for fit in fits) <= 4
 
 
@@ -299,7 +354,9 @@ def test_a_hold_too_short_for_its_creep_is_said_to_be_so():
     force = Creep(100.0, (10.0,), (4.0,)).value_at(time) + 0.01 * rng.standard_normal(time.size)
     fit = fit_creep(Recording({"time": time, "force": force}, "hold"), "force")
     assert "too short for the longest" in fit.verdict
-    with pytest.raises(IdentificationError, match="12 or more rows of a hold in increasing time; there are 5"):
+    with pytest.raises(
+        IdentificationError, match="12 or more rows of a hold in increasing time; there are 5"
+    ):
         fit_creep(Recording({"time": time[:5], "force": force[:5]}, "hold"), "force")
     with pytest.raises(ParameterError, match="1 amplitudes and 0 time constants"):
         Creep(1.0, (1.0,))
@@ -314,5 +371,8 @@ def test_figures_show_units_and_what_was_fitted():
     )
     fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE)
     upper, lower = fit.plot().axes
-    assert (upper.get_ylabel(), lower.get_ylabel()) == ("force [N]", "residual (model - measured) [N]")
+    assert (upper.get_ylabel(), lower.get_ylabel()) == (
+        "force [N]",
+        "residual (model - measured) [N]",
+    )
     assert "MaxwellSlip fitted to loop" in str(fit)

@@ -1,4 +1,6 @@
-"""Statistics of friction, creep and volume fits against their formulas, and the chosen limits from both sides."""
+"""Statistics of friction, creep and volume fits against their formulas, and the chosen limits from
+both sides.
+"""
 
 from __future__ import annotations
 
@@ -44,7 +46,9 @@ SLIP = MaxwellSlip((2e4, 1e4), (4e-4, 2e-3))
 
 
 def loop(noise: float = 0.5, seed: int = 0, shift: float = 0.0, memory: float = 0.0) -> Recording:
-    """Two loops of contraction with friction; the noise is that of a first-order process with a memory."""
+    """Two loops of contraction with friction; the noise is that of a first-order process with a
+    memory.
+    """
     contraction = np.concatenate(
         [np.linspace(a, b, 150) for a, b in itertools.pairwise((0.02, 0.16, 0.02, 0.16, 0.02))]
     )
@@ -53,7 +57,11 @@ def loop(noise: float = 0.5, seed: int = 0, shift: float = 0.0, memory: float = 
     for i in range(contraction.size):
         coloured[i] = memory * coloured[i - 1] + np.sqrt(1.0 - memory**2) * white[i]
     force = 900.0 - 4000.0 * contraction - SLIP.force_along(contraction * LENGTH) + coloured + shift
-    columns = {"time": 0.1 * np.arange(force.size), "pressure": np.full(force.size, 3e5), "contraction": contraction}
+    columns = {
+        "time": 0.1 * np.arange(force.size),
+        "pressure": np.full(force.size, 3e5),
+        "contraction": contraction,
+    }
     return Recording({**columns, "force": force}, "loop", {"resting_length": LENGTH})
 
 
@@ -72,11 +80,15 @@ def independent_rows(residuals: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.8])
-def test_evidence_of_a_friction_counts_its_parameters_and_those_of_the_curve_over_independent_rows(memory: float):
+def test_evidence_of_a_friction_counts_its_parameters_and_those_of_the_curve_over_independent_rows(
+    memory: float,
+):
     fit = fitted(loop(12.0, memory=memory))
-    with_friction, without = fit.series.fitted_residuals(fit.friction), fit.series.fitted_residuals(None)
+    with_friction = fit.series.fitted_residuals(fit.friction)
+    without = fit.series.fitted_residuals(None)
     n = independent_rows(with_friction)
-    square, plain = np.mean(with_friction**2), np.mean(without**2)
+    square = np.mean(with_friction**2)
+    plain = np.mean(without**2)
     freedom = n - 5  # three coefficients of the curve and two stiffnesses
     expected = stats.f.sf((plain - square) / 2 / (square / freedom), 2, freedom)
     assert fit.effective_sample_size == pytest.approx(n)
@@ -89,7 +101,9 @@ def test_evidence_of_a_friction_counts_its_parameters_and_those_of_the_curve_ove
 
 
 def test_too_few_independent_residuals_leave_aicc_undefined_and_are_no_nan():
-    """The residuals change so slowly that fewer of them are independent than the model has parameters."""
+    """The residuals change so slowly that fewer of them are independent than the model has
+    parameters.
+    """
     fit = fitted(loop(60.0, memory=0.999).rows(slice(None, None, 15)))
     assert fit.effective_sample_size < 7
     assert fit.aicc_reduction == -np.inf
@@ -115,7 +129,9 @@ def test_the_repeatability_is_the_standard_deviation_of_two_runs():
 
 
 @pytest.mark.parametrize(("kept", "is_named"), [(28, True), (34, False)])
-def test_a_branch_with_less_than_a_tenth_of_the_rows_of_the_other_is_named(kept: int, is_named: bool):
+def test_a_branch_with_less_than_a_tenth_of_the_rows_of_the_other_is_named(
+    kept: int, is_named: bool
+):
     fit = fitted(loop())
     rows = fit.series.direction > 0
     falling = np.flatnonzero(fit.series.direction < 0)
@@ -128,16 +144,21 @@ def test_a_branch_with_less_than_a_tenth_of_the_rows_of_the_other_is_named(kept:
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])
-def test_the_amplitude_of_a_run_has_the_scatter_of_repeated_runs_as_its_standard_error(memory: float):
+def test_the_amplitude_of_a_run_has_the_scatter_of_repeated_runs_as_its_standard_error(
+    memory: float,
+):
     runs = [fitted(loop(4.0, seed, memory=memory)) for seed in range(40)]
     found = [agreement_of_run(SLIP, run, "", 3e5) for run in runs]
     scatter = np.std([each.amplitude for each in found], ddof=1)
     assert np.mean([each.amplitude_stderr for each in found]) == pytest.approx(scatter, rel=0.4)
-    assert np.mean([each.amplitude for each in found]) == pytest.approx(force_amplitude(runs[0].series, SLIP), rel=0.05)
+    assert np.mean([each.amplitude for each in found]) == pytest.approx(
+        force_amplitude(runs[0].series, SLIP), rel=0.05
+    )
 
 
 @pytest.mark.parametrize(
-    ("deviation", "p_value", "disagrees"), [(0.19, 0.001, False), (0.21, 0.001, True), (0.21, 0.011, False)]
+    ("deviation", "p_value", "disagrees"),
+    [(0.19, 0.001, False), (0.21, 0.001, True), (0.21, 0.011, False)],
 )
 def test_a_run_disagrees_if_it_deviates_by_a_fifth_and_significantly(deviation, p_value, disagrees):
     assert RunAgreement("run", "", 3e5, 10.0, 1.0, 10.0, deviation, p_value).disagrees == disagrees
@@ -148,13 +169,19 @@ def test_the_range_of_an_identified_friction_is_that_of_its_pressures_without_th
     friction = identified_friction(SLIP, [series])
     assert isinstance(friction, IdentifiedFriction)
     margin = 0.02 * 1.99e5
-    assert (friction.min_pressure, friction.max_pressure) == pytest.approx((1.01e5 - margin, 1.99e5 + margin), rel=1e-6)
+    assert (friction.min_pressure, friction.max_pressure) == pytest.approx(
+        (1.01e5 - margin, 1.99e5 + margin), rel=1e-6
+    )
 
 
 @pytest.mark.parametrize(("ratio", "is_tested"), [(1.15, False), (1.25, True)])
-def test_a_dependence_on_pressure_is_tested_from_a_ratio_of_pressures_of_1_2_on(ratio: float, is_tested: bool):
+def test_a_dependence_on_pressure_is_tested_from_a_ratio_of_pressures_of_1_2_on(
+    ratio: float, is_tested: bool
+):
     recordings = [
-        dataclasses.replace(loop(seed=i).with_columns(pressure=np.full(600, level)), origin=f"{level:g}")
+        dataclasses.replace(
+            loop(seed=i).with_columns(pressure=np.full(600, level)), origin=f"{level:g}"
+        )
         for i, level in enumerate((3e5, 3e5 * ratio))
     ]
     loops = find_loops(recordings)
@@ -163,13 +190,23 @@ def test_a_dependence_on_pressure_is_tested_from_a_ratio_of_pressures_of_1_2_on(
 
 
 def test_a_campaign_whose_loops_cannot_be_fitted_together_names_no_friction():
-    """One of two loops has no law: the muscle has no friction, although the other loop alone would justify one."""
-    runs = [loop(seed=i).with_columns(pressure=np.full(600, level)) for i, level in enumerate((2e5, 4e5))]
-    first, second = find_loops([dataclasses.replace(run, origin=f"loop {i}") for i, run in enumerate(runs)])
+    """One of two loops has no law: the muscle has no friction, although the other loop alone would
+    justify one.
+    """
+    runs = [
+        loop(seed=i).with_columns(pressure=np.full(600, level))
+        for i, level in enumerate((2e5, 4e5))
+    ]
+    first, second = find_loops(
+        [dataclasses.replace(run, origin=f"loop {i}") for i, run in enumerate(runs)]
+    )
     alone = LoopFit(first, (fitted(first.recording),), {})
     stage = FrictionStage(NoFriction(), (alone, LoopFit(second, (), {})), fit_jointly([alone]))
     assert alone.recommended is not None
-    assert stage.verdict == "Fewer than two loops can be fitted together; the muscle is written without friction."
+    assert (
+        stage.verdict
+        == "Fewer than two loops can be fitted together; the muscle is written without friction."
+    )
     single = dataclasses.replace(stage, friction=alone.recommended.friction, loops=(alone,))
     assert single.verdict.startswith(alone.recommended.verdict)
 
@@ -187,12 +224,16 @@ def test_the_speeds_of_the_data_are_those_without_the_lowest_and_the_highest_twe
 
 
 @pytest.mark.parametrize(("ratio", "varies"), [(2.9, False), (3.1, True)])
-def test_speeds_that_differ_by_a_factor_of_three_determine_terms_of_speed(ratio: float, varies: bool):
+def test_speeds_that_differ_by_a_factor_of_three_determine_terms_of_speed(
+    ratio: float, varies: bool
+):
     assert DataLimits(100.0, 1e-3, ratio * 1e-3).has_speed_variation == varies
 
 
 @pytest.mark.parametrize(("force", "on_bound"), [(98.0, False), (99.5, True)])
-def test_a_force_within_a_hundredth_of_the_maximum_force_is_on_its_bound(force: float, on_bound: bool):
+def test_a_force_within_a_hundredth_of_the_maximum_force_is_on_its_bound(
+    force: float, on_bound: bool
+):
     found = parameters_on_bounds(Dahl(3e4, force), DataLimits(100.0, np.nan, np.nan))
     assert bool(found) == on_bound
 
@@ -201,15 +242,21 @@ def test_parameters_of_a_friction_along_the_pressure_have_pascals_in_place_of_me
     axis = Axis("pressure", 1.0, "Pa", 1e8)  # 1e8 Pa correspond to a metre
     displayed = {unit: axis.display(2.0, unit) for unit in ("m", "m/s", "N/m", "N s/m", "1", "N")}
     assert displayed == {
-        "m": (2e8, "Pa"), "m/s": (2e8, "Pa/s"), "N/m": (2e-8, "N/Pa"), "N s/m": (2e-8, "N s/Pa"), "1": (2.0, ""),
+        "m": (2e8, "Pa"),
+        "m/s": (2e8, "Pa/s"),
+        "N/m": (2e-8, "N/Pa"),
+        "N s/m": (2e-8, "N s/Pa"),
+        "1": (2.0, ""),
         "N": (2.0, "N"),
-    }  # fmt: skip
+    }
 
 
 # Creep
 
 
-def hold(creep: Creep, noise: float, duration: float = 100.0, rows: int = 400, seed: int = 1) -> Recording:
+def hold(
+    creep: Creep, noise: float, duration: float = 100.0, rows: int = 400, seed: int = 1
+) -> Recording:
     time = np.linspace(0.0, duration, rows)
     force = creep.value_at(time) + noise * np.random.default_rng(seed).standard_normal(rows)
     return Recording({"time": time, "force": force}, "hold")
@@ -239,17 +286,25 @@ def test_a_time_constant_up_to_twice_the_hold_is_found():
 
 
 @pytest.mark.parametrize(("change", "drifts"), [(2.3, False), (3.2, True)])
-def test_a_quantity_drifts_if_its_quarters_differ_by_two_standard_deviations(change: float, drifts: bool):
+def test_a_quantity_drifts_if_its_quarters_differ_by_two_standard_deviations(
+    change: float, drifts: bool
+):
     noise = np.random.default_rng(3).standard_normal(20_000)
     assert _drifts(100.0 + noise + change * np.linspace(0.0, 1.0, 20_000)) == drifts
 
 
 @pytest.mark.parametrize(("difference", "count"), [(4e-4, 1), (7e-4, 2)])
-def test_lengths_that_differ_by_more_than_five_hundredths_of_a_per_cent_are_two_holds(difference: float, count: int):
-    contraction = 0.1 + difference * np.concatenate([np.zeros(200), np.linspace(0.0, 1.0, 300), np.ones(200)])
+def test_lengths_that_differ_by_more_than_five_hundredths_of_a_per_cent_are_two_holds(
+    difference: float, count: int
+):
+    contraction = 0.1 + difference * np.concatenate(
+        [np.zeros(200), np.linspace(0.0, 1.0, 300), np.ones(200)]
+    )
     time = 0.1 * np.arange(700)
     columns = {"time": time, "pressure": np.full(700, 3e5), "contraction": contraction}
-    recording = Recording({**columns, "force": 100.0 + 50.0 * np.exp(-time / 10.0)}, "hold", {"resting_length": 0.3})
+    recording = Recording(
+        {**columns, "force": 100.0 + 50.0 * np.exp(-time / 10.0)}, "hold", {"resting_length": 0.3}
+    )
     assert [each.quantity for each in find_holds(recording)] == ["force"] * count
 
 
@@ -261,7 +316,11 @@ def test_a_mass_flow_is_integrated_by_the_trapezoidal_rule_and_its_end_is_the_la
     flow = np.where(time < 1.9, 1e-4 * time, 0.0)
     mass = np.concatenate([[0.0], np.cumsum((flow[1:] + flow[:-1]) / 2 * np.diff(time))])
     volume = 5e-5
-    columns = {"time": time, "pressure": mass * 287.05 * 293.15 / volume, "contraction": np.zeros(time.size)}
+    columns = {
+        "time": time,
+        "pressure": mass * 287.05 * 293.15 / volume,
+        "contraction": np.zeros(time.size),
+    }
     (found,) = volume_points([Recording({**columns, "mass_flow": flow}, "fill")]).volume
     assert found == pytest.approx(volume, rel=1e-9)
     late = dataclasses.replace(
@@ -274,7 +333,9 @@ def test_a_mass_flow_is_integrated_by_the_trapezoidal_rule_and_its_end_is_the_la
 
 def test_the_standard_deviation_and_the_criterion_of_a_polynomial_are_those_of_linear_least_squares():
     contraction = np.linspace(0.0, 0.25, 12)
-    volume = 6e-5 + 2e-5 * np.sin(14 * contraction) + 3e-7 * np.random.default_rng(1).standard_normal(12)
+    volume = (
+        6e-5 + 2e-5 * np.sin(14 * contraction) + 3e-7 * np.random.default_rng(1).standard_normal(12)
+    )
     fit = fit_volume(VolumePoints(contraction, volume, 0), 0.2)
     degree = len(fit.geometry.coefficients) - 1
     design = np.vander(contraction, degree + 1)
@@ -283,7 +344,9 @@ def test_the_standard_deviation_and_the_criterion_of_a_polynomial_are_those_of_l
     at = np.array([0.01, 0.13, 0.24])
     rows = np.vander(at, degree + 1)
     assert fit.geometry.volume(at) == pytest.approx(rows @ coefficients, rel=1e-9)
-    assert fit.standard_deviation(at) == pytest.approx(np.sqrt(np.sum(rows @ covariance * rows, axis=1)), rel=1e-5)
+    assert fit.standard_deviation(at) == pytest.approx(
+        np.sqrt(np.sum(rows @ covariance * rows, axis=1)), rel=1e-5
+    )
     k = degree + 2
     criterion = 12 * np.log(square[0] / 12) + 2 * k + 2 * k * (k + 1) / (12 - k - 1)
     assert fit.aicc[f"polynomial of degree {degree}"] == pytest.approx(criterion, rel=1e-9)
@@ -294,7 +357,9 @@ def test_the_standard_deviation_and_the_criterion_of_a_polynomial_are_those_of_l
 
 def test_a_recording_without_rows_is_refused_or_left_out_by_name():
     empty = dataclasses.replace(loop().rows(slice(0, 0)), origin="empty.csv")
-    with pytest.raises(IdentificationError, match=r"empty\.csv: a fit of creep needs 12 or more rows"):
+    with pytest.raises(
+        IdentificationError, match=r"empty\.csv: a fit of creep needs 12 or more rows"
+    ):
         fit_creep(empty, "force")
     with pytest.raises(ColumnError, match=r"empty\.csv: the recording has no rows"):
         volume_points([empty])
@@ -307,6 +372,9 @@ def test_a_recording_without_rows_is_refused_or_left_out_by_name():
 def test_creep_is_fitted_to_a_contraction_or_a_force_only():
     time = np.arange(20.0)
     rows = Recording({"time": time, "length": 0.2 + 1e-3 * np.exp(-time)}, "hold.csv")
-    with pytest.raises(IdentificationError, match=r"hold.csv: creep of the column 'length' .*'contraction' or 'force'"):
+    with pytest.raises(
+        IdentificationError,
+        match=r"hold.csv: creep of the column 'length' .*'contraction' or 'force'",
+    ):
         fit_creep(rows, "length")
     assert fit_creep(rows.with_constants(resting_length=0.21), "contraction").verdict

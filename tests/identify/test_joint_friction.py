@@ -1,6 +1,8 @@
-"""One friction for loops at several pressures: its dependence on pressure is found, and what does not hold is refused.
+"""One friction for loops at several pressures: its dependence on pressure is found, and what does
+not hold is refused.
 
-The truth of these tests is a Coulomb friction with a sinusoidal presliding, which is none of the laws that are fitted.
+The truth of these tests is a Coulomb friction with a sinusoidal presliding, which is none of the
+laws that are fitted.
 """
 
 from __future__ import annotations
@@ -11,7 +13,14 @@ import itertools
 import numpy as np
 import pytest
 
-from airmuscle.bench import ContractionPath, PolynomialCurve, find_loops, fit_jointly, fit_loop, identified_friction
+from airmuscle.bench import (
+    ContractionPath,
+    PolynomialCurve,
+    find_loops,
+    fit_jointly,
+    fit_loop,
+    identified_friction,
+)
 from airmuscle.bench.identify.hysteresis import make_loop_series, search_parameters
 from airmuscle.physics import (
     BoucWen,
@@ -23,15 +32,20 @@ from airmuscle.physics import (
 )
 from airmuscle.recording import Recording
 
-LENGTH, PRESLIDING, SPEED = 0.3, 2.5e-3, 1e-3
+LENGTH = 0.3
+PRESLIDING = 2.5e-3
+SPEED = 1e-3
 LEVELS = (1e5, 3e5, 6e5)
 GROWING = {1e5: 13.0, 2e5: 18.0, 3e5: 23.0, 4.5e5: 30.5, 6e5: 38.0}
 TURNS = (0.02, 0.16, 0.05, 0.12, 0.02)
 
 
 def sinusoidal_friction(path, coulomb):
-    """Force of a deflection that is limited to the presliding distance, with a sinusoidal stiffness."""
-    deflection, force = 0.0, [0.0]
+    """Force of a deflection that is limited to the presliding distance, with a sinusoidal
+    stiffness.
+    """
+    deflection = 0.0
+    force = [0.0]
     for step in np.diff(path):
         deflection = min(max(deflection + step, -PRESLIDING), PRESLIDING)
         force.append(coulomb * np.sin(0.5 * np.pi * deflection / PRESLIDING))
@@ -42,7 +56,10 @@ def sweep(pressure, coulomb, seed=0, density=1000):
     """An isobaric loop with a minor loop at 1 mm/s."""
     rng = np.random.default_rng(int(pressure) + seed)
     contraction = np.concatenate(
-        [np.linspace(a, b, int(density * abs(b - a)), endpoint=False) for a, b in itertools.pairwise(TURNS)]
+        [
+            np.linspace(a, b, int(density * abs(b - a)), endpoint=False)
+            for a, b in itertools.pairwise(TURNS)
+        ]
     )
     path = contraction * LENGTH
     static = 2e-3 * pressure * (1.0 - 3.2 * contraction) + 40.0 * contraction**2 + 60.0
@@ -75,7 +92,9 @@ def test_friction_that_grows_with_pressure_is_found_and_predicts_a_pressure_betw
     made = sinusoidal_friction(path, GROWING[4.5e5])
     found = best.friction.pressure_factor(4.5e5) * best.friction.force_along(path)
     assert np.sqrt(np.mean((made - found) ** 2)) < 0.1 * GROWING[4.5e5]
-    assert [run.amplitude for run in best.agreement] == pytest.approx([GROWING[p] for p in LEVELS], rel=0.05)
+    assert [run.amplitude for run in best.agreement] == pytest.approx(
+        [GROWING[p] for p in LEVELS], rel=0.05
+    )
     assert "times 0.2" in best.verdict
     assert best.verdict.endswith("The data justify this friction for all runs.")
 
@@ -108,9 +127,17 @@ def test_a_constant_friction_gets_no_scale():
 
 
 def test_a_run_without_a_pressure_leaves_the_dependence_on_pressure_untested():
-    """Its mean pressure is unknown, so that no scale over the pressure can be fitted to the runs."""
-    fits = [fit_loop(loop, elements=3) for loop in find_loops([sweep(p, GROWING[p]) for p in (1e5, 3e5, 6e5)])]
-    without = [dataclasses.replace(f, series=dataclasses.replace(f.series, pressure=None)) for f in fits[0].fits]
+    """Its mean pressure is unknown, so that no scale over the pressure can be fitted to the
+    runs.
+    """
+    fits = [
+        fit_loop(loop, elements=3)
+        for loop in find_loops([sweep(p, GROWING[p]) for p in (1e5, 3e5, 6e5)])
+    ]
+    without = [
+        dataclasses.replace(f, series=dataclasses.replace(f.series, pressure=None))
+        for f in fits[0].fits
+    ]
     unknown = dataclasses.replace(fits[0], fits=tuple(without))
     for found in fit_jointly([unknown, *fits[1:]]):
         assert not isinstance(found.friction, PressureScaledFriction)
@@ -136,7 +163,8 @@ def test_two_pressures_cannot_test_the_dependence_and_one_loop_is_no_joint_fit()
     ids=lambda law: type(law).__name__,
 )
 def test_the_scale_of_a_made_friction_comes_back_in_every_law(law):
-    truth, runs = PressureScaledFriction(law, 0.3, 6e5), []
+    truth = PressureScaledFriction(law, 0.3, 6e5)
+    runs = []
     for pressure in LEVELS:
         run = sweep(pressure, 0.0)
         path = run["contraction"] * LENGTH

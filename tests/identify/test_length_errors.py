@@ -1,7 +1,9 @@
-"""A resting length that is recorded wrongly is found as a nuisance parameter of the fit to several specimens.
+"""A resting length that is recorded wrongly is found as a nuisance parameter of the fit to several
+specimens.
 
-The shortening is measured, so that the contraction is wrong by a constant factor: nothing at rest, one sign elsewhere.
-With a law whose ends are free, an error in one of three lengths has the same effect as one in either of the others.
+The shortening is measured, so that the contraction is wrong by a constant factor: nothing at rest,
+one sign elsewhere. With a law whose ends are free, an error in one of three lengths has the same
+effect as one in either of the others.
 """
 
 from __future__ import annotations
@@ -12,7 +14,14 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.bench import Candidate, RunSplit, compare, estimate_length_error, find_length_errors, select_for_both
+from airmuscle.bench import (
+    Candidate,
+    RunSplit,
+    compare,
+    estimate_length_error,
+    find_length_errors,
+    select_for_both,
+)
 from airmuscle.bench.identify import blank_surface, compare_chapter, corrected_length
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, EffectiveLength, LogarithmicLength, TonduLopez2000
@@ -24,7 +33,8 @@ OTHER = LogarithmicLength(blank_surface(3), blank_surface(1), 0.3, 0.3)
 
 def run(length: float, contraction: float, seed: int) -> Recording:
     random = np.random.default_rng(seed)
-    pressure, held = np.linspace(0.3e5, 6e5, 50), np.full(50, contraction)
+    pressure = np.linspace(0.3e5, 6e5, 50)
+    held = np.full(50, contraction)
     law = TonduLopez2000(Braid(0.01, 0.45, length - 0.02), 1.15)
     force = law.force(pressure, held * length / (length - 0.02)) + 2 * random.standard_normal(50)
     columns = {"pressure": pressure, "contraction": held, "force": force}
@@ -64,7 +74,9 @@ def test_a_strong_prior_keeps_the_recorded_length():
 
 def test_the_error_of_one_length_is_reported_with_its_alternatives():
     runs = rig(0.002)
-    found = {each.specimen: each.offset for each in find_length_errors(am.fit(LAW, runs).model, runs)}
+    found = {
+        each.specimen: each.offset for each in find_length_errors(am.fit(LAW, runs).model, runs)
+    }
     assert found["202 mm"] == pytest.approx(-0.002, abs=4e-4)
     comparison = compare(runs, [Candidate("ends", LAW)])
     (note,) = comparison.notes
@@ -86,9 +98,15 @@ def test_two_specimens_do_not_show_an_error_of_length():
 
 
 def test_one_law_for_two_purposes_states_its_excess_over_the_best_of_each():
-    candidates = [Candidate("ends", LAW), Candidate("logarithm", OTHER), Candidate("surface", blank_surface(2))]
+    candidates = [
+        Candidate("ends", LAW),
+        Candidate("logarithm", OTHER),
+        Candidate("surface", blank_surface(2)),
+    ]
     steps = []
-    found = select_for_both(rig(), candidates, progress=lambda name, fraction: steps.append(fraction))
+    found = select_for_both(
+        rig(), candidates, progress=lambda name, fraction: steps.append(fraction)
+    )
     errors = [[each[c.name].cross_validated_rmse for c in candidates] for each in found.comparisons]
     worst = [max(row[i] / min(row) for row in errors) for i in range(3)]
     assert found.recommended[0].candidate is candidates[int(np.argmin(worst))]
@@ -110,10 +128,13 @@ def test_a_law_that_is_not_determined_for_one_purpose_is_not_the_one_law(monkeyp
         compare_chapter,
         "compare_splits",
         lambda runs, _, splits, **__: tuple(
-            compare(two, [family if split == RunSplit() else surface], leave_out=split) for split in splits
+            compare(two, [family if split == RunSplit() else surface], leave_out=split)
+            for split in splits
         ),
     )
-    with pytest.raises(IdentificationError, match="no candidate is determined without each run and without each"):
+    with pytest.raises(
+        IdentificationError, match="no candidate is determined without each run and without each"
+    ):
         select_for_both(two, [family, surface])
 
 

@@ -1,4 +1,6 @@
-"""Hysteresis loops of a file with several runs: one loop for each run with two branches, named after file and rows."""
+"""Hysteresis loops of a file with several runs: one loop for each run with two branches, named
+after file and rows.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,9 @@ def test_a_file_with_one_run_is_one_loop_with_the_name_of_the_file():
 
 
 def test_sweeps_in_one_direction_at_several_levels_are_no_loop():
-    with pytest.raises(IdentificationError, match=r"three.csv, rows \d+ to \d+: the falling branch has no rows"):
+    with pytest.raises(
+        IdentificationError, match=r"three.csv, rows \d+ to \d+: the falling branch has no rows"
+    ):
         find_loops([recording(LEVELS, LEG)])
 
 
@@ -65,7 +69,9 @@ def test_a_loop_of_another_muscle_at_the_same_level_is_no_repeat():
 
 def test_a_recording_without_a_loop_is_left_out_with_a_warning_that_names_it():
     one_way = dataclasses.replace(recording(LEVELS[:1], LEG), origin="one_way.csv")
-    with pytest.warns(AirmuscleWarning, match=r"left out: one_way\.csv: the falling branch has no rows to fit"):
+    with pytest.warns(
+        AirmuscleWarning, match=r"left out: one_way\.csv: the falling branch has no rows to fit"
+    ):
         loops = find_loops([one_way, recording(LEVELS[:1])])
     assert [loop.recording.origin for loop in loops] == ["three.csv"]
 
@@ -73,16 +79,23 @@ def test_a_recording_without_a_loop_is_left_out_with_a_warning_that_names_it():
 def test_a_loop_at_another_held_length_is_no_repeat_without_a_resting_length_either():
     def held(length: float) -> Recording:
         pressure = np.concatenate([np.linspace(5e4, 5e5, 200), np.linspace(5e5, 5e4, 200)])
-        columns = {"time": 0.2 * np.arange(400.0), "pressure": pressure, "length": np.full(400, length)}
+        columns = {
+            "time": 0.2 * np.arange(400.0),
+            "pressure": pressure,
+            "length": np.full(400, length),
+        }
         return Recording({**columns, "force": 200.0 + 1e-3 * pressure}, f"{length}")
 
-    assert [loop.repeat is not None for loop in find_loops([held(0.3), held(0.296), held(0.2961)])] == [False, True]
+    assert [
+        loop.repeat is not None for loop in find_loops([held(0.3), held(0.296), held(0.2961)])
+    ] == [False, True]
 
 
 @pytest.mark.slow
 def test_a_campaign_and_the_command_for_hysteresis_choose_the_same_law():
     """Loops whose transition takes 20 of 900 rows: every sixth row no longer shows its form."""
-    rng, rows = np.random.default_rng(4), np.arange(900.0)
+    rng = np.random.default_rng(4)
+    rows = np.arange(900.0)
     swept = 0.0173 * (1.0 - np.cos(2.0 * np.pi * rows / 900))
     friction = np.where(rows < 450, 1.0, -1.0) * np.tanh(np.minimum(rows, 900 - rows) / 20.0)
     runs = [

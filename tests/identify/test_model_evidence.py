@@ -1,4 +1,6 @@
-"""Evidence for a larger model: F test, AICc and the number of independent observations, against their definitions."""
+"""Evidence for a larger model: F test, AICc and the number of independent observations, against
+their definitions.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from airmuscle.bench.identify import aicc, effective_sample_size, f_test_p_value
 
 @pytest.mark.parametrize(
     ("p", "text"),
-    [(0.0, "p < 0.001"), (0.00099, "p < 0.001"), (0.001, "p = 0.001"), (0.0234, "p = 0.023"), (1.0, "p = 1")],
+    [
+        (0.0, "p < 0.001"),
+        (0.00099, "p < 0.001"),
+        (0.001, "p = 0.001"),
+        (0.0234, "p = 0.023"),
+        (1.0, "p = 1"),
+    ],
 )
 def test_a_small_p_value_has_no_digits(p: float, text: str):
     assert format_p_value(p) == text
@@ -35,8 +43,11 @@ def test_aicc_is_infinite_without_degrees_of_freedom():
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
 def test_observations_of_a_first_order_process_count_as_fewer_independent_ones(correlation: float):
     """N (1 - r)/(1 + r), by which the variance of the mean of the process grows."""
-    random, count = np.random.default_rng(0), 20000
+    random = np.random.default_rng(0)
+    count = 20000
     values = np.zeros(count)
     for i, noise in enumerate(random.standard_normal(count).tolist()):
         values[i] = correlation * values[i - 1] + noise
-    assert effective_sample_size(values) == pytest.approx(count * (1 - correlation) / (1 + correlation), rel=0.08)
+    assert effective_sample_size(values) == pytest.approx(
+        count * (1 - correlation) / (1 + correlation), rel=0.08
+    )

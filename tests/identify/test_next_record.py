@@ -1,5 +1,6 @@
-"""Next record to measure: the Fisher information of a record adds to that of the fit, so that the expected standard
-errors are those of a joint fit with it, and a record that responds to one of two parameters alone separates them.
+"""Next record to measure: the Fisher information of a record adds to that of the fit, so that the
+expected standard errors are those of a joint fit with it, and a record that responds to one of two
+parameters alone separates them.
 """
 
 from __future__ import annotations
@@ -34,20 +35,28 @@ from airmuscle.recording import Recording
 
 NOISE = 500.0
 FILL = Schedule({"fill": ((0.0, 1.0),)})
-VALVE, WALL = "circuit.fill.critical_ratio", "gas.heat_transfer"
+VALVE = "circuit.fill.critical_ratio"
+WALL = "gas.heat_transfer"
 
 
 def rig(muscle=None, gas=None):
     valve = Valve(4e-9, 0.3)
     circuit = FillDischarge(Supply(5e5), valve, valve)
-    return Plant(muscle or load("dmsp-20-300").muscle, circuit, Isometric(0.05), gas=gas or EnergyBalance(1.0))
+    return Plant(
+        muscle or load("dmsp-20-300").muscle,
+        circuit,
+        Isometric(0.05),
+        gas=gas or EnergyBalance(1.0),
+    )
 
 
 def measured(plant, command, times, initial_pressure, seed):
     """A record of the plant with noise, as an experiment."""
     state = plant.state_at(pressure=initial_pressure)
     step = float(times[1] - times[0])
-    run = simulate(plant, command, duration=float(times[-1]), initial_state=state, output_times=step)
+    run = simulate(
+        plant, command, duration=float(times[-1]), initial_state=state, output_times=step
+    )
     noise = NOISE * np.random.default_rng(seed).standard_normal(times.size)
     columns = {"time": times, "pressure": np.interp(times, run["time"], run["pressure"]) + noise}
     conditions = InitialConditions.at_rest(plant, initial_pressure)
@@ -56,7 +65,9 @@ def measured(plant, command, times, initial_pressure, seed):
 
 def fitted(plant, free, *more):
     records = [measured(plant, FILL, np.arange(0.0, 2.0, 0.01), 0.0, 1), *more]
-    return fit_dynamic(plant, records, free=free, observed={"pressure": NOISE}, per_record=(StartTime(0.02),))
+    return fit_dynamic(
+        plant, records, free=free, observed={"pressure": NOISE}, per_record=(StartTime(0.02),)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -75,17 +86,21 @@ def test_the_pair_of_valve_and_wall_with_the_greatest_correlation_is_separated(f
     assert abs(best.precision.correlation) < 0.5
     assert best.gain > 3.0
     assert f"To separate them, measure {best.description}" in ranking.verdict
-    assert [each.gain for each in ranking.ranking] == sorted((each.gain for each in ranking.ranking), reverse=True)
+    assert [each.gain for each in ranking.ranking] == sorted(
+        (each.gain for each in ranking.ranking), reverse=True
+    )
 
 
 def test_the_precision_does_not_depend_on_the_zero_of_the_clock():
     """A start time that is estimated as nearly zero is not known more closely than another one."""
-    plant, free = rig(), ("circuit.fill.conductance", VALVE, WALL)
+    plant = rig()
+    free = ("circuit.fill.conductance", VALVE, WALL)
     record = measured(plant, FILL, np.arange(0.0, 2.0, 0.01), 0.0, 1)
     late = fitted(plant, free).estimates[-1].value
     shifted = record.recording.with_columns(time=record.recording["time"] - late + 1e-9)
     near_zero = dataclasses.replace(record, recording=shifted, start_time=-late)
-    sensor, own = {"pressure": NOISE}, (StartTime(0.02),)
+    sensor = {"pressure": NOISE}
+    own = (StartTime(0.02),)
     fit = fit_dynamic(plant, [near_zero], free=free, observed=sensor, per_record=own)
     now = rank_records(fit, (VALVE, WALL)).now
     assert abs(fit.estimates[-1].value) < 1e-8
@@ -100,13 +115,17 @@ def test_the_present_precision_is_that_of_the_fit(fill):
 
 
 def test_a_repeat_divides_the_standard_errors_by_the_root_of_two(fill):
-    (again,) = (each for each in rank_records(fill).ranking if each.description == "a repeat of the record")
+    (again,) = (
+        each for each in rank_records(fill).ranking if each.description == "a repeat of the record"
+    )
     assert again.gain == pytest.approx(math.sqrt(2.0), rel=0.05)
 
 
 def test_the_expected_standard_errors_are_those_of_a_joint_fit_with_the_record(fill):
     best = rank_records(fill).ranking[0]
-    (candidate,) = (each for each in candidate_records(fill) if each.description == best.description)
+    (candidate,) = (
+        each for each in candidate_records(fill) if each.description == best.description
+    )
     planned = candidate.experiment
     initial = planned.initial_conditions.known["pressure"]
     further = measured(planned.plant, planned.command, planned.recording["time"], initial, 2)
@@ -120,9 +139,11 @@ def test_a_load_that_does_not_rest_at_ambient_pressure_leaves_the_other_records(
     start = InitialConditions.at_rest(plant, 3e5)
     run = simulate(plant, FILL, duration=1.0, initial_state=start.guess, output_times=0.01)
     fit = fit_dynamic(
-        plant, [Experiment(run, FILL, start)], free=("circuit.fill.conductance", "gas.exponent"),
+        plant,
+        [Experiment(run, FILL, start)],
+        free=("circuit.fill.conductance", "gas.exponent"),
         observed={"pressure": NOISE},
-    )  # fmt: skip
+    )
     compared = [each.description for each in rank_records(fit).ranking]
     assert compared.count("a repeat of the record") == 1
     assert any("rigid tank of known volume" in each for each in compared)
@@ -195,7 +216,9 @@ def test_the_command_ranks_the_records_of_a_study(fill, tmp_path):
     named = [key for key in said["ranking"]["ranking"][0] if key.startswith("standard_error_of_")]
     assert named == [f"standard_error_of_{VALVE}", f"standard_error_of_{WALL}"]
     assert said["ranking"]["ranking"][0]["record_in_addition"] == "none"
-    assert any("whose valve is closed" in row["record_in_addition"] for row in said["ranking"]["ranking"])
+    assert any(
+        "whose valve is closed" in row["record_in_addition"] for row in said["ranking"]["ranking"]
+    )
     text = (tmp_path / "plan" / "plan.csv").read_text(encoding="utf-8")
     assert text.splitlines()[1].startswith("none,1.0,")
     assert "To separate them" in (tmp_path / "plan" / "report.html").read_text(encoding="utf-8")

@@ -1,5 +1,6 @@
-"""Which runs to measure: a D-optimal design has the greatest det of the Fisher information Sum J^T J among designs of
-as many runs, so for a line y = a + b x its points stand at the ends; every run stays within the bench's limits.
+"""Which runs to measure: a D-optimal design has the greatest det of the Fisher information Sum J^T
+J among designs of as many runs, so for a line y = a + b x its points stand at the ends; every run
+stays within the bench's limits.
 """
 
 from __future__ import annotations
@@ -36,8 +37,13 @@ def test_the_exchange_finds_the_best_of_all_designs():
     rng = np.random.default_rng(4)
     designs = rng.standard_normal((8, 3, 3))
     information = np.einsum("rij,rik->rjk", designs, designs)
-    best = max(_log_determinant(information, c) for c in itertools.combinations_with_replacement(range(8), 3))
-    assert _log_determinant(information, _select_runs(information, 3)) == pytest.approx(best, abs=1e-6)
+    best = max(
+        _log_determinant(information, c)
+        for c in itertools.combinations_with_replacement(range(8), 3)
+    )
+    assert _log_determinant(information, _select_runs(information, 3)) == pytest.approx(
+        best, abs=1e-6
+    )
 
 
 def test_every_candidate_stays_within_the_bench():
@@ -66,11 +72,15 @@ def test_the_deviations_are_those_that_a_fit_then_has():
 
 
 def test_the_plan_tells_more_than_runs_spread_evenly():
-    assert optimal_design(law(), BENCH, runs=4, fixed=("geometry.radius",)).relative_d_efficiency > 1.1
+    assert (
+        optimal_design(law(), BENCH, runs=4, fixed=("geometry.radius",)).relative_d_efficiency > 1.1
+    )
 
 
 def test_what_the_runs_cannot_tell_is_named():
-    """Radius, angle, end correction: F is linear in r0^2, so all three are told; a single isobar at rest is not it."""
+    """Radius, angle, end correction: F is linear in r0^2, so all three are told; a single isobar at
+    rest is not it.
+    """
     found = optimal_design(law(), BENCH, runs=3)
     assert found.undetermined == ()
     tight = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 1e-9), 5000.0)
@@ -88,7 +98,16 @@ def test_a_bench_that_can_do_nothing_is_refused():
         BenchLimits(ValidityRange(5e5, 5e4, 0.0, 0.25), 100.0)
 
 
-ARGUMENTS = ["plan", "tondu-lopez", "--max-pressure", "5 bar", "--max-force", "400 N", "--runs", "4"]
+ARGUMENTS = [
+    "plan",
+    "tondu-lopez",
+    "--max-pressure",
+    "5 bar",
+    "--max-force",
+    "400 N",
+    "--runs",
+    "4",
+]
 
 
 def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
@@ -126,8 +145,12 @@ def test_no_point_is_proposed_where_nothing_pulls():
 
 
 def test_no_point_is_proposed_beyond_the_place_where_the_pull_of_a_surface_ends():
-    """A polynomial that is slack from 83 to 217 kPa rises to 50 N below; the muscle stays slack there."""
-    surface = ContractileSurface((50.0, 0.0, 0.0, 250.0, 0.0, 250.0), 0.0, 600e3, 0.0, 0.2, degree=2)
+    """A polynomial that is slack from 83 to 217 kPa rises to 50 N below; the muscle stays slack
+    there.
+    """
+    surface = ContractileSurface(
+        (50.0, 0.0, 0.0, 250.0, 0.0, 250.0), 0.0, 600e3, 0.0, 0.2, degree=2
+    )
     assert surface.force(0.0, 0.1) == pytest.approx(50.0)
     assert surface.force(150e3, 0.1) == 0.0
     runs = candidate_runs(surface, BenchLimits(ValidityRange(0.0, 600e3, 0.0, 0.2), 600.0), 12)

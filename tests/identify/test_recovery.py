@@ -1,8 +1,10 @@
-"""What made the data comes back from noisy data within the bands that the fit states, for every law of the library.
+"""What made the data comes back from noisy data within the bands that the fit states, for every law
+of the library.
 
-Each characteristic of the library that has parameters makes points on its own validity range with noise; the fit starts elsewhere.
-Tables have no parameters, and are refused. The force (or what the law gives) must be held by its 99.9 % bands, and parameters that the data determine
-by their standard deviations.
+Each characteristic of the library that has parameters makes points on its own validity range with
+noise; the fit starts elsewhere. Tables have no parameters, and are refused. The force (or what the
+law gives) must be held by its 99.9 % bands, and parameters that the data determine by their
+standard deviations.
 """
 
 from __future__ import annotations
@@ -27,7 +29,9 @@ HELD = {
     "saga2007-exact": ("wall_thickness",),
 }
 LEAST_CONTRACTION = {"saga2007-exact": 0.04}
-"""Below it the rubber at rest would draw the tube in below its end rings, of which that law says nothing."""
+"""Below it the rubber at rest would draw the tube in below its end rings, of which that law says
+nothing.
+"""
 
 
 def law_of(name: str):
@@ -38,15 +42,22 @@ def law_of(name: str):
 
 
 def recoverable() -> list[str]:
-    return [n for n in files.list_laws() if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))]
+    return [
+        n
+        for n in files.list_laws()
+        if any(leaf.declared.fitted for leaf in tree.leaves(law_of(n)[0]))
+    ]
 
 
 def simulated(
     law, validity_range: ValidityRange, seed: int, least: float = -0.02
 ) -> tuple[Recording, Recording, float]:
-    """Noisy points, the same points without noise, and the noise: 0.5 % of the range of what the law gives."""
+    """Noisy points, the same points without noise, and the noise: 0.5 % of the range of what the
+    law gives.
+    """
     random = np.random.default_rng(seed)
-    low, high = max(validity_range.contraction[0], least), validity_range.contraction[1]
+    low = max(validity_range.contraction[0], least)
+    high = validity_range.contraction[1]
     pressure = random.uniform(*validity_range.pressure, 400)
     direction = fitted_quantity_of(law)
     if isinstance(law, ForceLaw):
@@ -58,10 +69,19 @@ def simulated(
         }
     elif isinstance(law, ContractionLaw):
         force = random.uniform(*law.force_range, 400)
-        columns = {"pressure": pressure, "force": force, "contraction": law.contraction(pressure, force)}
+        columns = {
+            "pressure": pressure,
+            "force": force,
+            "contraction": law.contraction(pressure, force),
+        }
     else:
-        contraction, force = random.uniform(low, high, 400), random.uniform(0.0, 60.0, 400)
-        columns = {"contraction": contraction, "force": force, "pressure": law.pressure(contraction, force)}
+        contraction = random.uniform(low, high, 400)
+        force = random.uniform(0.0, 60.0, 400)
+        columns = {
+            "contraction": contraction,
+            "force": force,
+            "pressure": law.pressure(contraction, force),
+        }
         inside = (columns["pressure"] > 0) & (columns["pressure"] < 8e5)
         columns = {key: values[inside] for key, values in columns.items()}
     exact = Recording(columns, "simulated")

@@ -1,8 +1,10 @@
-"""A law that is linear in some of its parameters is fitted from far starts: the others alone are searched for.
+"""A law that is linear in some of its parameters is fitted from far starts: the others alone are
+searched for.
 
-What made the data comes back from starts a factor away; on measured maps with a level left out a fit ends, with values
-or with the names of the parameters that nothing tells apart, and never for want of steps. Where nothing but the linear
-parameters is free, the projected start is the least-squares solution itself.
+What made the data comes back from starts a factor away; on measured maps with a level left out a
+fit ends, with values or with the names of the parameters that nothing tells apart, and never for
+want of steps. Where nothing but the linear parameters is free, the projected start is the
+least-squares solution itself.
 """
 
 from __future__ import annotations
@@ -14,7 +16,15 @@ import pytest
 
 import airmuscle
 from airmuscle import read_csv
-from airmuscle.bench import UNCENSORED, Candidate, Censoring, LevelSplit, compare, fit, standard_candidates
+from airmuscle.bench import (
+    UNCENSORED,
+    Candidate,
+    Censoring,
+    LevelSplit,
+    compare,
+    fit,
+    standard_candidates,
+)
 from airmuscle.bench.identify import (
     blank_surface,
     find_initial_values,
@@ -40,19 +50,27 @@ from airmuscle.recording import Recording
 DATA = Path(airmuscle.__file__).parent / "files" / "library" / "data"
 SAROSI = Sarosi2012(1.2e-4, 420.0, -40.0, -8.7e-3, 2.7e-3, -310.0)
 HUNT = Hunt2017(0.17)
-MAPS = ("dmsp-10-250", "dmsp-20-300", "festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")
+MAPS = (
+    "dmsp-10-250",
+    "dmsp-20-300",
+    "festo-tool-dmsp-10",
+    "festo-tool-dmsp-20",
+    "festo-tool-dmsp-40",
+)
 
 
 def pulled(law: Sarosi2012) -> Recording:
     random = np.random.default_rng(1)
-    pressure, contraction = random.uniform(1e5, 6e5, 120), random.uniform(-0.02, 0.2, 120)
+    pressure = random.uniform(1e5, 6e5, 120)
+    contraction = random.uniform(-0.02, 0.2, 120)
     force = law.force(pressure, contraction)
     return Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
 
 
 def pressed(law: Hunt2017) -> Recording:
     random = np.random.default_rng(2)
-    contraction, force = random.uniform(0.0, 0.13, 120), random.uniform(0.0, 120.0, 120)
+    contraction = random.uniform(0.0, 0.13, 120)
+    force = random.uniform(0.0, 120.0, 120)
     pressure = law.pressure(contraction, force)
     return Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
 
@@ -66,7 +84,10 @@ def test_sarosi_comes_back_from_a_start_far_away(decay: float):
 
 @pytest.mark.parametrize("steepness", [0.6, 1.2, 2.7])
 def test_hunt_comes_back_from_a_start_far_away(steepness: float):
-    found = fit(Hunt2017(0.17, offset=1e5, scale=1e5, steepness=steepness, centre=0.3, by_force=10.0), pressed(HUNT))
+    found = fit(
+        Hunt2017(0.17, offset=1e5, scale=1e5, steepness=steepness, centre=0.3, by_force=10.0),
+        pressed(HUNT),
+    )
     for name in ("steepness", "centre", "span_by_force", "offset", "scale", "by_force"):
         assert found[name].value == pytest.approx(getattr(HUNT, name), rel=1e-5), name
 
@@ -75,14 +96,18 @@ def test_hunt_comes_back_from_a_start_far_away(steepness: float):
 @pytest.mark.slow
 def test_with_any_level_left_out_a_fit_settles_or_names_what_nothing_tells_apart(name: str):
     recording = read_csv(DATA / f"{name}.csv")
-    candidates = [c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012 | Hunt2017)]
+    candidates = [
+        c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012 | Hunt2017)
+    ]
     assert len(candidates) == 2
     (labels,), names = label_folds([recording], LevelSplit("contraction"))
     reasons = []
     for candidate in candidates:
         for left_out in names:
             try:
-                assert np.isfinite(fit(candidate.law, recording.rows(labels != left_out)).values).all()
+                assert np.isfinite(
+                    fit(candidate.law, recording.rows(labels != left_out)).values
+                ).all()
             except IdentificationError as error:
                 reasons.append(str(error))
     assert [r for r in reasons if "cannot separate" not in r and "do not depend on" not in r] == []
@@ -99,8 +124,11 @@ def lengths(inner: ContractileSurface, dead_length: float, noise: float = 0.0) -
     runs = []
     for i, length in enumerate((0.08, 0.12, 0.2, 0.4)):
         random = np.random.default_rng(i)
-        pressure, contraction = random.uniform(3e5, 6e5, 150), random.uniform(0.0, 0.12, 150)
-        force = EffectiveLength(inner, length, dead_length, 1e-3).unclamped_force(pressure, contraction)
+        pressure = random.uniform(3e5, 6e5, 150)
+        contraction = random.uniform(0.0, 0.12, 150)
+        force = EffectiveLength(inner, length, dead_length, 1e-3).unclamped_force(
+            pressure, contraction
+        )
         columns = {
             "pressure": pressure,
             "contraction": contraction,
@@ -115,7 +143,8 @@ def lengths(inner: ContractileSurface, dead_length: float, noise: float = 0.0) -
 def test_the_ends_of_a_family_of_degree_five_are_found_from_any_start(start: tuple[float, float]):
     random = np.random.default_rng(4)
     coefficients = random.normal(0, 20, 21)
-    coefficients[:2], coefficients[6] = (300.0, -250.0), 200.0
+    coefficients[:2] = (300.0, -250.0)
+    coefficients[6] = 200.0
     inner = ContractileSurface(tuple(coefficients), 3e5, 6e5, -0.06, 0.18, -1e6, 1e6, 5)
     found = fit(EffectiveLength(blank_surface(5), 0.4, *start), lengths(inner, 0.02))
     assert found["dead_length"].value == pytest.approx(0.02, abs=1e-5)
@@ -123,10 +152,14 @@ def test_the_ends_of_a_family_of_degree_five_are_found_from_any_start(start: tup
 
 
 def test_slack_rows_take_part_in_the_projection():
-    """The start is the least over the linear parameters of the whole sum, rows that are cut off among them."""
+    """The start is the least over the linear parameters of the whole sum, rows that are cut off
+    among them.
+    """
     recording = pulled(SAROSI)
     slack = recording.with_columns(force=np.maximum(recording["force"], 0.0))
-    problem = make_problem(Sarosi2012(0.0, 1.0, -10.0, 0.0, 0.0, 0.0), slack, Censoring(), np.ones(120), ())
+    problem = make_problem(
+        Sarosi2012(0.0, 1.0, -10.0, 0.0, 0.0, 0.0), slack, Censoring(), np.ones(120), ()
+    )
     assert problem.censoring.any()
     start = find_initial_values(problem)
     assert start[2] == pytest.approx(-40.0, rel=1e-4)
@@ -150,12 +183,21 @@ def test_a_step_is_halved_until_the_sum_of_squares_is_at_most_the_limit():
         return float(x @ x)
 
     x, step = np.array([1.0]), np.array([-4.0])
-    assert [shortened_step(square, x, step, limit).item() for limit in (9.0, 1.0, 0.9)] == [-4.0, -2.0, -1.0]
+    assert [shortened_step(square, x, step, limit).item() for limit in (9.0, 1.0, 0.9)] == [
+        -4.0,
+        -2.0,
+        -1.0,
+    ]
     assert shortened_step(square, x, step, 0.9, halvings=2).item() == 0.0
 
 
 def test_what_is_linear_alone_is_solved_at_once():
-    found = fit(Sarosi2012(0.0, 0.0, -40.0, 0.0, 0.0, 0.0), pulled(SAROSI), censoring=UNCENSORED, fixed=("a3",))
+    found = fit(
+        Sarosi2012(0.0, 0.0, -40.0, 0.0, 0.0, 0.0),
+        pulled(SAROSI),
+        censoring=UNCENSORED,
+        fixed=("a3",),
+    )
     assert found["a2"].value == pytest.approx(420.0, rel=1e-9)
 
 
@@ -164,7 +206,9 @@ def test_a_fold_that_leaves_the_exponential_open_is_excluded_by_name():
     recording = read_csv(DATA / "dmsp-20-300.csv")
     (candidate,) = (c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012))
     found = compare(
-        recording, [candidate, Candidate("plane", blank_surface(1, 4e3))], leave_out=LevelSplit("contraction")
+        recording,
+        [candidate, Candidate("plane", blank_surface(1, 4e3))],
+        leave_out=LevelSplit("contraction"),
     )
     (excluded,) = found.excluded
     assert "cannot separate a_1, a_2, a_3" in excluded.reason

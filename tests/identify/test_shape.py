@@ -1,7 +1,9 @@
-"""A shaped surface never loses force with pressure nor gains it with contraction, at any point of its validity range.
+"""A shaped surface never loses force with pressure nor gains it with contraction, at any point of
+its validity range.
 
-The conditions hold between the points of any grid; where data keep them anyway they change nothing; where the free
-surface breaks them the place is named. A conversion of one law into another says how far the two are apart.
+The conditions hold between the points of any grid; where data keep them anyway they change nothing;
+where the free surface breaks them the place is named. A conversion of one law into another says how
+far the two are apart.
 """
 
 from __future__ import annotations
@@ -12,7 +14,12 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import approximate, find_shape_violations, fit, fit_shape_constrained
-from airmuscle.bench.identify import FORCE_FALLS, RISES_WITH_CONTRACTION, blank_surface, shape_constraints
+from airmuscle.bench.identify import (
+    FORCE_FALLS,
+    RISES_WITH_CONTRACTION,
+    blank_surface,
+    shape_constraints,
+)
 from airmuscle.errors import IdentificationError, SolveError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording
@@ -23,7 +30,8 @@ BOX = ValidityRange(1e5, 6e5, 0.0, 0.2)
 
 def points(n: int, noise: float, seed: int = 2) -> Recording:
     random = np.random.default_rng(seed)
-    pressure, contraction = random.uniform(*BOX.pressure, n), random.uniform(*BOX.contraction, n)
+    pressure = random.uniform(*BOX.pressure, n)
+    contraction = random.uniform(*BOX.contraction, n)
     force = MUSCLE.force(pressure, contraction) + noise * random.standard_normal(n)
     return Recording({"pressure": pressure, "contraction": contraction, "force": force}, "bench")
 
@@ -35,7 +43,8 @@ def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
     assert find_shape_violations(found.model, found.model.validity_range, points=201) == ()
     assert found.rmse > found.unconstrained_rmse
     grid = np.meshgrid(
-        np.linspace(*found.model.validity_range.pressure, 60), np.linspace(*found.model.validity_range.contraction, 60)
+        np.linspace(*found.model.validity_range.pressure, 60),
+        np.linspace(*found.model.validity_range.contraction, 60),
     )
 
     def distance(law):
@@ -63,7 +72,9 @@ def test_conditions_that_hold_anyway_change_nothing():
 
 @pytest.mark.slow
 def test_the_conditions_are_those_of_the_slopes():
-    """Enough: where all hold, both slopes have their sign everywhere. Nearly necessary: a plain slope passes."""
+    """Enough: where all hold, both slopes have their sign everywhere. Nearly necessary: a plain
+    slope passes.
+    """
     rows = shape_constraints(3, (5, 4))
     random = np.random.default_rng(1)
     q, x = (v.ravel() for v in np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41)))
@@ -86,12 +97,19 @@ def test_at_points_of_free_contraction_the_force_is_zero():
     pressure = np.array([2e5, 4e5, 6e5])
     free = Recording({"pressure": pressure, "contraction": np.full(3, 0.2)}, "hung free")
     found = fit_shape_constrained(blank_surface(4), data, free=free)
-    assert found.model.unclamped_force(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
+    assert found.model.unclamped_force(pressure, free["contraction"]) == pytest.approx(
+        np.zeros(3), abs=1e-8
+    )
     assert find_shape_violations(found.model, found.model.validity_range) == ()
     none = fit_shape_constrained(blank_surface(4), data, free=free.rows(slice(0, 0)))
     assert none.rmse == pytest.approx(fit_shape_constrained(blank_surface(4), data).rmse, rel=1e-6)
-    many = Recording({"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2}, "too many")
-    with pytest.raises(IdentificationError, match="3 points of free contraction determine all 3 coefficients"):
+    many = Recording(
+        {"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2},
+        "too many",
+    )
+    with pytest.raises(
+        IdentificationError, match="3 points of free contraction determine all 3 coefficients"
+    ):
         fit_shape_constrained(blank_surface(1), data, free=many)
 
 
@@ -118,7 +136,9 @@ def test_a_conversion_says_how_far_it_is_off():
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
     worst = found.max_error
     assert np.abs(worst.error) == pytest.approx(np.abs(difference).max(), rel=0.02)
-    denser = (1 - np.cos(np.pi * np.linspace(0, 1, 300))) / 2  # as the conversion judges: denser towards the edges
+    denser = (
+        1 - np.cos(np.pi * np.linspace(0, 1, 300))
+    ) / 2  # as the conversion judges: denser towards the edges
     grid = np.meshgrid(1e5 + 5e5 * denser, 0.2 * denser)
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
     assert found.rmse == pytest.approx(np.sqrt(np.mean(difference**2)), rel=0.1)

@@ -1,8 +1,9 @@
 """A law that is recommended does not pull where a muscle was measured slack.
 
-The effects of a specimen are limited by its slack rows, by the points that these imply, and by the decay of the effects
-where the population does not pull. A law of any length is slack at further lengths far below the pressure at which it
-starts to pull. Errors at slack rows count in every score, and a law that pulls there is not recommended.
+The effects of a specimen are limited by its slack rows, by the points that these imply, and by the
+decay of the effects where the population does not pull. A law of any length is slack at further
+lengths far below the pressure at which it starts to pull. Errors at slack rows count in every
+score, and a law that pulls there is not recommended.
 """
 
 from __future__ import annotations
@@ -48,8 +49,11 @@ MUSCLES = ((0.083, 5.2e-3, 25.5, 1.25), (0.182, 5.3e-3, 24.6, 1.15), (0.382, 5.4
 
 
 def ramps(rows: int = 120) -> list[Recording]:
-    """Ramps of pressure of three muscles with a dead zone that grows with the contraction; slack sensors read -2 N."""
-    random, made = np.random.default_rng(1), []
+    """Ramps of pressure of three muscles with a dead zone that grows with the contraction; slack
+    sensors read -2 N.
+    """
+    random = np.random.default_rng(1)
+    made = []
     for length, radius, angle, correction in MUSCLES:
         law = am.characteristic.TonduLopez2000(Braid(radius, np.radians(angle), length), correction)
         for repeat in (1, 2):
@@ -57,11 +61,26 @@ def ramps(rows: int = 120) -> list[Recording]:
                 time = np.linspace(0.0, 28.0, rows)
                 pressure = 8e3 + 6.12e5 * (1 - np.abs(time / 14 - 1))
                 contraction = np.full(rows, held)
-                effective = np.maximum(pressure - 6e4 - 1.2e6 * held, 0.0) * (1 + 0.02 * np.sin(pressure / 1.5e5))
-                force = np.maximum(law.force(effective, contraction) - 2e3 * held * (effective > 0), 0.0)
+                effective = np.maximum(pressure - 6e4 - 1.2e6 * held, 0.0) * (
+                    1 + 0.02 * np.sin(pressure / 1.5e5)
+                )
+                force = np.maximum(
+                    law.force(effective, contraction) - 2e3 * held * (effective > 0), 0.0
+                )
                 force = force + random.normal(0, 1, rows) - 2.0
-                columns = {"time": time, "pressure": pressure, "contraction": contraction, "force": force}
-                made.append(Recording(columns, f"{length * 1e3:.0f} mm, {held}, {repeat}", {"resting_length": length}))
+                columns = {
+                    "time": time,
+                    "pressure": pressure,
+                    "contraction": contraction,
+                    "force": force,
+                }
+                made.append(
+                    Recording(
+                        columns,
+                        f"{length * 1e3:.0f} mm, {held}, {repeat}",
+                        {"resting_length": length},
+                    )
+                )
     return made
 
 
@@ -90,39 +109,61 @@ def test_the_law_of_a_specimen_does_not_pull_at_pressures_below_its_slack_rows(p
     assert np.max(law.force(np.full(9, pressure), contraction)) < 5.0
 
 
-def test_the_law_of_a_specimen_does_not_pull_where_its_rows_imply_that_it_is_slack_but_none_was_recorded(measured):
-    """Contracted muscles were recorded from 60 kPa on: at lower pressures they are slack all the more."""
+def test_the_law_of_a_specimen_does_not_pull_where_its_rows_imply_that_it_is_slack_but_none_was_recorded(
+    measured,
+):
+    """Contracted muscles were recorded from 60 kPa on: at lower pressures they are slack all the
+    more.
+    """
     recorded = [
-        run.rows((run["force"] > 0) | (run["pressure"] > 6e4) | (run["contraction"] < 0.04)) for run in measured
+        run.rows((run["force"] > 0) | (run["pressure"] > 6e4) | (run["contraction"] < 0.04))
+        for run in measured
     ]
     name = "pooled, ln L0, degree 3, change of degree 1, effects of degree 2"
     (law,) = [each.law for each in standard_candidates(recorded) if each.name == name]
     found = fit(law, recorded).model
-    pressure, contraction = (x.ravel() for x in np.meshgrid(np.linspace(8e3, 9e4, 15), np.linspace(0.06, 0.12, 7)))
-    assert max(np.max(found.for_specimen(each).force(pressure, contraction)) for each in found.specimens) < 2.0
+    pressure, contraction = (
+        x.ravel() for x in np.meshgrid(np.linspace(8e3, 9e4, 15), np.linspace(0.06, 0.12, 7))
+    )
+    assert (
+        max(
+            np.max(found.for_specimen(each).force(pressure, contraction))
+            for each in found.specimens
+        )
+        < 2.0
+    )
 
 
 def test_the_effects_decay_where_the_population_does_not_pull():
     population = LogarithmicLength(
-        _surface(-100.0), ContractileSurface.blank(1).with_validity_range((1e5, 6e5), (0.0, 0.2)), 0.2, 0.2
+        _surface(-100.0),
+        ContractileSurface.blank(1).with_validity_range((1e5, 6e5), (0.0, 0.2)),
+        0.2,
+        0.2,
     )
     law = PooledLengthLaw(population, (_surface(400.0),), ("a",), (0.2,), "a", effect_decay=1 / 20)
     assert law.force(3e5, 0.1) == 0.0
     assert dataclasses.replace(law, effect_decay=0.0).force(3e5, 0.1) == pytest.approx(300.0)
-    weak = dataclasses.replace(law, population=dataclasses.replace(population, inner=_surface(-5.0)))
+    weak = dataclasses.replace(
+        law, population=dataclasses.replace(population, inner=_surface(-5.0))
+    )
     assert weak.force(3e5, 0.1) == pytest.approx(-5.0 + 0.75 * 400.0)
 
 
 def _surface(force: float):
     surface = ContractileSurface.blank(1).with_validity_range((1e5, 6e5), (0.0, 0.2))
-    return dataclasses.replace(surface, coefficients=(force, 0.0, 0.0), min_force=-1e6, max_force=1e6)
+    return dataclasses.replace(
+        surface, coefficients=(force, 0.0, 0.0), min_force=-1e6, max_force=1e6
+    )
 
 
 def test_the_greatest_error_of_a_pooled_fit_includes_slack_rows(pooled):
     violated = np.where(pooled.recording["force"] <= 0, pooled.modelled, pooled.residuals)
     assert abs(pooled.max_error.error) == pytest.approx(float(np.abs(violated).max()))
     measured = pooled.recording["force"] > 0
-    assert pooled.rmse == pytest.approx(float(np.sqrt(np.sum(violated**2) / np.count_nonzero(measured))))
+    assert pooled.rmse == pytest.approx(
+        float(np.sqrt(np.sum(violated**2) / np.count_nonzero(measured)))
+    )
 
 
 def test_a_law_of_any_length_pulls_less_where_a_length_that_was_not_measured_is_slack(measured):
@@ -138,19 +179,31 @@ def test_a_law_of_any_length_pulls_less_where_a_length_that_was_not_measured_is_
 
 def test_a_law_that_pulls_at_slack_rows_of_a_specimen_left_out_loses(measured):
     """The constant law meets no slack row; its score must contain them."""
-    comparison = compare(measured, [Candidate("plane", ContractileSurface.blank(1))], leave_out=SpecimenSplit())
+    comparison = compare(
+        measured, [Candidate("plane", ContractileSurface.blank(1))], leave_out=SpecimenSplit()
+    )
     (score,) = [s for s in comparison.ranking[0].fold_scores if s.fold == "83 mm"]
     others = [run for run in measured if run.constants["resting_length"] != 0.083]
     law = fit(ContractileSurface.blank(1), others).model
     own = [run for run in measured if run.constants["resting_length"] == 0.083]
-    force, modelled = (np.concatenate(each) for each in (
-        [run["force"] for run in own], [law.force(run["pressure"], run["contraction"]) for run in own]))  # fmt: skip
+    force, modelled = (
+        np.concatenate(each)
+        for each in (
+            [run["force"] for run in own],
+            [law.force(run["pressure"], run["contraction"]) for run in own],
+        )
+    )
     squares = np.sum((modelled - np.maximum(force, 0.0)) ** 2)
-    assert score.rmse == pytest.approx(float(np.sqrt(squares / np.count_nonzero(force > 0))), rel=1e-6)
+    assert score.rmse == pytest.approx(
+        float(np.sqrt(squares / np.count_nonzero(force > 0))), rel=1e-6
+    )
 
 
 def test_a_law_that_pulls_where_a_muscle_is_slack_is_not_recommended(measured):
-    candidates = [Candidate("rich", ContractileSurface.blank(3)), Candidate("plain", ContractileSurface.blank(2))]
+    candidates = [
+        Candidate("rich", ContractileSurface.blank(3)),
+        Candidate("plain", ContractileSurface.blank(2)),
+    ]
     ranking = compare(measured[:8], candidates, leave_out=RunSplit()).ranking
     pulls = dataclasses.replace(
         ranking[0],
@@ -164,8 +217,10 @@ def test_a_law_that_pulls_where_a_muscle_is_slack_is_not_recommended(measured):
 
 
 def test_a_slack_row_that_a_measured_force_contradicts_does_not_exclude_a_law():
-    pressure, contraction = np.array([1e5, 2e5, 3e5, 4e5]), np.full(4, 0.1)
-    force, modelled = np.array([0.0, 50.0, 0.0, 150.0]), np.array([2.0, 50.0, 100.0, 150.0])
+    pressure = np.array([1e5, 2e5, 3e5, 4e5])
+    contraction = np.full(4, 0.1)
+    force = np.array([0.0, 50.0, 0.0, 150.0])
+    modelled = np.array([2.0, 50.0, 100.0, 150.0])
     found = slack_pull(pressure, contraction, force, modelled, limit=10.0)
     assert (found.rows, found.pulling, found.greatest) == (2, 0, 2.0)
     modelled[0] = 60.0
@@ -175,7 +230,9 @@ def test_a_slack_row_that_a_measured_force_contradicts_does_not_exclude_a_law():
 def test_the_slack_region_lies_below_the_pressure_and_above_the_contraction_of_slack_rows():
     pressure = np.array([1e5, 3e5, 2e5])
     contraction = np.array([0.05, 0.1, 0.12])
-    steps = Slackness.of(pressure, contraction, np.array([True, True, False]), np.array([False, False, True]))
+    steps = Slackness.of(
+        pressure, contraction, np.array([True, True, False]), np.array([False, False, True])
+    )
     assert steps.slack_limit(np.array([0.04, 0.05, 0.2])).tolist() == [-np.inf, 1e5, 3e5]
     assert steps.pull_limit(np.array([0.05, 0.12, 0.13])).tolist() == [2e5, 2e5, np.inf]
     p, c = steps.region(0.0, 0.12)
@@ -196,7 +253,9 @@ def test_all_rows_slack_is_a_clear_error(measured):
     with pytest.raises(IdentificationError, match="no measured value"):
         fit(
             PooledLengthLaw(
-                LogarithmicLength(ContractileSurface.blank(2), ContractileSurface.blank(1), 0.2, 0.2),
+                LogarithmicLength(
+                    ContractileSurface.blank(2), ContractileSurface.blank(1), 0.2, 0.2
+                ),
                 (ContractileSurface.blank(2),),
             ),
             slack,
@@ -211,24 +270,37 @@ def test_all_rows_slack_is_a_clear_error(measured):
         ((9.0, 8.0, 23.2), None),
     ],
 )
-def test_the_specimen_that_does_not_follow_the_others_is_named(rms: tuple[float, ...], odd: str | None):
+def test_the_specimen_that_does_not_follow_the_others_is_named(
+    rms: tuple[float, ...], odd: str | None
+):
     errors = SpecimenErrors(tuple("abcd"[: len(rms)]), rms, (0.1, 0.2, 0.4, 0.3)[: len(rms)])
     assert (errors.odd or (None,))[0] == odd
     notes = odd_specimen_notes(errors)
     assert len(notes) == (odd is not None)
     if odd is not None:
-        assert notes[0].startswith("Specimen c does not follow the others: left out, its rms error is 23.2 N")
+        assert notes[0].startswith(
+            "Specimen c does not follow the others: left out, its rms error is 23.2 N"
+        )
         assert "extrapolated" in notes[0]
     assert odd_specimen_notes(None) == []
 
 
 def isobars(curve: float = 40.0, rows: int = 200) -> list[Recording]:
-    """Three isobars that are curved, the last one little, with a force that is not linear in pressure (chosen)."""
-    random, made = np.random.default_rng(1), []
+    """Three isobars that are curved, the last one little, with a force that is not linear in
+    pressure (chosen).
+    """
+    random = np.random.default_rng(1)
+    made = []
     for pressure, shift, bend in ((1e5, 3.0, 1.4), (3e5, -3.0, 0.9), (5e5, 3.0, 0.15)):
         contraction = np.linspace(0.02, 0.12, rows)
         x = (contraction - 0.07) / 0.05
-        force = 2e-3 * pressure - 3000 * (contraction - 0.02) + bend * curve * (x * x - 1 / 3) + shift + 200
+        force = (
+            2e-3 * pressure
+            - 3000 * (contraction - 0.02)
+            + bend * curve * (x * x - 1 / 3)
+            + shift
+            + 200
+        )
         columns = {"pressure": pressure + random.normal(0, 300, rows), "contraction": contraction}
         columns["force"] = force + random.normal(0, 3, rows)
         made.append(Recording(columns, f"{pressure / 1e5:.0f} bar", {"resting_length": 0.17}))
@@ -236,13 +308,16 @@ def isobars(curve: float = 40.0, rows: int = 200) -> list[Recording]:
 
 
 def test_with_three_levels_a_law_is_not_recommended_that_the_measured_points_contradict():
-    """One standard error of three folds admits straight isobars through curved points, 12 N against 7 N."""
+    """One standard error of three folds admits straight isobars through curved points, 12 N against
+    7 N.
+    """
     candidates = [
         Candidate("straight", ContractileSurface.blank(1)),
         Candidate("curved", ContractileSurface.blank(2), ("coefficients[4]", "coefficients[5]")),
     ]
     found = compare(isobars(), candidates, leave_out=LevelSplit("pressure"))
-    straight, curved = found["straight"], found["curved"]
+    straight = found["straight"]
+    curved = found["curved"]
     assert excess_error(straight, curved) <= 0
     assert straight.cross_validated_rmse < 1.25 * curved.cross_validated_rmse
     assert straight.in_sample_rmse > 1.5 * curved.in_sample_rmse

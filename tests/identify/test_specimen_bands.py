@@ -1,5 +1,6 @@
-"""The band for a specimen that was not measured comes from the specimens left out of the fit, with Student's t for their
-small number; it holds 90 to 99 % of the rows of further specimens that vary as the measured ones do.
+"""The band for a specimen that was not measured comes from the specimens left out of the fit, with
+Student's t for their small number; it holds 90 to 99 % of the rows of further specimens that vary
+as the measured ones do.
 """
 
 from __future__ import annotations
@@ -12,7 +13,13 @@ import pytest
 
 import airmuscle as am
 from airmuscle.bench import fit, standard_candidates
-from airmuscle.bench.identify import SpecimenErrors, degrees_of_freedom, leverages, specimens_of, t_quantile
+from airmuscle.bench.identify import (
+    SpecimenErrors,
+    degrees_of_freedom,
+    leverages,
+    specimens_of,
+    t_quantile,
+)
 from airmuscle.bench.identify.specimen_errors import specimen_errors
 from airmuscle.files import Entry, save
 from airmuscle.files.library import predict_with_entry
@@ -25,10 +32,15 @@ LAW = "pooled, ln L0, degree 2, change of degree 1, effects of degree 2"
 NOISE = 1.0
 
 
-def specimen(rng: np.random.Generator, length: float, name: str, spread: float = 0.04) -> list[Recording]:
-    """Ramps of the pressure at four held lengths, of a muscle whose gain, slope and threshold differ from the type."""
+def specimen(
+    rng: np.random.Generator, length: float, name: str, spread: float = 0.04
+) -> list[Recording]:
+    """Ramps of the pressure at four held lengths, of a muscle whose gain, slope and threshold
+    differ from the type.
+    """
     gain, slope, threshold = 1.0 + spread * rng.normal(size=3) * (1.0, 2.0, 5.0)
-    runs, pressure = [], np.linspace(1e5, 6e5, 30)
+    runs = []
+    pressure = np.linspace(1e5, 6e5, 30)
     for contraction in (0.02, 0.08, 0.14, 0.2):
         force = gain * 9e-4 * (pressure - 2e4 * threshold) * (1.0 - 3.4 * slope * contraction)
         force += 15.0 * math.log(length / 0.2) + rng.normal(0.0, NOISE, pressure.size)
@@ -39,16 +51,24 @@ def specimen(rng: np.random.Generator, length: float, name: str, spread: float =
 
 
 def family(seed: int, count: int) -> tuple[Entry, list[float]]:
-    """The entry fitted to a number of specimens, and the share of the rows of three further ones within its band."""
+    """The entry fitted to a number of specimens, and the share of the rows of three further ones
+    within its band.
+    """
     rng = np.random.default_rng(seed)
-    runs = [run for i, length in enumerate(LENGTHS[count]) for run in specimen(rng, length, f"S{i}")]
+    runs = [
+        run for i, length in enumerate(LENGTHS[count]) for run in specimen(rng, length, f"S{i}")
+    ]
     (law,) = [each.law for each in standard_candidates(runs) if each.name == LAW]
     result = fit(law, runs)
     errors = specimen_errors(result, runs)
-    entry = fitted_entry(result, Entry("m", "m", "fitted", law), [Path("x.csv")], recordings=runs, errors=errors)
+    entry = fitted_entry(
+        result, Entry("m", "m", "fitted", law), [Path("x.csv")], recordings=runs, errors=errors
+    )
     shares = []
     for i in range(3):
-        predictions = [predict_with_entry(entry, run) for run in specimen(rng, rng.uniform(0.1, 0.4), f"N{i}")]
+        predictions = [
+            predict_with_entry(entry, run) for run in specimen(rng, rng.uniform(0.1, 0.4), f"N{i}")
+        ]
         shares.append(float(np.mean([each.quantities[0].share for each in predictions])))
     return entry, shares
 
@@ -94,9 +114,13 @@ def test_a_specimen_that_was_not_measured_is_named_and_has_the_band_of_those_lef
 
 def test_the_band_widens_and_a_note_names_the_length_beyond_the_measured_ones(entry):
     rng = np.random.default_rng(2)
-    within, beyond = (predict_with_entry(entry, specimen(rng, length, "X")[0]) for length in (0.2, 0.8))
+    within, beyond = (
+        predict_with_entry(entry, specimen(rng, length, "X")[0]) for length in (0.2, 0.8)
+    )
     assert beyond.quantities[0].half_width[0] > 1.4 * within.quantities[0].half_width[0]
-    assert "the resting length, 800 mm, is outside that of the fit, 100 mm to 400 mm" in " ".join(beyond.notes)
+    assert "the resting length, 800 mm, is outside that of the fit, 100 mm to 400 mm" in " ".join(
+        beyond.notes
+    )
     assert "resting length" not in " ".join(within.notes)
 
 
@@ -110,7 +134,9 @@ def test_two_specimens_state_no_band_for_others(tmp_path):
     prediction = predict_with_entry(entry, specimen(rng, 0.2, "X")[0])
     assert prediction.quantities[0].share is None
     assert prediction.quantities[0].band == "not known for a specimen that was not measured"
-    assert "the band is not known for a specimen that was not measured" in " ".join(prediction.notes)
+    assert "the band is not known for a specimen that was not measured" in " ".join(
+        prediction.notes
+    )
 
 
 def test_a_muscle_file_keeps_both_bands_with_what_they_hold_for(entry, tmp_path):
@@ -121,7 +147,9 @@ def test_a_muscle_file_keeps_both_bands_with_what_they_hold_for(entry, tmp_path)
 def test_files_that_state_neither_specimen_nor_length_are_not_taken_for_specimens():
     run = Recording({"pressure": np.ones(2)}, "a")
     assert specimens_of([run, run.with_constants(specimen="A")]) == ()
-    assert specimens_of([run.with_constants(specimen="A"), run.with_constants(resting_length=0.2)]) == ("A", "200 mm")
+    assert specimens_of(
+        [run.with_constants(specimen="A"), run.with_constants(resting_length=0.2)]
+    ) == ("A", "200 mm")
 
 
 def test_the_quantile_is_that_of_students_t_and_the_number_of_rows_does_not_count():
@@ -129,7 +157,9 @@ def test_the_quantile_is_that_of_students_t_and_the_number_of_rows_does_not_coun
     assert t_quantile(math.inf) == pytest.approx(1.95996, abs=1e-4)
     errors = SpecimenErrors(("a", "b", "c"), (3.0, 4.0, 5.0))
     assert errors.deviation == pytest.approx(math.sqrt(50.0 / 3.0 * 2.0 / 3.0))
-    assert errors.half_width == pytest.approx(4.3027 * errors.deviation * math.sqrt(4.0 / 3.0), rel=1e-4)
+    assert errors.half_width == pytest.approx(
+        4.3027 * errors.deviation * math.sqrt(4.0 / 3.0), rel=1e-4
+    )
 
 
 def test_the_leverage_of_a_specimen_is_that_of_the_regression_by_the_logarithm_of_its_length():

@@ -1,4 +1,6 @@
-"""Control of angle and stiffness: the pressures give tau = tau_0(theta_r) + J a_r + K e + I - D omega and k_r, I' = K/T_i e."""
+"""Control of angle and stiffness: the pressures give tau = tau_0(theta_r) + J a_r + K e + I - D
+omega and k_r, I' = K/T_i e.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +15,22 @@ from airmuscle.engine import Measurement
 
 NAMES = ("left.pressure", "right.pressure")
 LAW = AngleAndStiffness(INVERSE, NAMES)
-WANTED, STIFFNESS, H = 0.2, 7.0, 0.01
+WANTED = 0.2
+STIFFNESS = 7.0
+H = 0.01
 WEIGHT = MECHANISM.weight_torque * np.sin(WANTED)
 
 
 def sampled(law, angle, memory=None, speed=0.0, acceleration=0.0):
-    """Torque and stiffness of the commanded pressures at the wanted angle, and the memory for the next sample."""
+    """Torque and stiffness of the commanded pressures at the wanted angle, and the memory for the
+    next sample.
+    """
     columns = {"angle": angle, "angular_speed": speed}
     setpoints = {"angle": WANTED, "stiffness": STIFFNESS, "acceleration": acceleration}
     ranges = dict.fromkeys(NAMES, (0.0, 5e5))
-    commands, later = law.step(memory or dict(law.initial_memory), Measurement(columns, setpoints, ranges), H)
+    commands, later = law.step(
+        memory or dict(law.initial_memory), Measurement(columns, setpoints, ranges), H
+    )
     first, second = (commands[name] for name in NAMES)
     return (INVERSE.torque(first, second, WANTED), INVERSE.stiffness(first, second, WANTED)), later
 
@@ -48,7 +56,8 @@ def test_a_wanted_acceleration_adds_the_torque_of_the_inertia():
 
 
 def test_the_integral_of_the_error_is_added_from_the_next_sample_on_up_to_its_limit():
-    law, memory = replace(LAW, gain=3.0, integral_time=0.5, max_integral=0.0145), None
+    law = replace(LAW, gain=3.0, integral_time=0.5, max_integral=0.0145)
+    memory = None
     integrals = []
     for _ in range(7):
         found, memory = sampled(law, WANTED - 0.05, memory)

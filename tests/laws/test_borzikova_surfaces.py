@@ -1,7 +1,9 @@
-"""Plane curves k(p) under 45, 130 and 260 N, and the surfaces over them, as defined by Borzíková et al.:
+"""Plane curves k(p) under 45, 130 and 260 N, and the surfaces over them, as defined by Borzíková et
+al.:
 
-k = k_max (1 - exp v) with v = Sum a_ij p^i F^j, or directly k[%] = Sum a_ij p^i F^j; p in bar, F in N.
-Solutions are searched within the validity range; outside it a surface is flagged and extrapolated linearly.
+k = k_max (1 - exp v) with v = Sum a_ij p^i F^j, or directly k[%] = Sum a_ij p^i F^j; p in bar, F in
+N. Solutions are searched within the validity range; outside it a surface is flagged and
+extrapolated linearly.
 """
 
 import dataclasses
@@ -16,8 +18,9 @@ from airmuscle.papers.borzikova_surfaces import sample
 from airmuscle.physics import BorzikovaDirect, BorzikovaExponential
 from airmuscle.physics.muscle.characteristic import SAM_30X290
 
-# Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;
-# rows by power of p in bar, columns by power of F in N. Ten decimals were computed apart from this program.
+# Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in
+# F; rows by power of p in bar, columns by power of F in N. Ten decimals were computed apart from
+# this program.
 EXACT = """
      1.6846648427e-01  -2.0969209723e-03   5.6765232032e-06
     -2.4200192886e+00   2.9208299484e-02  -7.6323055877e-05
@@ -39,21 +42,31 @@ def repaired() -> BorzikovaDirect:
         (45.0, 0.0, 0.40 - 0.40 * np.exp(0.0856)),
         (45.0, 2.0, 0.40 - 0.40 * np.exp(0.1273 * 4 - 1.2602 * 2 + 0.0856)),
         (130.0, 2.0, 0.40 - 0.40 * np.exp(0.0742 * 8 - 0.3787 * 4 + 0.0872 * 2 - 0.0082)),
-        (260.0, 2.0, 0.40 - 0.40 * np.exp(0.0127 * 16 - 0.0607 * 8 - 0.0034 * 4 + 0.0147 * 2 + 0.007)),
+        (
+            260.0,
+            2.0,
+            0.40 - 0.40 * np.exp(0.0127 * 16 - 0.0607 * 8 - 0.0034 * 4 + 0.0147 * 2 + 0.007),
+        ),
     ],
 )
 def test_a_plane_curve_is_the_printed_formula(force, bar, contraction):
-    assert SAM_30X290.curve_at(force).contraction(bar * 1e5) == pytest.approx(contraction, abs=1e-15)
+    assert SAM_30X290.curve_at(force).contraction(bar * 1e5) == pytest.approx(
+        contraction, abs=1e-15
+    )
 
 
-@pytest.mark.parametrize(("force", "turns"), [(45.0, [4.950]), (130.0, [0.119, 3.283]), (260.0, [0.276, 3.600])])
+@pytest.mark.parametrize(
+    ("force", "turns"), [(45.0, [4.950]), (130.0, [0.119, 3.283]), (260.0, [0.276, 3.600])]
+)
 def test_extrema_of_the_plane_curves(force, turns):
     found = SAM_30X290.curve_at(force).turning_pressures()
     assert [p / 1e5 for p in found] == pytest.approx(turns, abs=6e-4)
 
 
 def test_between_the_loads_there_is_no_plane_curve():
-    with pytest.raises(GeometryLimitError, match=r"at 200 N; curves exist at 45, 130, 260 N\. Use a surface"):
+    with pytest.raises(
+        GeometryLimitError, match=r"at 200 N; curves exist at 45, 130, 260 N\. Use a surface"
+    ):
         SAM_30X290.curve_at(200.0)
 
 
@@ -92,22 +105,37 @@ def test_force_and_pressure_invert_contraction(force, repaired):
 
 
 def test_slopes_follow_from_contraction():
-    force, step = 120.0, 1e-3
+    force = 120.0
+    step = 1e-3
     slopes = EXPONENTIAL.slopes(2e5, EXPONENTIAL.contraction(2e5, force))
-    by_force = EXPONENTIAL.contraction(2e5, force + step) - EXPONENTIAL.contraction(2e5, force - step)
+    by_force = EXPONENTIAL.contraction(2e5, force + step) - EXPONENTIAL.contraction(
+        2e5, force - step
+    )
     assert slopes.by_contraction == pytest.approx(2 * step / by_force, rel=1e-6)
 
 
 def test_solutions_are_searched_within_the_validity_range():
-    with pytest.raises(SolveError, match=r"range 45 to 260 N gives a contraction of 39 % at 200 kPa"):
+    with pytest.raises(
+        SolveError, match=r"range 45 to 260 N gives a contraction of 39 % at 200 kPa"
+    ):
         EXPONENTIAL.force(2e5, 0.39)
-    with pytest.raises(SolveError, match=r"range 0 to 350 kPa gives 260 N at a contraction of 25 %"):
+    with pytest.raises(
+        SolveError, match=r"range 0 to 350 kPa gives 260 N at a contraction of 25 %"
+    ):
         EXPONENTIAL.pressure(0.25, 260.0)
 
 
 def test_points_outside_the_validity_range_are_flagged():
-    pressure, force = np.array([-1.0, 0.0, 2e5, 3.5e5, 3.6e5, 2e5]), np.array([100, 45, 44, 260, 100, 261.0])
-    assert EXPONENTIAL.inside_validity_range(pressure, force).tolist() == [False, True, False, True, False, False]
+    pressure = np.array([-1.0, 0.0, 2e5, 3.5e5, 3.6e5, 2e5])
+    force = np.array([100, 45, 44, 260, 100, 261.0])
+    assert EXPONENTIAL.inside_validity_range(pressure, force).tolist() == [
+        False,
+        True,
+        False,
+        True,
+        False,
+        False,
+    ]
 
 
 def test_outside_the_validity_range_the_exponent_is_extrapolated_linearly():
@@ -120,7 +148,8 @@ def test_outside_the_validity_range_the_exponent_is_extrapolated_linearly():
 
 
 def test_the_traced_model_gives_the_numeric_values():
-    pressure, force = np.linspace(-1e5, 5e5, 30), np.linspace(0.0, 400.0, 30)
+    pressure = np.linspace(-1e5, 5e5, 30)
+    force = np.linspace(0.0, 400.0, 30)
     values, by_parameters = autodiff.jacobian(EXPONENTIAL, "contraction", pressure, force)
     assert values == pytest.approx(EXPONENTIAL.contraction(pressure, force), abs=1e-14)
     assert by_parameters.shape == (30, 15 + 4 + 1)
@@ -134,7 +163,8 @@ def test_the_misprinted_surface_loads_with_a_warning():
 
 def test_a_wrong_number_of_coefficients_is_an_error():
     with pytest.raises(
-        ParameterError, match=r"with pressure_degree 4 and force_degree 2 needs 15 coefficients, not 14"
+        ParameterError,
+        match=r"with pressure_degree 4 and force_degree 2 needs 15 coefficients, not 14",
     ):
         dataclasses.replace(EXPONENTIAL, coefficients=EXPONENTIAL.coefficients[:14])
 

@@ -1,4 +1,6 @@
-"""Contractile surface: powers, force limits, monomial coefficients, and extrapolation outside the validity range."""
+"""Contractile surface: powers, force limits, monomial coefficients, and extrapolation outside the
+validity range.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +33,11 @@ def test_a_polynomial_of_total_degree_n_has_its_powers_and_no_others(degree):
 @given(st.integers(0, 99), st.floats(*BOX[0]), st.floats(*BOX[1]))
 def test_inside_the_validity_range_it_is_the_sum_of_its_powers(seed, pressure, contraction):
     law = surface(seed)
-    x, q = 2 * contraction / 0.25 - 1, 2 * (pressure - 50e3) / 600e3 - 1
-    expected = sum(a * x**i * q**j for a, (i, j) in zip(law.coefficients, exponents(5), strict=True))
+    x = 2 * contraction / 0.25 - 1
+    q = 2 * (pressure - 50e3) / 600e3 - 1
+    expected = sum(
+        a * x**i * q**j for a, (i, j) in zip(law.coefficients, exponents(5), strict=True)
+    )
     assert law.force(pressure, contraction) == pytest.approx(expected, abs=1e-8)
     plain = law.monomial_coefficients(1e5)
     exported = sum(a * contraction**i * (pressure / 1e5) ** j for (i, j), a in plain.items())
@@ -46,24 +51,32 @@ def test_outside_the_validity_range_it_neither_increases_with_contraction_nor_de
     law = surface(seed)
     if contraction > 0.25 or contraction < 0.0:
         out = contraction + 0.01 * np.sign(contraction)
-        further, nearer = max(out, contraction), min(out, contraction)
+        further = max(out, contraction)
+        nearer = min(out, contraction)
         assert law.force(pressure, further) <= law.force(pressure, nearer) + 1e-9
     if not 50e3 <= pressure <= 650e3:
         out = pressure + 1e4 * np.sign(pressure - 300e3)
-        assert law.force(max(out, pressure), contraction) >= law.force(min(out, pressure), contraction) - 1e-9
+        assert (
+            law.force(max(out, pressure), contraction)
+            >= law.force(min(out, pressure), contraction) - 1e-9
+        )
 
 
 @given(st.integers(0, 99), st.floats(*BOX[0]))
 def test_it_is_continuous_at_the_edge_of_the_validity_range(seed, pressure):
     law = surface(seed)
     for edge in BOX[1]:
-        assert law.force(pressure, edge - 1e-9) == pytest.approx(law.force(pressure, edge + 1e-9), abs=1e-3)
+        assert law.force(pressure, edge - 1e-9) == pytest.approx(
+            law.force(pressure, edge + 1e-9), abs=1e-3
+        )
 
 
 def test_a_physical_slope_is_extrapolated_linearly():
     falling = ContractileSurface((300.0, -100.0, 200.0), *BOX[0], *BOX[1], degree=1)
     slopes = falling.slopes(300e3, 0.1)
-    expected = falling.force(650e3, 0.25) + slopes.by_pressure * 100e3 + slopes.by_contraction * 0.02
+    expected = (
+        falling.force(650e3, 0.25) + slopes.by_pressure * 100e3 + slopes.by_contraction * 0.02
+    )
     assert falling.force(750e3, 0.27) == pytest.approx(expected)
 
 

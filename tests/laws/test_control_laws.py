@@ -1,5 +1,5 @@
-"""Control laws by hand and by their published properties: cascade, feed-forward, gain schedule, sliding modes,
-dead zone, sigma-delta modulation, sensors, state feedback and iterative learning.
+"""Control laws by hand and by their published properties: cascade, feed-forward, gain schedule,
+sliding modes, dead zone, sigma-delta modulation, sensors, state feedback and iterative learning.
 """
 
 from __future__ import annotations
@@ -34,10 +34,15 @@ WIDE = {"u": (-math.inf, math.inf)}
 
 
 def commanded(law, setpoints, measured, ranges=WIDE, dt=H):
-    """The commands of a law at each sample, for columns {name: values} of set points and measurements."""
-    memory, told = law.init(), []
+    """The commands of a law at each sample, for columns {name: values} of set points and
+    measurements.
+    """
+    memory = law.init()
+    told = []
     for k in range(len(next(iter({**setpoints, **measured}.values())))):
-        columns, wanted = ({name: float(v[k]) for name, v in each.items()} for each in (measured, setpoints))
+        columns, wanted = (
+            {name: float(v[k]) for name, v in each.items()} for each in (measured, setpoints)
+        )
         commands, memory = law.step(memory, Measurement(columns, wanted, ranges), dt)
         assert list(memory) == list(law.initial_memory)
         told.append(commands)
@@ -48,7 +53,8 @@ def commanded(law, setpoints, measured, ranges=WIDE, dt=H):
 
 
 def test_a_cascade_is_the_inner_law_with_the_outer_command_as_set_point():
-    outer, inner = PID("x", "p", 3.0, 0.5), PID("p", "u", 2.0, 0.1)
+    outer = PID("x", "p", 3.0, 0.5)
+    inner = PID("p", "u", 2.0, 0.1)
     rng = np.random.default_rng(1)
     r, x, p = rng.normal(size=(3, 30))
     whole = commanded(Cascade(outer, inner, (-1.0,), (1.0,)), {"x": r}, {"x": x, "p": p})
@@ -60,12 +66,15 @@ def test_a_cascade_is_the_inner_law_with_the_outer_command_as_set_point():
 
 def test_feedback_sees_the_range_that_the_feed_forward_leaves():
     law = WithFeedForward(SetpointCommand(("u",), ("ahead",)), PID("y", "u", 1.0, 0.2))
-    error, ahead = np.full(400, 2.0), np.full(400, 0.7)
+    error = np.full(400, 2.0)
+    ahead = np.full(400, 0.7)
     told = commanded(law, {"y": error, "ahead": ahead}, {"y": np.zeros(400)}, {"u": (0.0, 1.0)})
     assert told[0]["u"] == pytest.approx(0.7, abs=1e-12)
     assert told[-1]["u"] == pytest.approx(1.0, abs=1e-12)
     turned = np.concatenate([error, np.full(40, -0.2)])
-    told = commanded(law, {"y": turned, "ahead": np.full(440, 0.7)}, {"y": np.zeros(440)}, {"u": (0.0, 1.0)})
+    told = commanded(
+        law, {"y": turned, "ahead": np.full(440, 0.7)}, {"y": np.zeros(440)}, {"u": (0.0, 1.0)}
+    )
     assert told[401]["u"] < 1.0, "the integral of the feedback is wound up"
 
 
@@ -77,7 +86,8 @@ def test_scheduled_gains_are_interpolated_and_constant_beyond():
 
 
 def test_decentralised_laws_do_not_influence_each_other():
-    one, two = PID("a", "u", 1.0, 0.1), PID("b", "v", 2.0, 0.3)
+    one = PID("a", "u", 1.0, 0.1)
+    two = PID("b", "v", 2.0, 0.3)
     rng = np.random.default_rng(2)
     a, b, r, q = rng.normal(size=(4, 20))
     ranges = {"u": (-1.0, 1.0), "v": (-1.0, 1.0)}
@@ -85,7 +95,9 @@ def test_decentralised_laws_do_not_influence_each_other():
     alone = [
         {**x, **y}
         for x, y in zip(
-            commanded(one, {"a": r}, {"a": a}, ranges), commanded(two, {"b": q}, {"b": b}, ranges), strict=True
+            commanded(one, {"a": r}, {"a": a}, ranges),
+            commanded(two, {"b": q}, {"b": b}, ranges),
+            strict=True,
         )
     ]
     assert both == alone
@@ -98,27 +110,60 @@ def test_decentralised_laws_do_not_influence_each_other():
             lambda: Cascade(PID("x", "q", 1.0), PID("p", "u", 1.0), (0.0,), (1.0,)),
             "no set point for the outer command 'q'",
         ),
-        (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (0.0, 1.0), (1.0,)), "2 minima and 1 maxima for 1"),
-        (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (2.0,), (1.0,)), "must be below its maximum 1"),
+        (
+            lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (0.0, 1.0), (1.0,)),
+            "2 minima and 1 maxima for 1",
+        ),
+        (
+            lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (2.0,), (1.0,)),
+            "must be below its maximum 1",
+        ),
         (lambda: Decentralised(()), "there is no law; give at least one"),
-        (lambda: Decentralised((PID("a", "u", 1.0), PID("b", "u", 1.0))), "'u' is commanded by two laws"),
-        (lambda: WithFeedForward(SetpointCommand(("u",)), PID("y", "v", 1.0)), "the input of the feedback 'v'"),
+        (
+            lambda: Decentralised((PID("a", "u", 1.0), PID("b", "u", 1.0))),
+            "'u' is commanded by two laws",
+        ),
+        (
+            lambda: WithFeedForward(SetpointCommand(("u",)), PID("y", "v", 1.0)),
+            "the input of the feedback 'v'",
+        ),
         (lambda: SetpointCommand(("u",), ("a", "b")), "2 set points for 1 inputs"),
-        (lambda: GainSchedule(PID("y", "u", 1.0), "gian", "p", (1.0, 2.0), (1.0, 2.0)), "no parameter 'gian'"),
-        (lambda: GainSchedule(PID("y", "u", 1.0), "gain", "p", (2.0, 1.0), (1.0, 2.0)), "must rise"),
-        (lambda: GainSchedule(PID("y", "u", 1.0), "gain", "p", (1.0,), (1.0,)), "at least two breakpoints"),
+        (
+            lambda: GainSchedule(PID("y", "u", 1.0), "gian", "p", (1.0, 2.0), (1.0, 2.0)),
+            "no parameter 'gian'",
+        ),
+        (
+            lambda: GainSchedule(PID("y", "u", 1.0), "gain", "p", (2.0, 1.0), (1.0, 2.0)),
+            "must rise",
+        ),
+        (
+            lambda: GainSchedule(PID("y", "u", 1.0), "gain", "p", (1.0,), (1.0,)),
+            "at least two breakpoints",
+        ),
         (
             lambda: GainSchedule(PID("y", "u", 1.0), "integral_time", "p", (1.0, 2.0), (-1.0, 2.0)),
             "allowed range: 0 to",
         ),
         (lambda: DeadZoneController("y", "u", 1.0), "needs two, SplitRange"),
         (lambda: ColumnSensor("y", delay=2000), "delay is 2000; allowed range: 0 to 1000"),
-        (lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("z"),)), "the law does not measure 'z'"),
-        (lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("y"), ColumnSensor("y"))), "'y' has two sensors"),
-        (lambda: WithSensors(PID("y", "u", 1.0), (), 0.5), "seed is 0.5; it must be a whole number"),
+        (
+            lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("z"),)),
+            "the law does not measure 'z'",
+        ),
+        (
+            lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("y"), ColumnSensor("y"))),
+            "'y' has two sensors",
+        ),
+        (
+            lambda: WithSensors(PID("y", "u", 1.0), (), 0.5),
+            "seed is 0.5; it must be a whole number",
+        ),
         (lambda: IterativeLearning(0.01, (0.0, 0.0)), "the impulse response is 0"),
         (lambda: IterativeLearning(0.01, (1.0, 0.0), cutoff=60.0), "allowed range: below 50 Hz"),
-        (lambda: IterativeLearning(0.01, (1.0, 0.0)).improve([1.0], [1.0]), r"the signal has shape \(1,\); it must be"),
+        (
+            lambda: IterativeLearning(0.01, (1.0, 0.0)).improve([1.0], [1.0]),
+            r"the signal has shape \(1,\); it must be",
+        ),
     ],
 )
 def test_an_impossible_law_is_refused_with_what_is_allowed(make, message):
@@ -131,7 +176,9 @@ def test_an_impossible_law_is_refused_with_what_is_allowed(make, message):
 
 def sliding(law, disturbance, count, dt, start=1.0):
     """e of the integrator y' = u + d(t) with the set point 0, sampled by dt."""
-    memory, y, told = law.init(), start, []
+    memory = law.init()
+    y = start
+    told = []
     for k in range(count):
         commands, memory = law.step(memory, Measurement({"y": y}, {"y": 0.0}, WIDE), dt)
         y += dt * (commands["u"] + disturbance(k * dt))
@@ -147,13 +194,17 @@ def test_within_the_boundary_layer_the_error_is_the_disturbance_by_the_gain():
 def test_a_disturbance_below_the_amplitude_is_rejected_in_finite_time():
     law = SlidingMode("y", "u", amplitude=2.0)
     y = sliding(law, lambda t: 1.0, 3000, 1e-3)
-    assert abs(y[1100:]).max() <= 3.0 * 1e-3  # reached after 1/(2 - 1) s; then one step of chattering
+    assert (
+        abs(y[1100:]).max() <= 3.0 * 1e-3
+    )  # reached after 1/(2 - 1) s; then one step of chattering
     weak = SlidingMode("y", "u", amplitude=0.9)
     assert sliding(weak, lambda t: 1.0, 3000, 1e-3)[-1] > 1.0
 
 
 def test_super_twisting_rejects_a_changing_disturbance_to_second_order_in_the_sample_time():
-    """|d'| < k_2 is rejected without error; halving the sample time divides the band by about four (Levant 1993)."""
+    """|d'| < k_2 is rejected without error; halving the sample time divides the band by about four
+    (Levant 1993).
+    """
     law = SuperTwisting("y", "u", proportional=3.0, integral=4.0)
     bands = []
     for dt in (2e-3, 1e-3):
@@ -164,8 +215,11 @@ def test_super_twisting_rejects_a_changing_disturbance_to_second_order_in_the_sa
 
 
 def test_the_integral_of_super_twisting_is_held_at_the_end_of_the_range_and_never_takes_up_the_command():
-    """Driven further into the limit it is held, driven back it moves by k_2 h; a range of one point is no exception."""
-    law, memory = SuperTwisting("y", "u", proportional=2.0, integral=4.0), {"started": 1.0, "integral": 0.5}
+    """Driven further into the limit it is held, driven back it moves by k_2 h; a range of one point
+    is no exception.
+    """
+    law = SuperTwisting("y", "u", proportional=2.0, integral=4.0)
+    memory = {"started": 1.0, "integral": 0.5}
     for error, limits, change in (
         (1.0, (-1.0, 1.0), 0.0),
         (1.0, (-9.0, 9.0), 4.0 * H),
@@ -209,8 +263,13 @@ def test_within_the_dead_zone_nothing_switches_and_beyond_it_one_valve_opens():
 
 
 def test_the_generator_gives_its_published_numbers():
-    """The first five numbers of MRG32k3a from the state (1234567, 0, 0) of both parts, the newest first."""
-    state = dict.fromkeys(("x0", "x1", "x2", "y0", "y1", "y2"), 0.0) | {"x2": 1234567.0, "y2": 1234567.0}
+    """The first five numbers of MRG32k3a from the state (1234567, 0, 0) of both parts, the newest
+    first.
+    """
+    state = dict.fromkeys(("x0", "x1", "x2", "y0", "y1", "y2"), 0.0) | {
+        "x2": 1234567.0,
+        "y2": 1234567.0,
+    }
     numbers = []
     for _ in range(5):
         uniform, state = drawn(state)
@@ -223,7 +282,8 @@ def test_deviates_are_normal_and_seeds_are_independent():
 
     sequences = []
     for seed in (0.0, 1.0, 2147483644.0):
-        state, values = seeded(seed), []
+        state = seeded(seed)
+        values = []
         for _ in range(3000):
             value, state = drawn_normal(state)
             values.append(value)
@@ -236,19 +296,29 @@ def test_deviates_are_normal_and_seeds_are_independent():
 def test_a_sensor_delays_quantises_and_lags():
     direct = PID("y", "u", -1.0)
     y = np.array([0.0, 1.06, 2.0, 3.0, 4.0])
-    delayed = commanded(WithSensors(direct, (ColumnSensor("y", delay=2),)), {"y": np.zeros(5)}, {"y": y})
+    delayed = commanded(
+        WithSensors(direct, (ColumnSensor("y", delay=2),)), {"y": np.zeros(5)}, {"y": y}
+    )
     assert [c["u"] for c in delayed] == pytest.approx([0.0, 0.0, 0.0, 1.06, 2.0])
-    rounded = commanded(WithSensors(direct, (ColumnSensor("y", resolution=0.25),)), {"y": np.zeros(5)}, {"y": y})
+    rounded = commanded(
+        WithSensors(direct, (ColumnSensor("y", resolution=0.25),)), {"y": np.zeros(5)}, {"y": y}
+    )
     assert [c["u"] for c in rounded] == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0])
     step = np.array([0.0, 1.0, 1.0, 1.0, 1.0])
-    lagged = commanded(WithSensors(direct, (ColumnSensor("y", lag=0.02),)), {"y": np.zeros(5)}, {"y": step})
-    assert [c["u"] for c in lagged] == pytest.approx([1.0 - math.exp(-k * H / 0.02) for k in range(5)])
+    lagged = commanded(
+        WithSensors(direct, (ColumnSensor("y", lag=0.02),)), {"y": np.zeros(5)}, {"y": step}
+    )
+    assert [c["u"] for c in lagged] == pytest.approx(
+        [1.0 - math.exp(-k * H / 0.02) for k in range(5)]
+    )
 
 
 def test_the_noise_has_its_standard_deviation_and_the_seed_determines_it():
     def run(seed):
         law = WithSensors(PID("y", "u", -1.0), (ColumnSensor("y", noise=0.3),), seed)
-        return np.array([c["u"] for c in commanded(law, {"y": np.zeros(2000)}, {"y": np.zeros(2000)})])
+        return np.array(
+            [c["u"] for c in commanded(law, {"y": np.zeros(2000)}, {"y": np.zeros(2000)})]
+        )
 
     assert run(3.0).std() == pytest.approx(0.3, rel=0.06)
     np.testing.assert_array_equal(run(3.0), run(3.0))
@@ -267,7 +337,9 @@ def lag_response(count, time_constant, gain, dt=H, delay=0):
 
 def trials(learning, truth, reference, count):
     """The norms of the errors of successive trials, and the norms of the changes of the signal."""
-    f, norms, changes = np.zeros(len(reference)), [], []
+    f = np.zeros(len(reference))
+    norms = []
+    changes = []
     for _ in range(count):
         error = reference - np.convolve(truth, f)[: len(reference)]
         norms.append(float(np.linalg.norm(error)))
@@ -289,7 +361,8 @@ def test_with_the_true_model_learning_removes_nearly_all_of_the_error():
 
 
 def test_with_a_wrong_model_the_filter_keeps_30_trials_monotonic_and_without_it_they_diverge():
-    model, truth = lag_response(N, 0.1, 2.0), lag_response(N, 0.12, 3.0, delay=3)
+    model = lag_response(N, 0.1, 2.0)
+    truth = lag_response(N, 0.12, 3.0, delay=3)
     robust = IterativeLearning(H, tuple(model), change_weight=0.1, cutoff=3.0)
     naive = IterativeLearning(H, tuple(model), change_weight=1e-4, cutoff=49.0)
     assert robust.convergence_rate(truth) < 1.0 < naive.convergence_rate(truth)

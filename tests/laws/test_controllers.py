@@ -1,8 +1,10 @@
-"""PID is u = K (b r - y) + I + D with I' = K/T_i (r - y) by forward and (T_d/N) D' + D = K T_d (c r - y)' by backward
-differences; cut off at the range of its input, I follows with the time constant T_t; its first command is u_0.
+"""PID is u = K (b r - y) + I + D with I' = K/T_i (r - y) by forward and (T_d/N) D' + D = K T_d (c r
+- y)' by backward differences; cut off at the range of its input, I follows with the time constant
+T_t; its first command is u_0.
 
-TwoPoint is on from y < r - H/2 and off from y > r + H/2 on. Split gives what is above zero to one input, what is below
-to another. A memory is a value: the same step from the same memory is the same.
+TwoPoint is on from y < r - H/2 and off from y > r + H/2 on. Split gives what is above zero to one
+input, what is below to another. A memory is a value: the same step from the same memory is the
+same.
 """
 
 from __future__ import annotations
@@ -26,10 +28,15 @@ H = 0.01
 
 
 def carried(controller, setpoints, measured, ranges=None, dt=H):
-    """The commands of a controller of 'fill' for sequences of set points and measurements, and its last memory."""
-    memory, told = controller.init(), []
+    """The commands of a controller of 'fill' for sequences of set points and measurements, and its
+    last memory.
+    """
+    memory = controller.init()
+    told = []
     for r, y in zip(setpoints, measured, strict=True):
-        commands, memory = controller.step(memory, Measurement({"y": y}, {"y": r}, ranges or WIDE), dt)
+        commands, memory = controller.step(
+            memory, Measurement({"y": y}, {"y": r}, ranges or WIDE), dt
+        )
         told.append(commands["fill"])
     return np.array(told), memory
 
@@ -48,7 +55,9 @@ courses = st.lists(st.tuples(numbers, numbers), min_size=2, max_size=40)
     st.floats(0.0, 1.0),
 )
 def test_pid_is_its_discrete_transfer_functions(course, k, t_i, t_d, n, b, c):
-    """P, I = K h/T_i/(z - 1) and D = K T_d N (1 - 1/z)/(T_d + N h - T_d/z), each by a filter of its own."""
+    """P, I = K h/T_i/(z - 1) and D = K T_d N (1 - 1/z)/(T_d + N h - T_d/z), each by a filter of its
+    own.
+    """
     from scipy.signal import lfilter
 
     r, y = np.array(course).T
@@ -57,15 +66,21 @@ def test_pid_is_its_discrete_transfer_functions(course, k, t_i, t_d, n, b, c):
     proportional = k * (b * r - y)
     integral = 0.7 - proportional[0] + lfilter([0.0, k * H / t_i], [1.0, -1.0], r - y)
     weighted = c * r - y - (c * r[0] - y[0])  # nothing was there before the first sample
-    derivative = lfilter(np.array([1.0, -1.0]) * k * t_d * n / (t_d + n * H), [1.0, -t_d / (t_d + n * H)], weighted)
-    assert told == pytest.approx(proportional + integral + derivative, abs=1e-9 * max(1.0, np.abs(told).max()))
+    derivative = lfilter(
+        np.array([1.0, -1.0]) * k * t_d * n / (t_d + n * H), [1.0, -t_d / (t_d + n * H)], weighted
+    )
+    assert told == pytest.approx(
+        proportional + integral + derivative, abs=1e-9 * max(1.0, np.abs(told).max())
+    )
 
 
 def test_pid_by_hand():
-    """K = 2, T_i = 0.5 s, T_d = 0.1 s, N = 5, b = 0.5, c = 0, h = 0.1 s, u_0 = 1; r = 1, y = 0, 0.5, 0.8.
+    """K = 2, T_i = 0.5 s, T_d = 0.1 s, N = 5, b = 0.5, c = 0, h = 0.1 s, u_0 = 1; r = 1, y = 0,
+    0.5, 0.8.
 
     T_d + N h = 0.6, so D_k = D_(k-1)/6 - (5/3) (y_k - y_(k-1)); K h/T_i = 0.4.
-    k = 0: P = 1, I = 0, D = 0: u = 1.  k = 1: P = 0, I = 0.4, D = -5/6.  k = 2: P = -0.6, I = 0.6, D = -5/36 - 0.5.
+    k = 0: P = 1, I = 0, D = 0: u = 1.  k = 1: P = 0, I = 0.4, D = -5/6.  k = 2: P = -0.6, I = 0.6,
+    D = -5/36 - 0.5.
     """
     pid = PID("y", "fill", 2.0, 0.5, 0.1, 5.0, 0.5, 0.0, initial_output=1.0)
     told, _ = carried(pid, [1.0, 1.0, 1.0], [0.0, 0.5, 0.8], dt=0.1)
@@ -92,15 +107,24 @@ def test_a_step_of_the_set_point_is_weighted():
 
 
 @pytest.mark.parametrize(
-    ("t_d", "tracking", "expected"), [(0.0, 0.0, 0.5), (0.32, 0.0, 0.4), (0.0, 0.2, 0.2), (0.32, 0.2, 0.2)]
+    ("t_d", "tracking", "expected"),
+    [(0.0, 0.0, 0.5), (0.32, 0.0, 0.4), (0.0, 0.2, 0.2), (0.32, 0.2, 0.2)],
 )
 def test_anti_windup_tends_to_its_rest_with_its_time_constant(t_d, tracking, expected):
-    """Under a lasting error e, v - u tends to K e T_t/T_i, each sample nearer by 1 - h/T_t; T_t = sqrt(T_i T_d) by the rule."""
-    k, t_i, greatest, e = 2.0, 0.5, 1.0, 3.0
+    """Under a lasting error e, v - u tends to K e T_t/T_i, each sample nearer by 1 - h/T_t; T_t =
+    sqrt(T_i T_d) by the rule.
+    """
+    k = 2.0
+    t_i = 0.5
+    greatest = 1.0
+    e = 3.0
     pid = PID("y", "fill", k, t_i, t_d, tracking_time=tracking)
-    memory, beyond = pid.init(), []
+    memory = pid.init()
+    beyond = []
     for _ in range(2000):
-        commands, memory = pid.step(memory, Measurement({"y": 0.0}, {"y": e}, {"fill": (0.0, greatest)}), H)
+        commands, memory = pid.step(
+            memory, Measurement({"y": 0.0}, {"y": e}, {"fill": (0.0, greatest)}), H
+        )
         assert 0.0 <= commands["fill"] <= greatest
         beyond.append(k * e + memory["integral"] - greatest)
     rest = k * e * expected / t_i
@@ -158,7 +182,10 @@ def test_a_controller_has_its_source():
 @given(st.lists(st.floats(-2.0, 2.0), min_size=1, max_size=60), st.floats(0.0, 1.5))
 def test_two_point_holds_within_its_hysteresis_and_switches_beyond(away, hysteresis):
     told, _ = carried(
-        OnOffController("y", "fill", hysteresis), [1.0] * len(away), [1.0 + a for a in away], {"fill": (0.2, 0.9)}
+        OnOffController("y", "fill", hysteresis),
+        [1.0] * len(away),
+        [1.0 + a for a in away],
+        {"fill": (0.2, 0.9)},
     )
     assert set(told) <= {0.2, 0.9}
     before = [0.2, *told]
@@ -209,6 +236,12 @@ def test_a_relative_unit_follows_from_column_and_input(unit, measured, commanded
 
 def test_every_number_of_a_controller_is_declared():
     assert {leaf.path: leaf.declared.unit for leaf in leaves(PID("y", "fill", 1.0))} == {
-        "gain": "u/y", "integral_time": "s", "derivative_time": "s", "derivative_filter": "1", "setpoint_weight": "1",
-        "derivative_weight": "1", "tracking_time": "s", "initial_output": "u",
-    }  # fmt: skip
+        "gain": "u/y",
+        "integral_time": "s",
+        "derivative_time": "s",
+        "derivative_filter": "1",
+        "setpoint_weight": "1",
+        "derivative_weight": "1",
+        "tracking_time": "s",
+        "initial_output": "u",
+    }

@@ -1,6 +1,8 @@
-"""Segmentation by the driven quantity: branches, runs, outliers and plateaus of a sweep of length at constant pressure.
+"""Segmentation by the driven quantity: branches, runs, outliers and plateaus of a sweep of length
+at constant pressure.
 
-The noise and the ripple of a pressure that the regulator keeps constant are neither branches nor levels nor plateaus.
+The noise and the ripple of a pressure that the regulator keeps constant are neither branches nor
+levels nor plateaus.
 """
 
 from __future__ import annotations
@@ -8,7 +10,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.bench import ISOBARIC, find_branches, find_outliers, find_plateaus, find_runs, inspect, plateau_points
+from airmuscle.bench import (
+    ISOBARIC,
+    find_branches,
+    find_outliers,
+    find_plateaus,
+    find_runs,
+    inspect,
+    plateau_points,
+)
 from airmuscle.recording import Recording
 
 ROWS = 400
@@ -23,7 +33,8 @@ def isobar(
     force = 2e-3 * pressure * (1.0 - 3.0 * contraction) + random.normal(0, 0.3, len(contraction))
     time = step * np.arange(len(contraction))
     return Recording(
-        {"time": time, "pressure": pressure, "contraction": contraction, "force": force, **columns}, "isobar"
+        {"time": time, "pressure": pressure, "contraction": contraction, "force": force, **columns},
+        "isobar",
     )
 
 
@@ -33,7 +44,10 @@ def noisy(level: float, rows: int, std: float = 1500.0) -> np.ndarray:
 
 def test_the_branches_of_an_isobaric_run_are_those_of_the_contraction():
     found = inspect(isobar(noisy(3e5, 2 * ROWS))).branches
-    assert [(b.name, b.column) for b in found] == [("contracting", "contraction"), ("extending", "contraction")]
+    assert [(b.name, b.column) for b in found] == [
+        ("contracting", "contraction"),
+        ("extending", "contraction"),
+    ]
     assert found[0].interval.stop == pytest.approx(ROWS, abs=8)
     assert [(b.direction, b.interval) for b in found] == [
         (b.direction, b.interval) for b in find_branches(isobar(noisy(3e5, 2 * ROWS)))
@@ -44,7 +58,10 @@ def test_a_muscle_contracts_where_its_length_falls():
     recording = isobar(noisy(3e5, 2 * ROWS))
     columns = {name: recording[name] for name in ("time", "pressure", "force")}
     lengths = Recording({**columns, "length": 0.3 * (1.0 - SWEEP)}, "lengths")
-    assert [(b.name, b.direction) for b in find_branches(lengths)] == [("contracting", 1), ("extending", -1)]
+    assert [(b.name, b.direction) for b in find_branches(lengths)] == [
+        ("contracting", 1),
+        ("extending", -1),
+    ]
 
 
 def test_each_of_three_isobaric_runs_has_its_own_branches():
@@ -59,7 +76,10 @@ def test_a_ripple_of_the_pressure_does_not_split_an_isobaric_run(periods: float)
     (run,) = find_runs(isobar(ripple))
     assert (run.kind, len(run.interval)) == (ISOBARIC, 2 * ROWS)
     several = np.concatenate([ripple / 2.0, ripple])
-    assert [len(run.interval) for run in find_runs(isobar(several, np.tile(SWEEP, 2)))] == [2 * ROWS, 2 * ROWS]
+    assert [len(run.interval) for run in find_runs(isobar(several, np.tile(SWEEP, 2)))] == [
+        2 * ROWS,
+        2 * ROWS,
+    ]
 
 
 def test_two_close_isobars_remain_two_runs():
@@ -95,4 +115,6 @@ def test_holds_between_moves_at_constant_pressure_are_the_plateaus():
     contraction = np.concatenate(moves)
     recording = isobar(noisy(3e5, len(contraction), 300.0), contraction, step=1 / 60)
     found = find_plateaus(recording)
-    assert plateau_points(recording, found)["contraction"] == pytest.approx([0.02, 0.1, 0.2], abs=1e-3)
+    assert plateau_points(recording, found)["contraction"] == pytest.approx(
+        [0.02, 0.1, 0.2], abs=1e-3
+    )

@@ -1,8 +1,9 @@
-"""Laws at the ends of their ranges and beyond: an error, infinity or a continued force, never an arbitrary number.
+"""Laws at the ends of their ranges and beyond: an error, infinity or a continued force, never an
+arbitrary number.
 
-Straight fibres have an infinite dV/deps at zero contraction; a geometry states its limits to every call with numbers,
-of whatever type; beyond the contractions for which it was identified no law pulls harder than at their end. A contraction
-above 1, probably in per cent, is named.
+Straight fibres have an infinite dV/deps at zero contraction; a geometry states its limits to every
+call with numbers, of whatever type; beyond the contractions for which it was identified no law
+pulls harder than at their end. A contraction above 1, probably in per cent, is named.
 """
 
 from __future__ import annotations
@@ -50,9 +51,12 @@ from airmuscle.physics.muscle.geometry import as_polynomial
 BRAID = Braid(0.01, 0.4363, 0.2)
 RUBBER = RubberLine(3e5, 1e5)
 TUBES = {
-    **{type(m).__name__: StraightFibre(0.2, 0.02, 1, m) for m in (CircularArc(), Catenary(), Parabola(), TrueArcParabola())},
+    **{
+        type(m).__name__: StraightFibre(0.2, 0.02, 1, m)
+        for m in (CircularArc(), Catenary(), Parabola(), TrueArcParabola())
+    },
     "PleatedTube": PleatedTube(0.2, 0.02, 1),
-}  # fmt: skip
+}
 SURFACE = ContractileSurface((300.0, -200.0, 40.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 1)
 EXACT = ExactMeridian(PleatedTube(0.2, 0.02), RUBBER, 2e-3)
 
@@ -66,16 +70,24 @@ def law_of(name: str) -> Characteristic:
 @pytest.mark.parametrize("name", TUBES)
 def test_the_volume_of_straight_fibres_increases_infinitely_fast_at_zero_contraction(name: str):
     assert TUBES[name].volume_derivative(0.0) == np.inf
-    nearly_straight = TUBES[name].segments * np.pi * 0.01 * TUBES[name].fibre_length ** 2 / np.sqrt(6 * 1e-8)
-    assert TUBES[name].volume_derivative(np.array([0.0, 1e-8])) == pytest.approx([np.inf, nearly_straight], rel=1e-3)
+    nearly_straight = (
+        TUBES[name].segments * np.pi * 0.01 * TUBES[name].fibre_length ** 2 / np.sqrt(6 * 1e-8)
+    )
+    assert TUBES[name].volume_derivative(np.array([0.0, 1e-8])) == pytest.approx(
+        [np.inf, nearly_straight], rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("method", ["volume", "volume_derivative"])
 @pytest.mark.parametrize("name", TUBES)
 @pytest.mark.parametrize("kind", [float, np.array, pd.Series])
-def test_a_contraction_beyond_the_geometry_is_refused_whatever_its_type(method: str, name: str, kind):
+def test_a_contraction_beyond_the_geometry_is_refused_whatever_its_type(
+    method: str, name: str, kind
+):
     values = 0.7 if kind is float else kind([0.1, 0.7])
-    with pytest.raises(GeometryLimitError, match="a contraction of 70 % is outside its range, 0 to 50 %"):
+    with pytest.raises(
+        GeometryLimitError, match="a contraction of 70 % is outside its range, 0 to 50 %"
+    ):
         getattr(TUBES[name], method)(values)
 
 
@@ -91,7 +103,9 @@ def test_beyond_the_contractions_of_its_modulus_a_festo_muscle_does_not_pull_aga
     contraction = np.linspace(0.4, 0.9, 51)
     for pressure in (0.0, 3e5, 6e5):
         assert (law.force(pressure, contraction) == 0.0).all()
-        assert law.unclamped_force(pressure, contraction) == pytest.approx(law.unclamped_force(pressure, 0.4))
+        assert law.unclamped_force(pressure, contraction) == pytest.approx(
+            law.unclamped_force(pressure, 0.4)
+        )
 
 
 def test_derivatives_at_no_points_are_no_derivatives():
@@ -130,7 +144,9 @@ def test_an_energy_defect_with_a_constant_volume_has_no_relative_size():
 
 @pytest.mark.parametrize("name", list_laws())
 @pytest.mark.parametrize(
-    "contraction", [10.0, 10, np.array([0.1, np.nan, 10.0]), pd.Series([10.0])], ids=lambda c: type(c).__name__
+    "contraction",
+    [10.0, 10, np.array([0.1, np.nan, 10.0]), pd.Series([10.0])],
+    ids=lambda c: type(c).__name__,
 )
 def test_no_law_gives_a_force_without_a_word_for_a_contraction_in_per_cent(name: str, contraction):
     law = law_of(name)
@@ -143,10 +159,20 @@ def test_no_law_gives_a_force_without_a_word_for_a_contraction_in_per_cent(name:
     assert "per cent? As a ratio it is 0.1" in str(issued[0].message)
 
 
-@pytest.mark.parametrize("law", [SURFACE, InverseLength(SURFACE, SURFACE, 0.2, 0.3), EffectiveLength(SURFACE, 0.2, 0.0),
-                                 PooledLengthLaw(SURFACE, (SURFACE,)), Clamped(VirtualWork(BRAID))])  # fmt: skip
+@pytest.mark.parametrize(
+    "law",
+    [
+        SURFACE,
+        InverseLength(SURFACE, SURFACE, 0.2, 0.3),
+        EffectiveLength(SURFACE, 0.2, 0.0),
+        PooledLengthLaw(SURFACE, (SURFACE,)),
+        Clamped(VirtualWork(BRAID)),
+    ],
+)
 def test_a_law_with_a_limited_force_names_the_unit_of_a_contraction_in_per_cent(law):
-    with pytest.warns(AirmuscleWarning, match=r"contraction of 10 exceeds .* As a ratio it is 0\.1\."):
+    with pytest.warns(
+        AirmuscleWarning, match=r"contraction of 10 exceeds .* As a ratio it is 0\.1\."
+    ):
         law.force(3e5, 10.0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -185,7 +211,12 @@ def test_four_fibres_are_the_fewest_and_the_contraction_ends_below_the_pole():
     end = law.contraction_range[1]
     assert end == pytest.approx(law.pole, rel=2e-9)
     assert end < law.pole < 0.5
-    assert law.equilibrium_pressure(end, 100.0) > 1e9 > 0.0 > law.equilibrium_pressure(law.pole * 1.001, 100.0)
+    assert (
+        law.equilibrium_pressure(end, 100.0)
+        > 1e9
+        > 0.0
+        > law.equilibrium_pressure(law.pole * 1.001, 100.0)
+    )
     for fibres in (3, 2, 5):
         with pytest.raises(ParameterError, match="it must be an even integer, 4 or more"):
             replace(law, fibres=fibres)
@@ -206,9 +237,14 @@ def test_the_degree_of_a_polynomial_is_a_whole_number(degree):
 
 def test_a_polynomial_volume_has_a_range_without_infinite_slopes_and_without_zero_length():
     for tube in (StraightFibre(0.2, 0.02), PleatedTube(0.2, 0.02)):
-        with pytest.raises(GeometryLimitError, match=r"is infinite at a contraction of 0 %. .* such as \(0.01, 0.5\)"):
+        with pytest.raises(
+            GeometryLimitError,
+            match=r"is infinite at a contraction of 0 %. .* such as \(0.01, 0.5\)",
+        ):
             as_polynomial(tube)
-    with pytest.raises(ParameterError, match="max_contraction must be less than 1, where the length is zero"):
+    with pytest.raises(
+        ParameterError, match="max_contraction must be less than 1, where the length is zero"
+    ):
         as_polynomial(Braid(0.01, 0.43632, 0.2))
     with pytest.raises(ParameterError, match="1 coefficients; at least two are required"):
         ChebyshevGeometry((1e-4,), 0.0, 0.2, 0.2)
@@ -232,7 +268,9 @@ def test_the_range_of_a_short_pleated_tube_ends_where_the_search_for_its_outline
 def test_the_contraction_of_a_circle_by_virtual_work_ends_below_its_maximum_volume():
     law = CircleVirtualWork(StraightFibre(0.2, 0.02), RUBBER, 2e-3)
     end = law.contraction_range[1]
-    assert law.geometry.volume_derivative(end) > 0.0 > law.geometry.volume_derivative(end * (1 + 3e-9))
+    assert (
+        law.geometry.volume_derivative(end) > 0.0 > law.geometry.volume_derivative(end * (1 + 3e-9))
+    )
 
 
 def test_an_energy_defect_states_the_share_of_slack_states():
@@ -241,13 +279,17 @@ def test_an_energy_defect_states_the_share_of_slack_states():
     known = ValidityRange(1e5, 2e5, 0.0, 2 * end)
     assert virtual_work_defect(law, BRAID, known).slack == pytest.approx(20 / 41, abs=1 / 40)
     assert virtual_work_defect(law, BRAID, ValidityRange(1e5, 2e5, 0.0, end)).slack < 1 / 40
-    assert f"slack on {100 * maxwell_defect(law, BRAID, known).slack:.0f} %" in str(maxwell_defect(law, BRAID, known))
+    assert f"slack on {100 * maxwell_defect(law, BRAID, known).slack:.0f} %" in str(
+        maxwell_defect(law, BRAID, known)
+    )
 
 
 def test_rigid_ends_end_where_the_active_length_ends():
     law = EffectiveLength(SURFACE, 0.2, 0.04, 0.002)
     low, high = law.contraction_range
-    assert [(c * 0.2 + 0.002) / 0.16 for c in (low, high)] == pytest.approx(SURFACE.contraction_range)
+    assert [(c * 0.2 + 0.002) / 0.16 for c in (low, high)] == pytest.approx(
+        SURFACE.contraction_range
+    )
     wider = law.with_validity_range((1e5, 5e5), (0.0, 0.2)).inner
     assert wider.validity_range.pressure == (1e5, 5e5)
     assert wider.validity_range.contraction == pytest.approx((-0.1, 0.3))

@@ -1,7 +1,9 @@
-"""Exact meridian with rubber: local equilibrium of the fibres, virtual work to 1e-9, and the limit without rubber.
+"""Exact meridian with rubber: local equilibrium of the fibres, virtual work to 1e-9, and the limit
+without rubber.
 
-N cos(phi) = F + pi p r^2 and dN/dr = 2 pi t sigma along the whole fibre. Reference values are of the muscle of Table 1
-of Saga et al. 2007, computed by quadrature independently of this code. The circular meridian with virtual work is tested as well.
+N cos(phi) = F + pi p r^2 and dN/dr = 2 pi t sigma along the whole fibre. Reference values are of
+the muscle of Table 1 of Saga et al. 2007, computed by quadrature independently of this code. The
+circular meridian with virtual work is tested as well.
 """
 
 from dataclasses import replace
@@ -14,10 +16,19 @@ from scipy.integrate import solve_ivp
 
 from airmuscle.core import autodiff
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.physics import Catenary, CircleVirtualWork, ExactMeridian, PleatedTube, RubberLine, StraightFibre
+from airmuscle.physics import (
+    Catenary,
+    CircleVirtualWork,
+    ExactMeridian,
+    PleatedTube,
+    RubberLine,
+    StraightFibre,
+)
 from airmuscle.physics.muscle.characteristic import LINE_A, LINE_B
 
-L0, D0, WALL = 0.072, 0.012, 0.002
+L0 = 0.072
+D0 = 0.012
+WALL = 0.002
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
 LINES = {"A": LINE_A, "B": LINE_B}
 NONE = RubberLine(0.0, 0.0)
@@ -100,14 +111,19 @@ def test_without_rubber_it_is_the_elliptic_outline():
     found = law.shape_at_force(contraction, 100.0)
     assert found.pressure == pytest.approx(100.0 / tube.effective_area(contraction), rel=1e-11)
     assert found.radius == pytest.approx(tube.segment(contraction).max_radius, rel=1e-12)
-    assert law.force(2e5, contraction) == pytest.approx(2e5 * tube.effective_area(contraction), rel=1e-10)
+    assert law.force(2e5, contraction) == pytest.approx(
+        2e5 * tube.effective_area(contraction), rel=1e-10
+    )
     assert law.volume(0.2, 100.0) == pytest.approx(tube.volume(0.2), rel=1e-12)
 
 
 def integrated(law, contraction, force):
-    """Half the meridian from the middle to the end by the differential equations: length, chord, volume, end radius."""
+    """Half the meridian from the middle to the end by the differential equations: length, chord,
+    volume, end radius.
+    """
     found = law.shape_at_force(contraction, force)
-    p, fibre = found.pressure, force + np.pi * found.pressure * found.radius**2
+    p = found.pressure
+    fibre = force + np.pi * found.pressure * found.radius**2
     r0 = law.geometry.end_radius
 
     def along(s, state):
@@ -123,7 +139,8 @@ def integrated(law, contraction, force):
 
 
 @pytest.mark.parametrize(
-    ("name", "force", "contraction"), [("A", 0, 0.05), ("A", 100, 0.2), ("B", 0, 0.4), ("B", 200, 0.01)]
+    ("name", "force", "contraction"),
+    [("A", 0, 0.05), ("A", 100, 0.2), ("B", 0, 0.4), ("B", 200, 0.01)],
 )
 def test_an_independent_integration_reaches_the_end_ring(name, force, contraction):
     law = exact(LINES[name])
@@ -144,7 +161,9 @@ def test_an_independent_integration_reaches_the_end_ring(name, force, contractio
     rings=st.integers(0, 1),
 )
 def test_virtual_work_gives_the_tension(contraction, force, name, rings):
-    """F = (p dV/deps - dU/deps)/L0 to 1e-9, volume and energy differentiated numerically along a loaded path."""
+    """F = (p dV/deps - dU/deps)/L0 to 1e-9, volume and energy differentiated numerically along a
+    loaded path.
+    """
     law = exact(LINES[name], rings)
     contraction = min(contraction, law.contraction_range[1] - 0.15)
     step = min(1e-3, contraction / 60)
@@ -153,7 +172,9 @@ def test_virtual_work_gives_the_tension(contraction, force, name, rings):
     growth = weights @ np.array([law.volume(float(c), force) for c in at])
     stored = weights @ np.array([law.rubber_energy(float(c), force) for c in at])
     pressure = law.pressure(contraction, force)
-    assert (pressure * growth - stored) / L0 == pytest.approx(force, abs=1e-9 * pressure * growth / L0 + 1e-9 * force)
+    assert (pressure * growth - stored) / L0 == pytest.approx(
+        force, abs=1e-9 * pressure * growth / L0 + 1e-9 * force
+    )
 
 
 @given(contraction=st.floats(0.02, 0.36), force=st.floats(20.0, 300.0), name=st.sampled_from("AB"))
@@ -164,14 +185,20 @@ def test_the_half_shell_balances(contraction, force, name):
     x, r = law.profile(contraction, force, 8001)
     axial = force + np.pi * found.pressure * (D0 / 2) ** 2
     slope = _end_slope(law, found)
-    middle, ds = (r[1:] + r[:-1]) / 2, np.hypot(np.diff(x), np.diff(r))
+    middle = (r[1:] + r[:-1]) / 2
+    ds = np.hypot(np.diff(x), np.diff(r))
     hoop = WALL * (law.rubber.stress(middle / (D0 / 2) - 1) * ds).sum()
-    assert axial * slope / np.pi + hoop == pytest.approx(found.pressure * (middle * np.diff(x)).sum(), rel=2e-6)
+    assert axial * slope / np.pi + hoop == pytest.approx(
+        found.pressure * (middle * np.diff(x)).sum(), rel=2e-6
+    )
 
 
 def _end_slope(law, found):
-    """tan(phi0) from N0^2 = (F + pi p r0^2)^2 + (N0 sin phi0)^2, N0 by the rubber's work from the middle."""
-    r0, rise = D0 / 2, found.radius - D0 / 2
+    """tan(phi0) from N0^2 = (F + pi p r0^2)^2 + (N0 sin phi0)^2, N0 by the rubber's work from the
+    middle.
+    """
+    r0 = D0 / 2
+    rise = found.radius - D0 / 2
     work = law.rubber.slope * rise**2 / (2 * r0) + law.rubber.intercept * rise
     fibre = found.force + np.pi * found.pressure * found.radius**2 - 2 * np.pi * WALL * work
     axial = found.force + np.pi * found.pressure * r0**2
@@ -186,14 +213,19 @@ def test_the_three_directions_agree(contraction, force, name):
         assert law.contraction(pressure, force) == pytest.approx(contraction, rel=1e-8)
 
 
-@pytest.mark.parametrize(("pressure", "contraction", "name"), [(1.2e5, 0.05, "A"), (2e5, 0.2, "B"), (3e5, 0.35, "A")])
+@pytest.mark.parametrize(
+    ("pressure", "contraction", "name"), [(1.2e5, 0.05, "A"), (2e5, 0.2, "B"), (3e5, 0.35, "A")]
+)
 def test_slopes_are_exact(pressure, contraction, name):
     for law in (exact(LINES[name]), circle(LINES[name])):
         slopes = law.slopes(pressure, contraction)
-        p, c = 1e-3 * pressure, 1e-3 * contraction
+        p = 1e-3 * pressure
+        c = 1e-3 * contraction
 
         def by(step_p, step_c, law=law):
-            ends = [law.force(pressure + n * step_p, contraction + n * step_c) for n in (-2, -1, 1, 2)]
+            ends = [
+                law.force(pressure + n * step_p, contraction + n * step_c) for n in (-2, -1, 1, 2)
+            ]
             return (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / 12
 
         assert slopes.by_pressure == pytest.approx(by(p, 0) / p, rel=1e-8)
@@ -201,14 +233,19 @@ def test_slopes_are_exact(pressure, contraction, name):
 
 
 def test_the_circle_is_one_potential():
-    """F = (p dV/deps - dU/deps)/L0 with the volume and energy of its own geometry, and dF/dp = dV/deps / L0."""
+    """F = (p dV/deps - dU/deps)/L0 with the volume and energy of its own geometry, and dF/dp =
+    dV/deps / L0.
+    """
     law = circle(LINE_A, 1)
-    contraction, pressure = np.array([1e-3, 0.05, 0.2, 0.38]), 1.5e5
+    contraction = np.array([1e-3, 0.05, 0.2, 0.38])
+    pressure = 1.5e5
     growth = autodiff.derivative(law.geometry, "volume", contraction)
     step = 1e-3 * contraction
     ends = [_stored(law, contraction + n * step) for n in (-2, -1, 1, 2)]
     energy = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
-    assert law.force(pressure, contraction) == pytest.approx((pressure * growth - energy) / L0, rel=1e-9)
+    assert law.force(pressure, contraction) == pytest.approx(
+        (pressure * growth - energy) / L0, rel=1e-9
+    )
     assert law.slopes(pressure, contraction).by_pressure == pytest.approx(growth / L0, rel=1e-12)
 
 
@@ -222,28 +259,41 @@ def test_the_error_of_the_circle_is_as_documented():
     contraction = np.linspace(0.01, 0.30, 30)
     for name, line in LINES.items():
         for force in (100.0, 150.0, 200.0):
-            ratio = circle(line).pressure(contraction, force) / exact(line).pressure(contraction, force) - 1
+            ratio = (
+                circle(line).pressure(contraction, force) / exact(line).pressure(contraction, force)
+                - 1
+            )
             assert np.abs(ratio).max() < 0.007, (name, force)
-        unloaded = circle(line).pressure(contraction[4:], 0.0) / exact(line).pressure(contraction[4:], 0.0) - 1
+        unloaded = (
+            circle(line).pressure(contraction[4:], 0.0) / exact(line).pressure(contraction[4:], 0.0)
+            - 1
+        )
         assert unloaded.min() > -0.01
         assert unloaded.max() < 0.063
     assert 100 * circle(LINE_A).contraction_range[1] == pytest.approx(45.98, abs=0.005)
 
 
 def test_the_paper_s_working_points():
-    """At 0.11 MPa: 31.3 % unloaded and 3.1 % under 200 N with line A, 19.1 % and 3.0 % with line B."""
+    """At 0.11 MPa: 31.3 % unloaded and 3.1 % under 200 N with line A, 19.1 % and 3.0 % with line
+    B.
+    """
     found = [
-        round(100 * exact(line).contraction(0.11e6, force), 1) for line in LINES.values() for force in (0.0, 200.0)
+        round(100 * exact(line).contraction(0.11e6, force), 1)
+        for line in LINES.values()
+        for force in (0.0, 200.0)
     ]
     assert found == [31.3, 3.1, 19.1, 3.0]
 
 
 def test_the_end_slope_reaches_zero_where_the_equations_say():
-    """Line A, 1 %: from a horizontal end (phi0 = 0) the equations reach the middle at 15.681 N and 0.0840629 MPa."""
+    """Line A, 1 %: from a horizontal end (phi0 = 0) the equations reach the middle at 15.681 N and
+    0.0840629 MPa.
+    """
     law = exact(LINE_A)
     assert law.pressure(0.01, 15.69) == pytest.approx(84062.9, abs=5.0)
     with pytest.raises(
-        SolveError, match=r"no equilibrium with 15\.67 N at a contraction of 1 %.*contract the tube below"
+        SolveError,
+        match=r"no equilibrium with 15\.67 N at a contraction of 1 %.*contract the tube below",
     ):
         law.pressure(0.01, 15.67)
 
@@ -251,26 +301,41 @@ def test_the_end_slope_reaches_zero_where_the_equations_say():
 def test_errors_state_why_there_is_no_solution():
     law = exact(LINE_A)
     with pytest.raises(
-        SolveError, match=r"no equilibrium with 0 N at a contraction of 1 %.*increase the contraction or the force"
+        SolveError,
+        match=(
+            r"no equilibrium with 0 N at a contraction of 1 %.*increase the contraction or the"
+            r" force"
+        ),
     ):
         law.pressure(0.01, 0.0)
     with pytest.raises(
         SolveError,
-        match=r"ExactMeridian: 20 kPa is below the threshold pressure of 100 kPa, at which contraction starts",
+        match=(
+            r"ExactMeridian: 20 kPa is below the threshold pressure of 100 kPa, at which"
+            r" contraction starts"
+        ),
     ):
         law.contraction(2e4, 0.0)
-    with pytest.raises(SolveError, match=r"no meridian with a contraction of 30 % exists at 10 kPa"):
+    with pytest.raises(
+        SolveError, match=r"no meridian with a contraction of 30 % exists at 10 kPa"
+    ):
         law.force(1e4, 0.3)
     with pytest.raises(
         GeometryLimitError,
         match=r"ExactMeridian: a contraction of 60 % is outside its range, 0\.01 to 46\.88 %",
     ):
         law.pressure(0.6, 0.0)
-    with pytest.raises(SolveError, match=r"CircleVirtualWork: 20 kPa is below the threshold pressure"):
+    with pytest.raises(
+        SolveError, match=r"CircleVirtualWork: 20 kPa is below the threshold pressure"
+    ):
         circle(LINE_A).contraction(2e4, 0.0)
-    with pytest.raises(GeometryLimitError, match=r"CircleVirtualWork: a contraction of 46 % is outside its range"):
+    with pytest.raises(
+        GeometryLimitError, match=r"CircleVirtualWork: a contraction of 46 % is outside its range"
+    ):
         circle(LINE_A).pressure(0.46, 0.0)
-    with pytest.raises(ParameterError, match="requires a circular meridian; its geometry has a Catenary"):
+    with pytest.raises(
+        ParameterError, match="requires a circular meridian; its geometry has a Catenary"
+    ):
         replace(circle(LINE_A), geometry=StraightFibre(L0, D0, meridian=Catenary()))
 
 
@@ -280,7 +345,9 @@ def test_rest_below_the_threshold_pressure():
         start = WALL * line.intercept / (D0 / 2)
         assert circle(line).pressure(0.0, 80.0) == pytest.approx(start, rel=1e-13)
         near, further = exact(line).pressure(np.array([1e-4, 4e-4]), 80.0)
-        assert 2 * near - further == pytest.approx(start, rel=0.01)  # it leaves the start like sqrt(eps)
+        assert 2 * near - further == pytest.approx(
+            start, rel=0.01
+        )  # it leaves the start like sqrt(eps)
     assert circle(LINE_B).contraction(circle(LINE_B).threshold_pressure, 80.0) == 0.0
 
 

@@ -1,8 +1,9 @@
 """Friction models: hysteretic, opposed to the motion, and passive.
 
-The rates of each model and its force along a path agree; Dahl and Bouc-Wen agree with their closed forms, LuGre with
-its Stribeck curve; stop operators satisfy their definition, Masing's rules, closure of inner loops and wiping out. For
-every path, the work done against friction from the relaxed state is not negative. All but LuGre are rate-independent.
+The rates of each model and its force along a path agree; Dahl and Bouc-Wen agree with their closed
+forms, LuGre with its Stribeck curve; stop operators satisfy their definition, Masing's rules,
+closure of inner loops and wiping out. For every path, the work done against friction from the
+relaxed state is not negative. All but LuGre are rate-independent.
 """
 
 from __future__ import annotations
@@ -22,10 +23,12 @@ from airmuscle.errors import ParameterError
 from airmuscle.physics import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.physics.muscle.friction.path import stop_operators
 
-STIFFNESSES, LIMITS = (4e4, 2e4, 1e4), (1e-4, 4e-4, 1e-3)
+STIFFNESSES = (4e4, 2e4, 1e4)
+LIMITS = (1e-4, 4e-4, 1e-3)
 SLIP = MaxwellSlip(STIFFNESSES, LIMITS)
 LOPSIDED = PrandtlIshlinskii(STIFFNESSES, LIMITS, (5.0, 12.0, -8.0), (0.8, -0.5, -0.6))
-DAHL, BOUC_WEN = Dahl(5e4, 20.0), BoucWen(5e4, 20.0, 1.7, 0.8)
+DAHL = Dahl(5e4, 20.0)
+BOUC_WEN = BoucWen(5e4, 20.0, 1.7, 0.8)
 LUGRE = LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0)
 RATE_INDEPENDENT = [DAHL, BOUC_WEN, SLIP, LOPSIDED]
 ALL = [*RATE_INDEPENDENT, LUGRE]
@@ -45,7 +48,8 @@ def path_through(ends, rows=40):
 
 def integrated(law, ends, speed=1e-3):
     """Force and bristles at the end of a path at constant speed, by integration of the rates."""
-    values, names = np.zeros(len(law.states)), [s.name for s in law.states]
+    values = np.zeros(len(law.states))
+    names = [s.name for s in law.states]
     v = 0.0
     for a, b in itertools.pairwise((0.0, *ends)):
         if a == b:
@@ -55,7 +59,9 @@ def integrated(law, ends, speed=1e-3):
         def rates(_, z, v=v):
             return list(law.rates(dict(zip(names, z, strict=True)), v).values())
 
-        solved = solve_ivp(rates, (0.0, abs(b - a) / speed), values, method="LSODA", rtol=1e-9, atol=1e-13)
+        solved = solve_ivp(
+            rates, (0.0, abs(b - a) / speed), values, method="LSODA", rtol=1e-9, atol=1e-13
+        )
         values = solved.y[:, -1]
     bristles = dict(zip(names, values, strict=True))
     return law.force(bristles, v), bristles
@@ -77,7 +83,9 @@ def test_the_presliding_distance_of_a_smooth_law_is_that_of_its_initial_stiffnes
 
 
 def yielded(law, ends):
-    """Bristles at the end of a path, by integration of the rates, with steps within the smallest transition."""
+    """Bristles at the end of a path, by integration of the rates, with steps within the smallest
+    transition.
+    """
     names, longest = [s.name for s in law.states], 0.5 * law.transition * min(law.limits)
     z = np.zeros(len(names))
     for a, b in itertools.pairwise((0.0, *ends)):
@@ -85,7 +93,9 @@ def yielded(law, ends):
         v = np.sign(b - a)
 
         def rates(z, v=v):
-            return np.array(list(law.rates(dict(zip(names, z.tolist(), strict=True)), float(v)).values()))
+            return np.array(
+                list(law.rates(dict(zip(names, z.tolist(), strict=True)), float(v)).values())
+            )
 
         for _ in range(count):
             h = abs(b - a) / count
@@ -93,7 +103,9 @@ def yielded(law, ends):
     return z
 
 
-@pytest.mark.parametrize("law", [DAHL, BOUC_WEN, replace(BOUC_WEN, sharpness=6.0, unloading=3.0)], ids=repr)
+@pytest.mark.parametrize(
+    "law", [DAHL, BOUC_WEN, replace(BOUC_WEN, sharpness=6.0, unloading=3.0)], ids=repr
+)
 def test_the_force_along_a_path_is_the_integral_of_the_rates(law):
     ends = (1e-3, -2e-4, 3e-4, 2e-4, 9e-4, -3e-3)
     for count in range(1, len(ends) + 1):
@@ -106,7 +118,9 @@ def test_the_force_of_lugre_over_time_is_the_integral_of_its_rates():
     ends = (1e-3, -2e-4, 3e-4)
     path = path_through(ends)
     time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 5e-3
-    assert LUGRE.force_along(path, time)[-1] == pytest.approx(integrated(LUGRE, ends, 5e-3)[0], rel=1e-6)
+    assert LUGRE.force_along(path, time)[-1] == pytest.approx(
+        integrated(LUGRE, ends, 5e-3)[0], rel=1e-6
+    )
     slow = LUGRE.force_along(path, time * 1e6)
     np.testing.assert_allclose(slow, LUGRE.force_along(path), atol=1e-3)
 
@@ -116,7 +130,9 @@ def test_the_force_of_lugre_over_time_is_the_integral_of_its_rates():
 @settings(max_examples=8, deadline=None)
 @given(ends=st.lists(st.floats(-2e-3, 2e-3), min_size=2, max_size=5))
 def test_a_gradual_stop_differs_from_the_exact_one_by_its_transition_at_most(law, transition, ends):
-    """|delta - exact| <= eta Delta: the form used in a plant converges to the exact one with eta."""
+    """|delta - exact| <= eta Delta: the form used in a plant converges to the exact one with
+    eta.
+    """
     bends = yielded(replace(law, transition=transition), ends)
     exact = stop_operators(np.array([0.0, *ends]), law.limits)[-1]
     assert (np.abs(bends - exact) <= transition * np.array(law.limits) + 1e-9).all()
@@ -124,25 +140,40 @@ def test_a_gradual_stop_differs_from_the_exact_one_by_its_transition_at_most(law
 
 def test_dahl_agrees_with_its_closed_form():
     x = np.linspace(0.0, 2e-3, 50)
-    np.testing.assert_allclose(DAHL.force_along(x), 20.0 * (1.0 - np.exp(-5e4 * x / 20.0)), rtol=1e-12)
+    np.testing.assert_allclose(
+        DAHL.force_along(x), 20.0 * (1.0 - np.exp(-5e4 * x / 20.0)), rtol=1e-12
+    )
 
 
 def test_bouc_wen_agrees_with_its_closed_forms():
-    """n = 2, sigma = 1/2 is a hyperbolic tangent from rest; n = sigma = 1 is the Dahl model; large n is one stop."""
+    """n = 2, sigma = 1/2 is a hyperbolic tangent from rest; n = sigma = 1 is the Dahl model; large
+    n is one stop.
+    """
     x = np.linspace(0.0, 2e-3, 50)
-    np.testing.assert_allclose(BoucWen(5e4, 20.0, 2.0, 0.5).force_along(x), 20.0 * np.tanh(5e4 * x / 20.0), atol=1e-6)
+    np.testing.assert_allclose(
+        BoucWen(5e4, 20.0, 2.0, 0.5).force_along(x), 20.0 * np.tanh(5e4 * x / 20.0), atol=1e-6
+    )
     ends = (1e-3, -2e-4, 3e-4, -1e-3)
     path = path_through(ends)
-    np.testing.assert_allclose(BoucWen(5e4, 20.0, 1.0, 1.0).force_along(path), DAHL.force_along(path), atol=1e-6)
+    np.testing.assert_allclose(
+        BoucWen(5e4, 20.0, 1.0, 1.0).force_along(path), DAHL.force_along(path), atol=1e-6
+    )
     stop = MaxwellSlip((5e4,), (4e-4,))
-    assert np.abs(BoucWen(5e4, 20.0, 20.0, 0.5).force_along(path) - stop.force_along(path)).max() < 0.05 * 20.0
-    assert np.abs(BoucWen(5e4, 20.0, 2.0, 0.5).force_along(path) - stop.force_along(path)).max() > 0.05 * 20.0
+    assert (
+        np.abs(BoucWen(5e4, 20.0, 20.0, 0.5).force_along(path) - stop.force_along(path)).max()
+        < 0.05 * 20.0
+    )
+    assert (
+        np.abs(BoucWen(5e4, 20.0, 2.0, 0.5).force_along(path) - stop.force_along(path)).max()
+        > 0.05 * 20.0
+    )
 
 
 @pytest.mark.parametrize("bend", [-3e-4, -1e-4, 0.0, 2e-4, 3.9e-4])
 @pytest.mark.parametrize("speed", [-0.02, 0.02])
 def test_a_stop_with_full_transition_is_bouc_wen_with_n_1_and_sigma_a_half(bend, speed):
-    smooth, one = BoucWen(5e4, 20.0, 1.0, 0.5), MaxwellSlip((5e4,), (4e-4,), 1.0)
+    smooth = BoucWen(5e4, 20.0, 1.0, 0.5)
+    one = MaxwellSlip((5e4,), (4e-4,), 1.0)
     (expected,) = smooth.rates({"bristle": bend}, speed).values()
     assert one.rates({"bristle1": bend}, speed)["bristle1"] == pytest.approx(expected, rel=1e-12)
 
@@ -159,7 +190,9 @@ def test_lugre_slides_along_the_stribeck_curve(speed):
 @pytest.mark.parametrize("law", ALL, ids=name)
 @given(ends=turns)
 def test_friction_is_passive(law, ends):
-    """The work done against friction from rest is not negative; on a closed path it is dissipated or stored in bristles."""
+    """The work done against friction from rest is not negative; on a closed path it is dissipated
+    or stored in bristles.
+    """
     path = path_through((*ends, 0.0), 400)
     time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path)))]) / 0.02
     force = law.force_along(path, time)
@@ -172,7 +205,8 @@ def test_a_repeated_loop_closes_and_dissipates_work(law):
     ends = (2e-3, -2e-3) * 6
     path = path_through(ends, 400)
     force = law.force_along(path)
-    before, last = force[-1601:-800], force[-801:]
+    before = force[-1601:-800]
+    last = force[-801:]
     np.testing.assert_allclose(last, before, atol=1e-6)
     assert np.sum(0.5 * (last[1:] + last[:-1]) * np.diff(path[-801:])) > 0.03
 
@@ -181,8 +215,11 @@ def test_a_repeated_loop_closes_and_dissipates_work(law):
 @given(bend=st.floats(-1.0, 1.0), speed=st.floats(-1.0, 1.0), factor=st.floats(0.01, 100.0))
 def test_the_rates_are_proportional_to_speed(law, bend, speed, factor):
     bristles = {s.name: bend * s.nominal for s in law.states}
-    slow, fast = law.rates(bristles, speed), law.rates(bristles, factor * speed)
-    assert list(fast.values()) == pytest.approx([factor * r for r in slow.values()], abs=1e-13 * factor)
+    slow = law.rates(bristles, speed)
+    fast = law.rates(bristles, factor * speed)
+    assert list(fast.values()) == pytest.approx(
+        [factor * r for r in slow.values()], abs=1e-13 * factor
+    )
     assert law.force(bristles, speed) == law.force(bristles, 0.0)
 
 
@@ -201,7 +238,9 @@ def test_rows_between_two_turning_points_have_no_effect(law):
 
 @given(ends=turns)
 def test_a_stop_operator_satisfies_its_definition(ends):
-    """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator P, x = E + P."""
+    """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator P, x = E +
+    P.
+    """
     path = np.array([0.0, *ends])
     bends = stop_operators(path, LIMITS)
     play = np.zeros(3)
@@ -219,24 +258,39 @@ def test_masing_unloading_is_the_first_loading_scaled_by_two():
     first = SLIP.force_along(np.linspace(0.0, 1.5e-3, 301))
     path = path_through((1.5e-3, -1.5e-3), 600)
     unloading = SLIP.force_along(path)[600:]
-    np.testing.assert_allclose(unloading[0] - unloading, 2.0 * np.interp(np.linspace(0, 1.5e-3, 601),
-                               np.linspace(0, 1.5e-3, 301), first), atol=1e-9)  # fmt: skip
+    np.testing.assert_allclose(
+        unloading[0] - unloading,
+        2.0 * np.interp(np.linspace(0, 1.5e-3, 601), np.linspace(0, 1.5e-3, 301), first),
+        atol=1e-9,
+    )
 
 
 @pytest.mark.parametrize("law", EXACT_STOPS, ids=name)
 def test_an_inner_loop_closes_and_leaves_no_memory(law):
-    """At the end of an inner loop the force is that at its beginning, and continues as without the loop."""
-    outer, inner = (1.5e-3, -1e-3, 4e-4), (0.0, 2e-4, 1e-4, 4e-4)
-    assert law.force_along(np.array([0.0, *outer, *inner]))[-1] == law.force_along(np.array([0.0, *outer]))[-1]
+    """At the end of an inner loop the force is that at its beginning, and continues as without the
+    loop.
+    """
+    outer = (1.5e-3, -1e-3, 4e-4)
+    inner = (0.0, 2e-4, 1e-4, 4e-4)
+    assert (
+        law.force_along(np.array([0.0, *outer, *inner]))[-1]
+        == law.force_along(np.array([0.0, *outer]))[-1]
+    )
     going_on = (9e-4, -1.4e-3)
-    with_it, without = (law.force_along(np.array([0.0, *outer, *x, *going_on])) for x in (inner, ()))
+    with_it, without = (
+        law.force_along(np.array([0.0, *outer, *x, *going_on])) for x in (inner, ())
+    )
     np.testing.assert_allclose(with_it[-2:], without[-2:], atol=1e-12)
 
 
 def test_a_single_bristle_does_not_close_inner_loops():
-    outer, inner = (1.5e-3, -1e-3, -8e-4), (-9e-4, -8e-4)
+    outer = (1.5e-3, -1e-3, -8e-4)
+    inner = (-9e-4, -8e-4)
     for law in (DAHL, BOUC_WEN):
-        ends = law.force_along(np.array([0.0, *outer, *inner]))[-1], law.force_along(np.array([0.0, *outer]))[-1]
+        ends = (
+            law.force_along(np.array([0.0, *outer, *inner]))[-1],
+            law.force_along(np.array([0.0, *outer]))[-1],
+        )
         assert abs(ends[0] - ends[1]) > 0.1
 
 
@@ -266,14 +320,18 @@ def test_a_traced_model_gives_the_numbers_of_the_numeric_one(law):
     for share, speed in itertools.product((-1.0, -0.97, 0.0, 0.4, 1.0), (-0.2, 0.0, 0.1)):
         bristles = {s.name: share * s.nominal for s in law.states}
         expected = [*law.rates(bristles, speed).values(), law.force(bristles, speed)]
-        assert [float(x) for x in function(*bristles.values(), speed)] == pytest.approx(expected, rel=1e-12)
+        assert [float(x) for x in function(*bristles.values(), speed)] == pytest.approx(
+            expected, rel=1e-12
+        )
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)
 def test_the_rates_are_continuous_in_the_speed_and_vanish_at_rest(law):
     bristles = {s.name: 0.98 * s.nominal for s in law.states}
     for speed in (-1e-12, 0.0, 1e-12):
-        assert list(law.rates(bristles, speed).values()) == pytest.approx([0.0] * len(bristles), abs=1e-11)
+        assert list(law.rates(bristles, speed).values()) == pytest.approx(
+            [0.0] * len(bristles), abs=1e-11
+        )
 
 
 def test_no_friction_has_no_force_and_no_state():
@@ -284,23 +342,32 @@ def test_no_friction_has_no_force_and_no_state():
 
 def test_unequal_lengths_and_active_dead_zones_are_errors():
     with pytest.raises(
-        ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one stiffness and one limit per element"
+        ParameterError,
+        match=(
+            "MaxwellSlip: 2 stiffnesses and 1 limits; give one stiffness and one limit per element"
+        ),
     ):
         MaxwellSlip((1.0, 2.0), (1e-3,))
     with pytest.raises(
-        ParameterError, match=r"deflection limit of each element\) is 25 m; allowed range: 1e-09 to 1 m"
+        ParameterError,
+        match=r"deflection limit of each element\) is 25 m; allowed range: 1e-09 to 1 m",
     ):
         MaxwellSlip((2e4,), (25.0,))
     with pytest.raises(ParameterError, match="PrandtlIshlinskii: 1 thresholds and 0 weights"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0,))
-    with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would decrease.*must not be less than -1"):
+    with pytest.raises(
+        ParameterError,
+        match=r"weight -0.9 at 12 N the force would decrease.*must not be less than -1",
+    ):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0, 12.0), (-0.2, -0.9))
     PrandtlIshlinskii((1.0,), (1e-3,), (5.0, -12.0), (-0.2, -0.9))
 
 
 def test_the_force_of_maxwell_slip_is_the_sum_of_its_springs():
     law = MaxwellSlip((2e4, 1e4), (3e-4, 1.2e-3))
-    assert law.force({"bristle1": 3e-4, "bristle2": -1e-3}, 0.0) == pytest.approx(6.0 - 10.0, rel=1e-14)
+    assert law.force({"bristle1": 3e-4, "bristle2": -1e-3}, 0.0) == pytest.approx(
+        6.0 - 10.0, rel=1e-14
+    )
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)

@@ -1,4 +1,5 @@
-"""Mathematical functions of numbers: the value of NumPy, outside of their domain NaN or infinity without a warning.
+"""Mathematical functions of numbers: the value of NumPy, outside of their domain NaN or infinity
+without a warning.
 
 Traced and compiled they have the same values to rounding.
 """
@@ -81,7 +82,9 @@ class Functions(System):
 @pytest.mark.parametrize(("x", "y"), [(0.3, 0.1), (0.1, 0.4), (0.25, 0.3), (0.05, 0.01)])
 def test_compiled_and_of_arrays_a_function_has_the_value_of_numbers(x: float, y: float):
     expected = values_of_all(x, y)
-    compiled = am.simulate(Functions(), am.Schedule({}), duration=0.1, initial_state={"x": x, "y": y})
+    compiled = am.simulate(
+        Functions(), am.Schedule({}), duration=0.1, initial_state={"x": x, "y": y}
+    )
     of_arrays = values_of_all(np.array([x, x]), np.array([y, y]))
     for name, value in expected.items():
         assert compiled[name][-1] == pytest.approx(value, rel=2e-15), name
@@ -90,4 +93,6 @@ def test_compiled_and_of_arrays_a_function_has_the_value_of_numbers(x: float, y:
 
 def test_a_smooth_sign_is_that_of_a_speed_far_from_zero():
     assert ops.hypot(3.0, 4.0) == 5.0
-    assert [v / ops.hypot(v, 0.01) for v in (-1.0, 0.0, 1.0)] == pytest.approx([-1.0, 0.0, 1.0], abs=1e-4)
+    assert [v / ops.hypot(v, 0.01) for v in (-1.0, 0.0, 1.0)] == pytest.approx(
+        [-1.0, 0.0, 1.0], abs=1e-4
+    )

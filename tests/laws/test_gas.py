@@ -1,6 +1,8 @@
-"""Dry ideal air: first law, adiabatic and isothermal limits, a vessel charged as an independent solution has it.
+"""Dry ideal air: first law, adiabatic and isothermal limits, a vessel charged as an independent
+solution has it.
 
-U' = sum c_p T_i m_i' - p V' + hA (T_amb - T), p V = m R T; what a process stores falls with volume by its pressure.
+U' = sum c_p T_i m_i' - p V' + hA (T_amb - T), p V = m R T; what a process stores falls with volume
+by its pressure.
 """
 
 from __future__ import annotations
@@ -30,10 +32,14 @@ from airmuscle.physics import (
     VirialGas,
     virial_coefficient_of_air,
 )
-from airmuscle.physics.pneumatics import SPECIFIC_HEAT_CONSTANT_PRESSURE, SPECIFIC_HEAT_CONSTANT_VOLUME
+from airmuscle.physics.pneumatics import (
+    SPECIFIC_HEAT_CONSTANT_PRESSURE,
+    SPECIFIC_HEAT_CONSTANT_VOLUME,
+)
 
 AMBIENT = Ambient()
-WARM, SUPPLY = AMBIENT.temperature, 650e3
+WARM = AMBIENT.temperature
+SUPPLY = 650e3
 VALVE = Valve(1e-8, 0.3)
 CONTRACTION = 0.05
 VOLUME = chosen_muscle().geometry.volume(CONTRACTION)
@@ -43,7 +49,9 @@ PROCESSES = [Isothermal(), Polytropic(1.2), Polytropic(1.4), VirialGas(), Virial
 def vessel(gas, ambient=AMBIENT):
     """A muscle that is held is a vessel of constant volume."""
     supply = Supply(SUPPLY - ambient.pressure)
-    return Plant(chosen_muscle(), FillDischarge(supply, VALVE, VALVE), Isometric(CONTRACTION), gas, ambient)
+    return Plant(
+        chosen_muscle(), FillDischarge(supply, VALVE, VALVE), Isometric(CONTRACTION), gas, ambient
+    )
 
 
 def charge(gas, absolute=AMBIENT.pressure, duration=1.0, rtol=1e-9):
@@ -51,12 +59,19 @@ def charge(gas, absolute=AMBIENT.pressure, duration=1.0, rtol=1e-9):
     start = plant.state_at(pressure=absolute - AMBIENT.pressure)
     command = Schedule({"fill": ((0.0, 1.0),)})
     return simulate(
-        plant, command, duration=duration, initial_state=start, integrator=Rodas4(rtol), output_times=duration / 200
+        plant,
+        command,
+        duration=duration,
+        initial_state=start,
+        integrator=Rodas4(rtol),
+        output_times=duration / 200,
     )
 
 
 def independent(heat_transfer, times):
-    """Pressure and temperature of the same vessel from the textbook's p and T equations, not from m and U."""
+    """Pressure and temperature of the same vessel from the textbook's p and T equations, not from m
+    and U.
+    """
 
     def flow(p):  # ISO 6358, written out again
         ratio = min(p / SUPPLY, 1.0)
@@ -66,12 +81,21 @@ def independent(heat_transfer, times):
 
     def rates(_, y):
         p, T = y
-        q, heat = flow(p), heat_transfer * (WARM - T)
+        q = flow(p)
+        heat = heat_transfer * (WARM - T)
         dp = (1.4 * 287.05 * WARM * q + 0.4 * heat) / VOLUME
         dT = T * (dp / p - q * 287.05 * T / (p * VOLUME))
         return [dp, dT]
 
-    return solve_ivp(rates, (0, times[-1]), [AMBIENT.pressure, WARM], "Radau", times, rtol=1e-10, atol=[1e-4, 1e-8]).y
+    return solve_ivp(
+        rates,
+        (0, times[-1]),
+        [AMBIENT.pressure, WARM],
+        "Radau",
+        times,
+        rtol=1e-10,
+        atol=[1e-4, 1e-8],
+    ).y
 
 
 @pytest.mark.parametrize("heat_transfer", [0.0, 0.3, 5.0])
@@ -85,7 +109,9 @@ def test_a_vessel_is_charged_as_an_independent_solution_has_it(heat_transfer):
 
 @pytest.mark.parametrize("start", [100.0, AMBIENT.pressure])
 def test_adiabatic_filling_ends_at_gamma_times_the_supplys_temperature(start):
-    """U = U0 + c_p T_s (m - m0): T = p/((p - p0)/(gamma T_s) + p0/T0), gamma T_s for an evacuated vessel."""
+    """U = U0 + c_p T_s (m - m0): T = p/((p - p0)/(gamma T_s) + p0/T0), gamma T_s for an evacuated
+    vessel.
+    """
     run = charge(EnergyBalance(0.0), start)
     p = run["pressure"] + AMBIENT.pressure
     expected = p / ((p - start) / (1.4 * WARM) + start / WARM)
@@ -95,10 +121,14 @@ def test_adiabatic_filling_ends_at_gamma_times_the_supplys_temperature(start):
 
 
 def test_without_heat_transfer_it_is_adiabatic_and_with_much_it_is_isothermal():
-    adiabatic, hardly = charge(EnergyBalance(0.0)), charge(EnergyBalance(1e-6))
+    adiabatic = charge(EnergyBalance(0.0))
+    hardly = charge(EnergyBalance(1e-6))
     np.testing.assert_allclose(hardly["pressure"], adiabatic["pressure"], rtol=1e-6, atol=1.0)
     isothermal = charge(Isothermal())["pressure"]
-    apart = [np.abs(charge(EnergyBalance(hA))["pressure"] - isothermal).max() for hA in (100.0, 1000.0, 10000.0)]
+    apart = [
+        np.abs(charge(EnergyBalance(hA))["pressure"] - isothermal).max()
+        for hA in (100.0, 1000.0, 10000.0)
+    ]
     assert apart[0] > 100.0
     assert apart[1] / apart[0] == pytest.approx(0.1, rel=0.2)
     assert apart[2] / apart[1] == pytest.approx(0.1, rel=0.2)
@@ -109,25 +139,40 @@ def test_a_discharging_vessel_cools_along_the_adiabat():
     plant = vessel(EnergyBalance(0.0))
     start = plant.state_at(pressure=5e5)
     run = simulate(
-        plant, Schedule({"discharge": ((0.0, 1.0),)}), duration=1.0, initial_state=start, integrator=Rodas4(1e-10)
+        plant,
+        Schedule({"discharge": ((0.0, 1.0),)}),
+        duration=1.0,
+        initial_state=start,
+        integrator=Rodas4(1e-10),
     )
     p = run["pressure"] + AMBIENT.pressure
     np.testing.assert_allclose(run["temperature"], WARM * (p / p[0]) ** (0.4 / 1.4), rtol=1e-8)
     assert run["temperature"][-1] < 180.0
 
 
-@given(st.floats(1e3, 1e6), st.floats(200, 500), st.floats(-1e-2, 1e-2), st.floats(-1e-3, 1e-3), st.floats(0, 100))
+@given(
+    st.floats(1e3, 1e6),
+    st.floats(200, 500),
+    st.floats(-1e-2, 1e-2),
+    st.floats(-1e-3, 1e-3),
+    st.floats(0, 100),
+)
 def test_pressure_rises_by_the_first_law(p, T, inflow, growth, heat_transfer):
     """p' = (gamma - 1)/V (c_p T_s m' - p V' + hA (T_amb - T)) - p V'/V."""
-    gas, V = EnergyBalance(heat_transfer), 1e-4
-    mass, energy = p * V / (GAS_CONSTANT * T), p * V / 0.4
+    gas = EnergyBalance(heat_transfer)
+    V = 1e-4
+    mass = p * V / (GAS_CONSTANT * T)
+    energy = p * V / 0.4
     content = {"air_mass": mass, "internal_energy": energy}
     air = gas.air(content, V, AMBIENT)
     assert air.pressure == pytest.approx(p)
     assert air.temperature == pytest.approx(T)
     flow = Flow(inflow, SPECIFIC_HEAT_CONSTANT_PRESSURE * 300.0 * inflow)
     rates = gas.rates(content, air, flow, growth, AMBIENT)
-    expected = 0.4 / V * (1004.675 * 300.0 * inflow - p * growth + heat_transfer * (WARM - T)) - p * growth / V
+    expected = (
+        0.4 / V * (1004.675 * 300.0 * inflow - p * growth + heat_transfer * (WARM - T))
+        - p * growth / V
+    )
     found = 0.4 * rates["internal_energy"] / V - 0.4 * energy * growth / V**2
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-3)
     assert rates["air_mass"] == inflow
@@ -135,12 +180,17 @@ def test_pressure_rises_by_the_first_law(p, T, inflow, growth, heat_transfer):
 
 def test_the_specific_heats_are_those_of_dry_air():
     assert pytest.approx(1005, abs=1.0) == SPECIFIC_HEAT_CONSTANT_PRESSURE
-    assert pytest.approx(GAS_CONSTANT) == SPECIFIC_HEAT_CONSTANT_PRESSURE - SPECIFIC_HEAT_CONSTANT_VOLUME
+    assert (
+        pytest.approx(GAS_CONSTANT)
+        == SPECIFIC_HEAT_CONSTANT_PRESSURE - SPECIFIC_HEAT_CONSTANT_VOLUME
+    )
 
 
 @pytest.mark.parametrize("gas", PROCESSES, ids=repr)
 def test_what_a_process_stores_is_the_work_it_can_do(gas):
-    mass, small, large = 3e-4, 0.8e-4, 1.7e-4
+    mass = 3e-4
+    small = 0.8e-4
+    large = 1.7e-4
     work = quad(lambda v: gas.pressure(mass, v, AMBIENT), small, large, epsrel=1e-12)[0]
     stored = [gas.available_energy({"air_mass": mass}, v, AMBIENT) for v in (small, large)]
     assert stored[0] - stored[1] == pytest.approx(work, rel=1e-9)
@@ -160,7 +210,9 @@ def test_sound_travels_at_the_root_of_dp_by_drho(gas):
     air = gas.air(content, V, AMBIENT)
     squeeze = 1e-6 * V
     rates = gas.rates(content, air, Flow(0.0, 0.0), -squeeze, AMBIENT)
-    after = gas.air({name: value + rates[name] for name, value in content.items()}, V - squeeze, AMBIENT)
+    after = gas.air(
+        {name: value + rates[name] for name, value in content.items()}, V - squeeze, AMBIENT
+    )
     density = content["air_mass"] / V
     by_density = (after.pressure - air.pressure) / (density * 1e-6)
     assert gas.sound_speed(air) ** 2 == pytest.approx(by_density, rel=1e-5)
@@ -181,23 +233,30 @@ def test_content_and_air_are_each_others_inverse(gas):
 
 @pytest.mark.parametrize("gas", PROCESSES, ids=repr)
 def test_the_slope_of_the_stored_energy_is_the_pressure(gas):
-    mass, volume = 2e-4, 9e-5
+    mass = 2e-4
+    volume = 9e-5
     (by_volume,) = autodiff.jvp(lambda x: [gas.energy(mass, x[0], AMBIENT)], [volume], [1.0])
     assert -by_volume == pytest.approx(gas.pressure(mass, volume, AMBIENT), rel=1e-12)
 
 
 def test_the_virial_gas_is_air_and_without_coefficient_the_ideal_gas():
-    """Second virial coefficients of air in cm3/mol: -8.64 at 20 °C (CIPM-2007), near -13.4 at 0 °C (tables)."""
+    """Second virial coefficients of air in cm3/mol: -8.64 at 20 °C (CIPM-2007), near -13.4 at 0 °C
+    (tables).
+    """
     molar = 28.96546e-3 * 1e6
     assert VirialGas().virial_coefficient * molar == pytest.approx(-8.64, abs=0.02)
     assert virial_coefficient_of_air(273.15) * molar == pytest.approx(-13.4, abs=0.4)
-    assert virial_coefficient_of_air(333.15) * molar == pytest.approx(-1.82, abs=0.01)  # by hand from a_0 to a_2
+    assert virial_coefficient_of_air(333.15) * molar == pytest.approx(
+        -1.82, abs=0.01
+    )  # by hand from a_0 to a_2
     for absolute in (1e5, 6.5e5):
         density = VirialGas().air_mass(absolute, 1.0, AMBIENT)
         assert VirialGas().pressure(density, 1.0, AMBIENT) == pytest.approx(absolute, rel=1e-14)
         factor = absolute / (density * GAS_CONSTANT * WARM)
         assert factor == pytest.approx(1.0 + VirialGas().virial_coefficient * density, rel=1e-14)
-        assert VirialGas(0.0).air_mass(absolute, 1.0, AMBIENT) == Isothermal().air_mass(absolute, 1.0, AMBIENT)
+        assert VirialGas(0.0).air_mass(absolute, 1.0, AMBIENT) == Isothermal().air_mass(
+            absolute, 1.0, AMBIENT
+        )
 
 
 def test_the_speed_of_sound_of_the_virial_gas_is_the_slope_of_its_pressure():

@@ -1,4 +1,5 @@
-"""Joints and arms: pulleys whose length is the integral of their moment arm, and Lagrange's equations of an arm.
+"""Joints and arms: pulleys whose length is the integral of their moment arm, and Lagrange's
+equations of an arm.
 
 r(theta) = dL/dtheta,   M = d2T/dv dv,   d/dt dT/dv - dT/dq + dV/dq = Q
 """
@@ -25,8 +26,15 @@ from airmuscle.physics import (
     SpringLoad,
 )
 
-PROFILES = (ConstantRadius(), PolynomialProfile((0.4, -0.3, 0.1)), CrankProfile(0.3), CrankProfile(-0.2))
-JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12, 0.7, -1.0, 1.0, PolynomialProfile((0.4, -0.3)))
+PROFILES = (
+    ConstantRadius(),
+    PolynomialProfile((0.4, -0.3, 0.1)),
+    CrankProfile(0.3),
+    CrankProfile(-0.2),
+)
+JOINT = AntagonisticJoint(
+    0.03, 0.05, 0.2, 2.0, 0.12, 0.7, -1.0, 1.0, PolynomialProfile((0.4, -0.3))
+)
 UPPER = ArmLink(0.3, 1.5, 0.14, 0.012, 0.1, -1.5, 1.5)
 LOWER = ArmLink(0.25, 1.1, 0.11, 0.006, 0.2, -1.5, 1.5)
 SIX = (
@@ -67,7 +75,10 @@ def test_a_symmetric_pair_is_its_own_mirror_image(angle, first, second):
     one = JOINT.generalised_forces({"angle": angle}, (first, second), lengths)["angle"]
     other = JOINT.generalised_forces({"angle": -angle}, (second, first), lengths)["angle"]
     assert one == pytest.approx(-other, abs=1e-12)
-    assert JOINT.contractions({"angle": angle}, lengths) == JOINT.contractions({"angle": -angle}, lengths)[::-1]
+    assert (
+        JOINT.contractions({"angle": angle}, lengths)
+        == JOINT.contractions({"angle": -angle}, lengths)[::-1]
+    )
 
 
 def test_the_weight_of_a_joint_acts_from_its_own_hanging_position():
@@ -75,7 +86,9 @@ def test_the_weight_of_a_joint_acts_from_its_own_hanging_position():
     still = {"angular_speed": 0.0}
     down = joint.acceleration({"angle": 0.0}, still, {"angle": 0.0}, {})["angle"]
     assert down == pytest.approx(-2.0 / 0.05)
-    assert joint.acceleration({"angle": -0.5 * np.pi}, still, {"angle": 0.0}, {})["angle"] == pytest.approx(0.0)
+    assert joint.acceleration({"angle": -0.5 * np.pi}, still, {"angle": 0.0}, {})[
+        "angle"
+    ] == pytest.approx(0.0)
 
 
 def test_dry_friction_opposes_motion_with_its_torque_and_vanishes_at_rest():
@@ -91,8 +104,11 @@ def test_dry_friction_opposes_motion_with_its_torque_and_vanishes_at_rest():
 
 
 def cartesian_kinetic_energy(arm, q, v):
-    """Kinetic energy from the velocities of the points of the links: a derivation without a mass matrix."""
-    velocity, energy = np.zeros(2), 0.0
+    """Kinetic energy from the velocities of the points of the links: a derivation without a mass
+    matrix.
+    """
+    velocity = np.zeros(2)
+    energy = 0.0
     for link, angle, speed in zip(arm.links, np.cumsum(q), np.cumsum(v), strict=True):
         along = speed * np.array([np.cos(angle), np.sin(angle)])
         centre = velocity + link.centre * along
@@ -107,7 +123,9 @@ def test_the_kinetic_energy_of_an_arm_is_that_of_its_points(q1, q2, v1, v2):
     expected = cartesian_kinetic_energy(ARM, np.array([q1, q2]), np.array([v1, v2]))
     assert found == pytest.approx(expected, rel=1e-12, abs=1e-14)
     speeds = np.array([v1, v2])
-    assert found == pytest.approx(0.5 * speeds @ np.array(ARM.mass_matrix(at(q1, q2))) @ speeds, rel=1e-12, abs=1e-14)
+    assert found == pytest.approx(
+        0.5 * speeds @ np.array(ARM.mass_matrix(at(q1, q2))) @ speeds, rel=1e-12, abs=1e-14
+    )
 
 
 @given(q1=angles, q2=st.floats(-3.1, 3.1))
@@ -117,10 +135,19 @@ def test_the_mass_matrix_is_symmetric_and_positive_definite(q1, q2):
     assert np.linalg.eigvalsh(matrix).min() > 1e-3
 
 
-@given(q1=angles, q2=angles, v1=st.floats(-3, 3), v2=st.floats(-3, 3), t1=st.floats(-5, 5), t2=st.floats(-5, 5))
+@given(
+    q1=angles,
+    q2=angles,
+    v1=st.floats(-3, 3),
+    v2=st.floats(-3, 3),
+    t1=st.floats(-5, 5),
+    t2=st.floats(-5, 5),
+)
 def test_an_arm_obeys_lagranges_equations_of_its_points(q1, q2, v1, v2, t1, t2):
     """d/dt dT/dv - dT/dq + dV/dq = Q - b v, with T and V of the points by finite differences."""
-    q, v, step = np.array([q1, q2]), np.array([v1, v2]), 1e-4
+    q = np.array([q1, q2])
+    v = np.array([v1, v2])
+    step = 1e-4
     forces = {"joint1.angle": t1, "joint2.angle": t2}
     acceleration = np.array([*ARM.acceleration(at(*q), moving(*v), forces, {}).values()])
 
@@ -134,11 +161,14 @@ def test_an_arm_obeys_lagranges_equations_of_its_points(q1, q2, v1, v2, t1, t2):
 
     def momentum(x, w):
         ends = [[energy(x, w + s * e)[0] for s in (1, -1)] for e in np.eye(2)]
-        return np.array([(a - b) / 2 for a, b in ends])  # exact, because the energy is quadratic in the speeds
+        return np.array(
+            [(a - b) / 2 for a, b in ends]
+        )  # exact, because the energy is quadratic in the speeds
 
-    change = (momentum(q + step * v, v + step * acceleration) - momentum(q - step * v, v - step * acceleration)) / (
-        2 * step
-    )
+    change = (
+        momentum(q + step * v, v + step * acceleration)
+        - momentum(q - step * v, v - step * acceleration)
+    ) / (2 * step)
     slopes = [[np.subtract(*energy(q + s * step * e, v)) for s in (1, -1)] for e in np.eye(2)]
     lagrangian = np.array([(a - b) / (2 * step) for a, b in slopes])
     damping = np.array([link.damping for link in ARM.links])
@@ -171,21 +201,39 @@ def test_the_tip_of_a_stretched_arm_is_at_its_length():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: replace(JOINT, min_angle=1.0, max_angle=0.5), "min_angle 1 must be less than max_angle 0.5"),
-        (lambda: replace(JOINT, profile=CrankProfile(0.0), max_angle=2.0), "allowed range: greater than 0 from -2 to 2 rad"),
+        (
+            lambda: replace(JOINT, min_angle=1.0, max_angle=0.5),
+            "min_angle 1 must be less than max_angle 0.5",
+        ),
+        (
+            lambda: replace(JOINT, profile=CrankProfile(0.0), max_angle=2.0),
+            "allowed range: greater than 0 from -2 to 2 rad",
+        ),
         (lambda: PolynomialProfile(()), "coefficients is empty"),
-        (lambda: JointWithFriction(SpringLoad(1.0, 1.0), 0.1), "SpringLoad has no coordinate in rad"),
-        (lambda: JointWithFriction(ARM, 0.1), "2 coordinates in rad; set coordinate .* joint1.angle or joint2.angle"),
-        (lambda: JointWithFriction(ARM, 0.1, coordinate="angle"), "no coordinate 'angle' in rad; PlanarArm has joint1.angle, joint2.angle"),
+        (
+            lambda: JointWithFriction(SpringLoad(1.0, 1.0), 0.1),
+            "SpringLoad has no coordinate in rad",
+        ),
+        (
+            lambda: JointWithFriction(ARM, 0.1),
+            "2 coordinates in rad; set coordinate .* joint1.angle or joint2.angle",
+        ),
+        (
+            lambda: JointWithFriction(ARM, 0.1, coordinate="angle"),
+            "no coordinate 'angle' in rad; PlanarArm has joint1.angle, joint2.angle",
+        ),
         (lambda: ArmLink(0.3, 1.0, 0.0), "moment of inertia about the joint is zero"),
-        (lambda: ArmLink(0.3, 1.0, 0.1, min_angle=1.0, max_angle=0.0), "min_angle 1 must be less than max_angle 0"),
+        (
+            lambda: ArmLink(0.3, 1.0, 0.1, min_angle=1.0, max_angle=0.0),
+            "min_angle 1 must be less than max_angle 0",
+        ),
         (lambda: MuscleRoute((0,), (0.1,)), "different joint numbers, counted from 1"),
         (lambda: MuscleRoute((1, 1), (0.1, 0.1)), "different joint numbers"),
         (lambda: MuscleRoute((1, 2), (0.1,)), "one radius for each joint"),
         (lambda: PlanarArm((UPPER,), SIX), "route 3 crosses joint 2; allowed range: 1 to 1"),
         (lambda: PlanarArm((UPPER,), ()), "one route for each muscle"),
     ],
-)  # fmt: skip
+)
 def test_impossible_joints_and_arms_are_refused(build, message):
     with pytest.raises(ParameterError, match=message):
         build()

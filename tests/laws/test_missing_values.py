@@ -1,4 +1,6 @@
-"""A missing value (NaN) gives a missing value or an error, never a force: max(0, NaN) is NaN, for numbers as for arrays."""
+"""A missing value (NaN) gives a missing value or an error, never a force: max(0, NaN) is NaN, for
+numbers as for arrays.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ def test_the_larger_and_the_smaller_of_a_value_and_a_missing_one_are_missing(fun
 
 @pytest.mark.parametrize("name", list_laws())
 @pytest.mark.parametrize("point", [(NAN, 0.05), (2e5, NAN)])
-def test_no_law_gives_a_force_at_a_missing_pressure_or_contraction(name: str, point: tuple[float, float]):
+def test_no_law_gives_a_force_at_a_missing_pressure_or_contraction(
+    name: str, point: tuple[float, float]
+):
     try:
         force = law_of(name).force(*point)
     except PhysicsError:

@@ -1,4 +1,6 @@
-"""Units of the parameters of control laws: a gain relates two signals, and its unit is that of their ratio."""
+"""Units of the parameters of control laws: a gain relates two signals, and its unit is that of
+their ratio.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,14 @@ from airmuscle.control import PID, Cascade, FrictionFeedForward, GainSchedule, S
 from airmuscle.engine import ColumnSensor, WithSensors
 from airmuscle.engine.loop.controller import parameter_units
 
-UNITS = {"position": "m", "pressure": "Pa", "speed": "rad/s", "fill": "1", "command": "N m", "force": "N"}
+UNITS = {
+    "position": "m",
+    "pressure": "Pa",
+    "speed": "rad/s",
+    "fill": "1",
+    "command": "N m",
+    "force": "N",
+}
 INNER = PID("pressure", "fill", gain=1e-5, integral_time=1.0)
 OUTER = PID("position", "pressure", gain=1e6)
 
@@ -26,7 +35,11 @@ OUTER = PID("position", "pressure", gain=1e6)
         (FrictionFeedForward("speed", "command", 2.0, 0.1), "amplitude", "N m"),
         (FrictionFeedForward("speed", "command", 2.0, 0.1), "boundary_speed", "rad/s"),
         (GainSchedule(INNER, "gain", "force", (0.0, 100.0), (1e-5, 2e-5)), "breakpoints[1]", "N"),
-        (GainSchedule(INNER, "gain", "force", (0.0, 100.0), (1e-5, 2e-5)), "scheduled_values[0]", "1/Pa"),
+        (
+            GainSchedule(INNER, "gain", "force", (0.0, 100.0), (1e-5, 2e-5)),
+            "scheduled_values[0]",
+            "1/Pa",
+        ),
         (SmithPredictor(OUTER, "position", "pressure", 3, 1e-7, 0.1), "static_gain", "m/Pa"),
         (SmithPredictor(OUTER, "position", "pressure", 3, 1e-7, 0.1), "time_constant", "s"),
         (WithSensors(OUTER, (ColumnSensor("position", 1e-5, 2e-5, 0.1),)), "sensors[0].noise", "m"),

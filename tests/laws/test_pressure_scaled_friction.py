@@ -1,4 +1,6 @@
-"""Friction whose force is scaled by an affine function of the gauge pressure: s(p) = max(a + (1 - a) p/p_r, 0)."""
+"""Friction whose force is scaled by an affine function of the gauge pressure: s(p) = max(a + (1 -
+a) p/p_r, 0).
+"""
 
 from __future__ import annotations
 
@@ -72,7 +74,9 @@ def test_the_range_of_the_data_belongs_to_the_law_and_changes_no_force():
     assert law.identified_range == ((1e5, 5e5), (-0.002, 0.002))
     assert law.pressure_factor(1e6) == law.inner.pressure_factor(1e6)
     assert NoFriction().identified_range is None
-    with pytest.raises(ParameterError, match="min_pressure 500000 must be less than max_pressure 100000"):
+    with pytest.raises(
+        ParameterError, match="min_pressure 500000 must be less than max_pressure 100000"
+    ):
         IdentifiedFriction(LAWS[0], 5e5, 1e5)
 
 
@@ -80,5 +84,9 @@ def test_the_range_of_the_data_belongs_to_the_law_and_changes_no_force():
 def test_one_scale_within_another_multiplies_them(pressure):
     inner = PressureScaledFriction(LAWS[0], 0.5, 3e5)
     for outer in (PressureScaledFriction(inner, 1.4, 4e5), IdentifiedFriction(inner, 0.0, 6e5)):
-        own = max(1.4 - 0.4 * pressure / 4e5, 0.0) if isinstance(outer, PressureScaledFriction) else 1.0
+        own = (
+            max(1.4 - 0.4 * pressure / 4e5, 0.0)
+            if isinstance(outer, PressureScaledFriction)
+            else 1.0
+        )
         assert outer.pressure_factor(pressure) == pytest.approx(own * (0.5 + 0.5 * pressure / 3e5))

@@ -1,4 +1,6 @@
-"""Laws, geometries and muscles are called with numbers, arrays, lists and texts with a unit; anything else is an error."""
+"""Laws, geometries and muscles are called with numbers, arrays, lists and texts with a unit;
+anything else is an error.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ MUSCLE = am.Muscle(am.load("tondu-lopez").characteristic, BRAID, damper=am.Linea
 
 @model
 class Product(ForceLaw):
-    """A user's law, in which a list that is not converted would be repeated: 2 [a, b] is [a, b, a, b]."""
+    """A user's law, in which a list that is not converted would be repeated: 2 [a, b] is [a, b, a,
+    b].
+    """
 
     def force(self, pressure, contraction):
         return 2 * pressure - 1e6 * contraction
@@ -57,8 +61,13 @@ LAWS = {
 )
 def test_texts_lists_and_integers_are_the_numbers_that_they_state(law, method, texts, numbers):
     call = getattr(law, method)
-    if isinstance(law, PressureLaw) and method in ("force", "slopes", "stiffness"):  # it does not contract by 20 %
-        texts, numbers = (texts[0], "5 %"), (numbers[0], 0.05)
+    if isinstance(law, PressureLaw) and method in (
+        "force",
+        "slopes",
+        "stiffness",
+    ):  # it does not contract by 20 %
+        texts = (texts[0], "5 %")
+        numbers = (numbers[0], 0.05)
     expected = call(*numbers)
     assert call(*texts) == expected == call(numbers[0], texts[1])
     names = {"force": ("pressure", "contraction"), "contraction": ("pressure", "force")}.get(method)
@@ -67,7 +76,10 @@ def test_texts_lists_and_integers_are_the_numbers_that_they_state(law, method, t
     for several in ([numbers[0]] * 2, (numbers[0],) * 2, np.full(2, numbers[0], dtype=np.float32)):
         result = call(several, numbers[1])
         assert np.shape(result)[-1:] == (2,)
-        assert pytest.approx(np.tile(np.asarray(expected), (2, 1)).squeeze(), rel=1e-6) == np.asarray(result).T
+        assert (
+            pytest.approx(np.tile(np.asarray(expected), (2, 1)).squeeze(), rel=1e-6)
+            == np.asarray(result).T
+        )
 
 
 def test_integers_are_no_other_numbers_than_floats():
@@ -82,7 +94,11 @@ def test_integers_are_no_other_numbers_than_floats():
 
 def test_a_muscle_and_its_geometry_take_texts_too():
     assert MUSCLE.tension("3 bar", "5 %") == MUSCLE.tension(3e5, 0.05)
-    assert MUSCLE.tension("3 bar", "5 %", "20 mm/s") == MUSCLE.tension(3e5, 0.05, 0.02) < MUSCLE.tension(3e5, 0.05)
+    assert (
+        MUSCLE.tension("3 bar", "5 %", "20 mm/s")
+        == MUSCLE.tension(3e5, 0.05, 0.02)
+        < MUSCLE.tension(3e5, 0.05)
+    )
     assert MUSCLE.tension(3e5, 0.05, speed="2 cm/s") == MUSCLE.tension(3e5, 0.05, 0.02)
     assert MUSCLE.static_force("3 bar", "5 %") == MUSCLE.static_force(3e5, 0.05)
     assert MUSCLE.stiffness("3 bar", "5 %") == MUSCLE.stiffness(3e5, 0.05)
@@ -107,17 +123,23 @@ def test_a_law_may_name_its_arguments_in_another_way():
 def test_what_is_no_quantity_is_refused_by_the_name_of_the_argument(value):
     for law in LAWS.values():
         with pytest.raises(
-            ParameterError, match=r"\.force: pressure is .*; give a number .* in Pa, or a text .* '3 bar'"
+            ParameterError,
+            match=r"\.force: pressure is .*; give a number .* in Pa, or a text .* '3 bar'",
         ):
             law.force(value, 0.1)
-    with pytest.raises(ParameterError, match=r"Muscle.tension: contraction is .*or a text with a unit, such as '10 %'"):
+    with pytest.raises(
+        ParameterError,
+        match=r"Muscle.tension: contraction is .*or a text with a unit, such as '10 %'",
+    ):
         MUSCLE.tension(3e5, value)
     with pytest.raises(ParameterError, match=r"Braid.volume: contraction is "):
         BRAID.volume(value)
 
 
 def test_a_text_of_another_quantity_is_refused_by_its_unit():
-    with pytest.raises(UnitError, match=r"contraction: pressure: unit 'N' cannot be converted to 'Pa'"):
+    with pytest.raises(
+        UnitError, match=r"contraction: pressure: unit 'N' cannot be converted to 'Pa'"
+    ):
         LAWS["F(p, eps)"].contraction("3 N", 100.0)
     with pytest.raises(UnitError, match=r"force: contraction: "):
         LAWS["F(p, eps)"].force(3e5, "much")

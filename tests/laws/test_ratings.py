@@ -1,4 +1,6 @@
-"""Ratings are what the maker permits: stated values limit, others do not, and lengths have their range too."""
+"""Ratings are what the maker permits: stated values limit, others do not, and lengths have their
+range too.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,9 @@ import pytest
 from airmuscle.errors import ParameterError
 from airmuscle.physics import Ratings
 
-DMSP_20 = Ratings(max_force=1500.0, min_pressure=0.0, max_pressure=6e5, max_contraction=0.25, max_prestretch=0.04)
+DMSP_20 = Ratings(
+    max_force=1500.0, min_pressure=0.0, max_pressure=6e5, max_contraction=0.25, max_prestretch=0.04
+)
 
 
 def test_permitted_values_give_no_text_and_the_limits_are_permitted():
@@ -31,7 +35,10 @@ def test_each_limit_is_named_with_its_range(quantity: str, value: float, text: s
 
 def test_what_is_not_stated_does_not_limit():
     assert Ratings().stated == ()
-    assert Ratings().excesses(force=9e5, pressure=9e7, contraction=0.9, length=19.0, temperature=900.0) == ()
+    assert (
+        Ratings().excesses(force=9e5, pressure=9e7, contraction=0.9, length=19.0, temperature=900.0)
+        == ()
+    )
     assert Ratings(max_temperature=323.15).excesses(temperature=330.0) == (
         "the temperature 56.85 °C is not permitted; allowed range: at most 50 °C",
     )
@@ -41,7 +48,9 @@ def test_what_is_not_stated_does_not_limit():
 
 
 def test_limits_in_the_wrong_order_and_unknown_quantities_are_refused():
-    with pytest.raises(ParameterError, match="min_pressure 700000 must be less than max_pressure 600000"):
+    with pytest.raises(
+        ParameterError, match="min_pressure 700000 must be less than max_pressure 600000"
+    ):
         Ratings(min_pressure=7e5, max_pressure=6e5)
     with pytest.raises(ParameterError, match="'speed' is not rated; there are force, pressure"):
         Ratings().excesses(speed=1.0)

@@ -1,6 +1,7 @@
 """An arm of unknown size: reduced forces, links in space and stick-slip, driven by pressures.
 
-F = S(p a + d),   d/dt dT/dv - dT/dq + dV/dq = Q,   power of friction + growth of bristle energy <= 0
+F = S(p a + d),   d/dt dT/dv - dT/dq + dV/dq = Q,   power of friction + growth of bristle energy <=
+0
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ ARM = SerialArm(
     PAIR,
 )
 SLIP = StickSlip(2.0, (0.01, 0.02), 0.0, 1.0, 0.004)
-angles, speeds = st.floats(-2.0, 2.0), st.floats(-4.0, 4.0)
+angles = st.floats(-2.0, 2.0)
+speeds = st.floats(-4.0, 4.0)
 three = st.tuples
 
 
@@ -64,8 +66,11 @@ def motion(v):
 
 @given(pressure=st.floats(0.0, 6e5), contraction=st.floats(-0.05, 0.2))
 def test_the_law_of_a_braid_is_a_reduced_law_with_an_area_of_degree_two(pressure, contraction):
-    tangent, sine = np.tan(0.4363), np.sin(0.4363)
-    a, b, section = 3.0 / tangent**2, 1.0 / sine**2, np.pi * 0.01**2
+    tangent = np.tan(0.4363)
+    sine = np.sin(0.4363)
+    a = 3.0 / tangent**2
+    b = 1.0 / sine**2
+    section = np.pi * 0.01**2
     law = LinearInPressure((section * (a - b), -2 * section * a, section * a), (0.0,), 1e-6)
     known = VirtualWork(BRAID).force(pressure, contraction)
     assert law.force(pressure, contraction) == pytest.approx(known, rel=1e-9, abs=1e-5)
@@ -80,7 +85,9 @@ def test_a_reduced_muscle_never_pushes_and_is_slack_over_its_width(pressure, con
 
 
 def test_a_reduced_law_without_coefficients_is_refused():
-    with pytest.raises(ParameterError, match="area and passive_force need at least one coefficient each"):
+    with pytest.raises(
+        ParameterError, match="area and passive_force need at least one coefficient each"
+    ):
         LinearInPressure(())
 
 
@@ -89,7 +96,8 @@ def test_a_reduced_law_without_coefficients_is_refused():
 
 @given(q=three(angles, angles), v=three(speeds, speeds), torques=three(speeds, speeds))
 def test_links_about_parallel_axes_are_a_planar_arm(q, v, torques):
-    upper, lower = ArmLink(0.3, 1.5, 0.14, 0.012, 0.1), ArmLink(0.25, 1.1, 0.11, 0.006, 0.2)
+    upper = ArmLink(0.3, 1.5, 0.14, 0.012, 0.1)
+    lower = ArmLink(0.25, 1.1, 0.11, 0.006, 0.2)
     links = (
         SpatialLink((0, 1, 0), (0, 0, 0), 1.5, (0, 0, -0.14), 0.012, 0.0, 0.1),
         SpatialLink((0, 1, 0), (0, 0, -0.3), 1.1, (0, 0, -0.11), 0.006, 0.0, 0.2),
@@ -100,9 +108,15 @@ def test_links_about_parallel_axes_are_a_planar_arm(q, v, torques):
     assert [*found.values()] == pytest.approx([*known.values()], rel=1e-9, abs=1e-9)
 
 
-@given(q=three(angles, angles, angles), v=three(speeds, speeds, speeds), a=three(speeds, speeds, speeds))
+@given(
+    q=three(angles, angles, angles),
+    v=three(speeds, speeds, speeds),
+    a=three(speeds, speeds, speeds),
+)
 def test_an_arm_in_space_obeys_lagranges_equations(q, v, a):
-    """The momenta M v are differentiated along the motion, the energies across it, both by central differences."""
+    """The momenta M v are differentiated along the motion, the energies across it, both by central
+    differences.
+    """
     q, v, a, step, names = np.array(q), np.array(v), np.array(a), 1e-5, place((0, 0, 0))
     momentum = lambda s: np.array(ARM.mass_matrix(place(q + s * v + 0.5 * s * s * a))) @ (v + s * a)  # noqa: E731
     change = (momentum(step) - momentum(-step)) / (2 * step)
@@ -125,11 +139,14 @@ def test_the_mass_matrix_in_space_is_symmetric_and_positive_definite(q):
 @given(q=three(angles, angles, angles), v=three(speeds, speeds, speeds))
 def test_tensions_do_the_work_of_the_shortening(q, v):
     """Virtual work: sum F_i dL_i = sum Q_k dtheta_k."""
-    tensions, lengths = (300.0, 120.0), (0.2, 0.2)
+    tensions = (300.0, 120.0)
+    lengths = (0.2, 0.2)
     forces = ARM.generalised_forces(place(q), tensions, lengths)
     rates = ARM.contraction_speeds(place(q), motion(v), lengths)
     power = sum(forces[c.name] * w for c, w in zip(ARM.coordinates, v, strict=True))
-    assert power == pytest.approx(sum(f * r for f, r in zip(tensions, rates, strict=True)), abs=1e-9)
+    assert power == pytest.approx(
+        sum(f * r for f, r in zip(tensions, rates, strict=True)), abs=1e-9
+    )
 
 
 # Friction that holds at rest
@@ -137,9 +154,16 @@ def test_tensions_do_the_work_of_the_shortening(q, v):
 
 @given(bristle=st.floats(-1.0, 1.0), speed=st.floats(-30.0, 30.0), load=st.floats(0.0, 50.0))
 def test_friction_that_sticks_is_passive(bristle, speed, load):
-    """The power of the friction and the growth of the energy of its bristle never have a positive sum."""
+    """The power of the friction and the growth of the energy of its bristle never have a positive
+    sum.
+    """
     power = SLIP.torque(bristle, load, speed) * speed
-    stored = SLIP.level(load, speed) * SLIP.presliding_angle * bristle * SLIP.bristle_rate(bristle, speed)
+    stored = (
+        SLIP.level(load, speed)
+        * SLIP.presliding_angle
+        * bristle
+        * SLIP.bristle_rate(bristle, speed)
+    )
     assert power + stored <= 1e-9
     assert abs(bristle) < 1.0 or bristle * SLIP.bristle_rate(bristle, speed) <= 0.0
 
@@ -153,11 +177,15 @@ def joint_on(torque, element=SLIP):
     start = driven.state_at((1e5 + torque / 3e-5, 1e5))
     pressures = {"a.measured_pressure": 1e5 + torque / 3e-5, "b.measured_pressure": 1e5}
     held = SampledSignal({name: [(0.0, p)] for name, p in pressures.items()})
-    return simulate(driven, held, duration=2.0, initial_state=start, integrator=RungeKutta4(1e-3))["angle"]
+    return simulate(driven, held, duration=2.0, initial_state=start, integrator=RungeKutta4(1e-3))[
+        "angle"
+    ]
 
 
 def test_a_joint_holds_below_its_friction_and_slides_above_it():
-    """The level is 2 N m and the load of the two tendons, 0.01 x 100 N and 0.02 x 100 N and their growth."""
+    """The level is 2 N m and the load of the two tendons, 0.01 x 100 N and 0.02 x 100 N and their
+    growth.
+    """
     unloaded = replace(SLIP, load_arms=())
     assert abs(joint_on(1.9, unloaded)[-1]) < 0.004 * 20.0
     assert joint_on(2.2, unloaded)[-1] > 1.0
@@ -176,12 +204,15 @@ BEAM = SerialArm(
 
 @given(angle=angles, speed=speeds, acceleration=st.floats(-50.0, 50.0))
 def test_a_bearing_carries_its_links_and_accelerates_them(angle, speed, acceleration):
-    """m sqrt((L alpha)^2 + g^2) across the axis, m L w^2 along it; the first joint, the other way round."""
+    """m sqrt((L alpha)^2 + g^2) across the axis, m L w^2 along it; the first joint, the other way
+    round.
+    """
     motion_of_both = {"joint1.angle": 0.3, "joint2.angle": angle, "joint1.angular_speed": speed}
     rates = {"joint1.angle": acceleration, "joint2.angle": 7.0}
     rotation = {**motion_of_both, "joint2.angular_speed": 1.0}
     first, second = (BEAM.bearing_force(joint, motion_of_both, rotation, rates) for joint in (0, 1))
-    turned, turning = 1.5 * 0.4 * speed**2, 1.5 * 0.4 * acceleration
+    turned = 1.5 * 0.4 * speed**2
+    turning = 1.5 * 0.4 * acceleration
     weight = 1.5 * BEAM.gravity
     assert second == pytest.approx((np.hypot(turning, weight), turned), rel=1e-4, abs=1e-9)
     assert first == pytest.approx((np.hypot(turning, turned), weight), rel=1e-4, abs=0.101)
@@ -189,10 +220,17 @@ def test_a_bearing_carries_its_links_and_accelerates_them(angle, speed, accelera
 
 @given(torque=st.floats(-20.0, 20.0), speed=st.floats(0.5, 4.0), turning=speeds)
 def test_the_friction_grows_with_the_load_of_the_bearing(torque, speed, turning):
-    """T_c + r_1 R_r + r_2 R_a at the accelerations of the arm, in whose power that leaves it this friction is."""
+    """T_c + r_1 R_r + r_2 R_a at the accelerations of the arm, in whose power that leaves it this
+    friction is.
+    """
     element = StickSlip(0.4, (), presliding_angle=0.004, bearing_arms=(0.02, 0.03))
     arm = WithStickSlip(BEAM, (StickSlip(0.1, presliding_angle=0.004), element))
-    q = {"joint1.angle": 0.2, "joint2.angle": -0.4, "joint1.friction_bristle": 0.0, "joint2.friction_bristle": 1.0}
+    q = {
+        "joint1.angle": 0.2,
+        "joint2.angle": -0.4,
+        "joint1.friction_bristle": 0.0,
+        "joint2.friction_bristle": 1.0,
+    }
     v = {"joint1.angular_speed": turning, "joint2.angular_speed": speed}
     forces = {"joint1.angle": torque, "joint2.angle": 3.0}
     moved = arm.acceleration(q, v, forces, {})
@@ -204,9 +242,14 @@ def test_the_friction_grows_with_the_load_of_the_bearing(torque, speed, turning)
     assert lost[0] - lost[1] == pytest.approx((friction - 0.4) * speed, rel=1e-9)
 
 
-@pytest.mark.parametrize(("inner", "arms"), [(BEAM, (0.1,) * 3), (AntagonisticJoint(0.03, 0.05), (0.1,))])
+@pytest.mark.parametrize(
+    ("inner", "arms"), [(BEAM, (0.1,) * 3), (AntagonisticJoint(0.03, 0.05), (0.1,))]
+)
 def test_bearing_arms_are_those_of_a_serial_arm(inner, arms):
-    name = f"{len(arms)} bearing_arms are given for a joint of {type(inner).__name__}; a SerialArm takes one or two"
+    name = (
+        f"{len(arms)} bearing_arms are given for a joint of {type(inner).__name__}; a SerialArm"
+        " takes one or two"
+    )
     elements = (replace(SLIP, load_arms=(), bearing_arms=arms),) * len(inner.coordinates)
     with pytest.raises(ParameterError, match=name):
         WithStickSlip(inner, elements)
@@ -214,10 +257,13 @@ def test_bearing_arms_are_those_of_a_serial_arm(inner, arms):
 
 def test_friction_needs_an_element_for_each_angle_and_a_load_for_each_muscle():
     with pytest.raises(
-        ParameterError, match="SerialArm has 3 angles and 1 elements are given; give one for each angle"
+        ParameterError,
+        match="SerialArm has 3 angles and 1 elements are given; give one for each angle",
     ):
         WithStickSlip(ARM, (SLIP,))
-    with pytest.raises(ParameterError, match="takes 2 muscles, and 1 load_arms are given; give one for each muscle"):
+    with pytest.raises(
+        ParameterError, match="takes 2 muscles, and 1 load_arms are given; give one for each muscle"
+    ):
         WithStickSlip(ARM, (SLIP, SLIP, replace(SLIP, load_arms=(0.1,))))
 
 
@@ -226,7 +272,8 @@ def test_friction_needs_an_element_for_each_angle_and_a_load_for_each_muscle():
 
 def test_a_driven_plant_has_the_motion_of_a_plant_at_its_pressures():
     muscles = tuple(replace(chosen_muscle(), name=n) for n in "ab")
-    lever, valve = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1), Valve(1e-8, 0.4)
+    lever = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1)
+    valve = Valve(1e-8, 0.4)
     plant = Plant(muscles, (FillDischarge(Supply(6e5), valve, valve),) * 2, lever)
     driven = PressureDriven(muscles, lever, (0.02, 0.05))
     state = plant.state_at(pressure=3e5, angle=0.1, angular_speed=0.4)
@@ -239,16 +286,30 @@ def test_a_driven_plant_has_the_motion_of_a_plant_at_its_pressures():
 
 
 def test_an_arm_with_stick_slip_is_traced_and_compiled():
-    """The compiled run of a coupled arm keeps its energy book: what the muscles give is stored or rubbed away."""
+    """The compiled run of a coupled arm keeps its energy book: what the muscles give is stored or
+    rubbed away.
+    """
     muscles = tuple(Muscle(LinearInPressure((6e-4,), (-5.0,)), BRAID, name=n) for n in "ab")
     driven = PressureDriven(muscles, WithStickSlip(ARM, (SLIP,) * 3), (0.02, 0.02))
     levels = {"a": (1e5, 3e5, 1e5), "b": (1e5, 5e4, 2e5)}
     signal = SampledSignal(
-        {f"{n}.measured_pressure": [*zip((0.0, 0.3, 0.6), p, strict=True)] for n, p in levels.items()}
+        {
+            f"{n}.measured_pressure": [*zip((0.0, 0.3, 0.6), p, strict=True)]
+            for n, p in levels.items()
+        }
     )
     start = driven.state_at((1e5, 1e5), **{"joint2.angle": 0.4, "joint3.angular_speed": 1.0})
-    run = simulate(driven, signal, duration=0.6, initial_state=start, integrator=RungeKutta4(5e-4), output_times=1e-3)
-    energy, lost, given = [], [], []
+    run = simulate(
+        driven,
+        signal,
+        duration=0.6,
+        initial_state=start,
+        integrator=RungeKutta4(5e-4),
+        output_times=1e-3,
+    )
+    energy = []
+    lost = []
+    given = []
     for row in range(len(run["time"])):
         state = {s.name: run[s.name][row] for s in driven.states}
         tensions = [run[f"{n}.force"][row] for n in "ab"]
@@ -263,7 +324,10 @@ def test_an_arm_with_stick_slip_is_traced_and_compiled():
 
 def test_a_driven_plant_counts_its_muscles_lags_and_pressures():
     muscles = tuple(replace(chosen_muscle(), name=n) for n in "ab")
-    with pytest.raises(ParameterError, match="2 muscles, 1 lags and a mechanism for any number of muscles are given"):
+    with pytest.raises(
+        ParameterError,
+        match="2 muscles, 1 lags and a mechanism for any number of muscles are given",
+    ):
         PressureDriven(muscles, HangingMass(2.0), (0.02,))
     with pytest.raises(ParameterError, match="two muscles have the same name"):
         PressureDriven((muscles[0],) * 2, HangingMass(2.0), (0.02, 0.02))

@@ -1,8 +1,8 @@
 """Segmentation of recordings, compared with synthetic recordings of known structure.
 
-Branches are identified from the pressure history alone; a dwell belongs to the branch before it. The resolution of a
-sensor is the step of its readings, its limit the reading at which they stay constant. Outliers are listed and never
-removed; the overshoot of a step is not an outlier.
+Branches are identified from the pressure history alone; a dwell belongs to the branch before it.
+The resolution of a sensor is the step of its readings, its limit the reading at which they stay
+constant. Outliers are listed and never removed; the overshoot of a step is not an outlier.
 """
 
 from __future__ import annotations
@@ -57,18 +57,29 @@ def staircase(levels: list[float], rows: int = 10, overshoot: float = 0.0) -> np
 
 
 def timed(pressure: np.ndarray, **columns: np.ndarray) -> Recording:
-    return Recording({"time": STEP * np.arange(len(pressure)), "pressure": pressure, **columns}, "synthetic")
+    return Recording(
+        {"time": STEP * np.arange(len(pressure)), "pressure": pressure, **columns}, "synthetic"
+    )
 
 
 def bench(seed: int = 1, noise: float = 400.0) -> tuple[Recording, int]:
-    """A stepped isometric run up and down with noise, rounding and saturation; and the row of the reversal."""
-    up, down = np.linspace(0, 6e5, 25), np.linspace(5.4e5, 5e4, 20)
+    """A stepped isometric run up and down with noise, rounding and saturation; and the row of the
+    reversal.
+    """
+    up = np.linspace(0, 6e5, 25)
+    down = np.linspace(5.4e5, 5e4, 20)
     pressure = staircase([*up, *down], 10, overshoot=0.6)
     random = RANDOM(seed)
     force = np.maximum(1.5e-3 * pressure - 300.0 + random.normal(0, 0.8, len(pressure)), -9.0)
     pressure = pressure + random.normal(0, noise, len(pressure))
-    rounded = {"pressure": 765.0 * np.round(pressure / 765.0), "force": 0.68 * np.round(force / 0.68)}
-    return timed(rounded["pressure"], force=rounded["force"], length=np.full(len(pressure), 0.25)), 250
+    rounded = {
+        "pressure": 765.0 * np.round(pressure / 765.0),
+        "force": 0.68 * np.round(force / 0.68),
+    }
+    return (
+        timed(rounded["pressure"], force=rounded["force"], length=np.full(len(pressure), 0.25)),
+        250,
+    )
 
 
 # Branches
@@ -91,7 +102,8 @@ def test_a_stepped_ramp_with_overshoots_has_one_reversal_at_the_last_row_of_the_
 def test_every_reversal_of_a_random_history_is_found(turns, rows, rest, first, seed):
     corners = np.cumsum([0.0, *(first * (-1) ** i * part * 5e5 for i, part in enumerate(turns))])
     corners += 1e5 - corners.min()
-    parts, truth = [], []
+    parts = []
+    truth = []
     for i, (a, b) in enumerate(itertools.pairwise(corners)):
         parts += [np.linspace(a, b, rows, endpoint=False), np.full(rest, b)]
         truth += [first * (-1.0) ** i] * (rows + rest)
@@ -99,13 +111,17 @@ def test_every_reversal_of_a_random_history_is_found(turns, rows, rest, first, s
     measured = pressure + RANDOM(seed).normal(0, 200.0, len(pressure))
     found = find_branches(timed(measured))
     assert [b.direction for b in found] == [first * (-1) ** i for i in range(len(turns))]
-    slack = 0.6 * 0.05 * np.ptp(pressure) / (0.2 * 5e5 / rows) + 2  # rows that half a swing takes at the least slope
+    slack = (
+        0.6 * 0.05 * np.ptp(pressure) / (0.2 * 5e5 / rows) + 2
+    )  # rows that half a swing takes at the least slope
     differing = np.count_nonzero(branch_directions(timed(measured), found) != truth)
     assert differing <= len(turns) * slack
 
 
 @given(scale=st.floats(1e-2, 1e2), shift=st.floats(-5e4, 1e6), stretch=st.floats(0.5, 2.0))
-def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(scale: float, shift: float, stretch: float):
+def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(
+    scale: float, shift: float, stretch: float
+):
     recording, _ = bench()
     other = recording.with_columns(pressure=recording["pressure"] * scale + shift)
     cut = [(b.direction, b.interval) for b in find_branches(recording)]
@@ -120,7 +136,9 @@ def test_negating_the_pressure_negates_the_directions():
 
 
 def test_a_minor_loop_is_found_and_a_ripple_is_not():
-    loop = np.concatenate([np.linspace(0, 4e5, 80), np.linspace(4e5, 3e5, 30), np.linspace(3e5, 6e5, 60)])
+    loop = np.concatenate(
+        [np.linspace(0, 4e5, 80), np.linspace(4e5, 3e5, 30), np.linspace(3e5, 6e5, 60)]
+    )
     assert [b.direction for b in find_branches(timed(loop))] == [1, -1, 1]
     ripple = np.linspace(0, 6e5, 300) + 1.2e4 * np.sin(np.arange(300) * 0.5)
     assert [b.direction for b in find_branches(timed(ripple))] == [1]
@@ -135,23 +153,33 @@ def test_a_sawtooth_has_a_deflating_branch_of_one_or_two_rows_at_each_fall():
 
 
 @pytest.mark.parametrize("constant", ["contraction", "force"])
-def test_no_branch_leaves_its_run_where_ramps_at_other_lengths_or_loads_follow_each_other(constant: str):
+def test_no_branch_leaves_its_run_where_ramps_at_other_lengths_or_loads_follow_each_other(
+    constant: str,
+):
     swept = {"contraction": "force", "force": "contraction"}[constant]
     pressure = np.tile(np.linspace(0.0, 6e5, 150), 5) + RANDOM(4).normal(0, 300.0, 750)
     levels = np.repeat(np.linspace(0.05, 0.25, 5), 150)
     recording = timed(pressure, **{constant: levels, swept: 1e-6 * pressure})
     found = inspect(recording).branches
-    assert [(b.interval.start, b.interval.stop) for b in found] == [(i, i + 150) for i in range(0, 750, 150)]
+    assert [(b.interval.start, b.interval.stop) for b in found] == [
+        (i, i + 150) for i in range(0, 750, 150)
+    ]
     assert {b.name for b in found} == {"inflating"}
     assert found == find_branches(recording)
 
 
 @pytest.mark.parametrize(("after", "falls"), [(5e5, {(150, 4)}), (2e4, set())])
-def test_rows_between_runs_belong_to_the_branch_of_neither(after: float, falls: set[tuple[int, int]]):
+def test_rows_between_runs_belong_to_the_branch_of_neither(
+    after: float, falls: set[tuple[int, int]]
+):
     gap = np.array([0.0107, 0.0111, 0.0193, 0.0197])
-    contraction = np.concatenate([0.03 * i + np.concatenate([np.zeros(150), gap]) for i in range(5)])
+    contraction = np.concatenate(
+        [0.03 * i + np.concatenate([np.zeros(150), gap]) for i in range(5)]
+    )
     contraction += RANDOM(6).normal(0.0, 1e-5, contraction.size)
-    pressure = np.tile(np.concatenate([np.linspace(0.0, 6e5, 150), np.linspace(after, 0.2 * after, 4)]), 5)
+    pressure = np.tile(
+        np.concatenate([np.linspace(0.0, 6e5, 150), np.linspace(after, 0.2 * after, 4)]), 5
+    )
     recording = timed(pressure, contraction=contraction, force=1e-3 * pressure).rows(slice(0, 766))
     found = inspect(recording).branches
     rising = [(b.interval.start, b.interval.stop) for b in found if b.direction > 0]
@@ -183,7 +211,9 @@ def test_a_branch_column_is_compared_but_not_used():
     stated = np.where(np.arange(len(recording)) < turn - 9, 1.0, 2.0)
     judged = recording.with_columns(branch=stated)
     assert find_branches(judged) == find_branches(recording)
-    assert branch_column_agreement(judged, find_branches(judged)) == pytest.approx(1.0 - 9 / len(recording))
+    assert branch_column_agreement(judged, find_branches(judged)) == pytest.approx(
+        1.0 - 9 / len(recording)
+    )
     assert branch_column_agreement(recording, find_branches(recording)) is None
 
 
@@ -210,7 +240,9 @@ def test_the_resolution_is_found_in_spite_of_a_varying_last_digit(step, noise, o
 def test_continuous_readings_have_no_resolution(seed: int, size: int):
     values = RANDOM(seed).normal(0, 1, size).cumsum()
     found = estimate_resolution(values)
-    assert found < 0.02 * np.ptp(values) / np.sqrt(size), "chance leaves at most a step far below the noise"
+    assert found < 0.02 * np.ptp(values) / np.sqrt(size), (
+        "chance leaves at most a step far below the noise"
+    )
 
 
 def test_a_few_set_points_of_a_test_are_not_a_resolution():
@@ -238,7 +270,9 @@ def test_resolution_and_saturation_of_a_test_bench_are_found():
     sides = found["force"].censoring(recording["force"])
     assert np.array_equal(sides == 1, recording["force"] < -8.7)
     assert not (sides == -1).any()
-    assert found["force"].std == pytest.approx(np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3)
+    assert found["force"].std == pytest.approx(
+        np.hypot(found["force"].noise, 0.68 / np.sqrt(12)), rel=1e-3
+    )
 
 
 def test_saturation_at_the_upper_limit_is_found():
@@ -252,21 +286,29 @@ def test_saturation_at_the_upper_limit_is_found():
     np.testing.assert_array_equal(found.censoring(full) == -1.0, full == full.max())
     few, many = (np.minimum(recording["force"], recording["force"][row]) for row in (180, 80))
     for values, serious in ((few, False), (many, True)):
-        said = [f for f in inspect(recording.with_columns(force=values)).findings if "upper limit" in f.text]
+        said = [
+            f
+            for f in inspect(recording.with_columns(force=values)).findings
+            if "upper limit" in f.text
+        ]
         assert [f.serious for f in said] == [serious]
         assert "These rows are bounds (censored), not values." in said[0].text
 
 
 def test_a_constant_signal_without_noise_or_with_noise_on_both_sides_is_not_saturated():
     vented = timed(np.maximum(np.concatenate([np.zeros(200), np.linspace(0, 5e5, 300)]), 0.0))
-    assert np.isinf(estimate_sensors(vented)["pressure"].lower_limit), "a sensor without noise does not show its end"
+    assert np.isinf(estimate_sensors(vented)["pressure"].lower_limit), (
+        "a sensor without noise does not show its end"
+    )
     noisy = timed(765.0 * np.round((vented["pressure"] + RANDOM(4).normal(0, 600, 500)) / 765.0))
     assert np.isinf(estimate_sensors(noisy)["pressure"].lower_limit)
 
 
 def test_several_runs_of_a_rig_show_a_limit_that_one_run_hardly_reaches():
     reaching, _ = bench(1)
-    rows = np.concatenate([np.flatnonzero(reaching["force"] <= reaching["force"].min())[:2], np.arange(150, 380)])
+    rows = np.concatenate(
+        [np.flatnonzero(reaching["force"] <= reaching["force"].min())[:2], np.arange(150, 380)]
+    )
     hardly = reaching.rows(np.sort(rows))
     assert np.isinf(estimate_sensors(hardly)["force"].lower_limit)
     seen = inspect_all([reaching, hardly])
@@ -283,7 +325,9 @@ def test_the_plateaus_of_a_staircase_are_its_steps():
     assert len(found) == len(steps) == 45
     levels = [*np.linspace(0, 6e5, 25), *np.linspace(5.4e5, 5e4, 20)]
     for plateau in found:
-        assert plateau.values["pressure"] == pytest.approx(levels[plateau.interval.start // 10], abs=900.0)
+        assert plateau.values["pressure"] == pytest.approx(
+            levels[plateau.interval.start // 10], abs=900.0
+        )
         assert plateau.interval.stop <= 10 * (plateau.interval.start // 10 + 1)
     points = plateau_points(recording, found)
     assert len(points) == 45
@@ -320,7 +364,11 @@ def test_points_without_time_are_steady_states():
 # Glitches
 
 
-@given(rows=st.sets(st.integers(1, 44), min_size=1, max_size=5), sign=st.sampled_from([1, -1]), seed=st.integers(0, 9))
+@given(
+    rows=st.sets(st.integers(1, 44), min_size=1, max_size=5),
+    sign=st.sampled_from([1, -1]),
+    seed=st.integers(0, 9),
+)
 def test_synthetic_outliers_are_listed_and_not_removed(rows: set[int], sign: int, seed: int):
     recording, _ = bench(seed)
     force = recording["force"].copy()
@@ -350,8 +398,13 @@ def test_an_outlier_of_two_rows_is_found_and_the_overshoot_of_a_step_is_not():
 
 
 def test_each_kind_of_run_is_recognised():
-    sweep, noise = np.linspace(0, 1, 200), RANDOM(0).normal(0, 1, 200)
-    held = {"pressure": 3e5 + 200 * noise, "contraction": 0.1 + 1e-4 * noise, "force": 500.0 + noise}
+    sweep = np.linspace(0, 1, 200)
+    noise = RANDOM(0).normal(0, 1, 200)
+    held = {
+        "pressure": 3e5 + 200 * noise,
+        "contraction": 0.1 + 1e-4 * noise,
+        "force": 500.0 + noise,
+    }
     swept = {"pressure": 6e5 * sweep, "contraction": 0.25 * sweep, "force": 1500 * (1 - sweep)}
     for kind, name in ((ISOBARIC, "pressure"), (ISOMETRIC, "contraction"), (ISOTONIC, "force")):
         recording = Recording({**swept, name: held[name]}, "run")
@@ -361,7 +414,11 @@ def test_each_kind_of_run_is_recognised():
         assert set(run.swept_columns) == set(swept) - {name}
     assert [r.kind for r in find_runs(Recording(swept, "free"))] == [FREE]
     assert [r.kind for r in find_runs(Recording(held, "rest"))] == [AT_REST]
-    by_length = {"pressure": swept["pressure"], "length": np.full(200, 0.3), "force": swept["force"]}
+    by_length = {
+        "pressure": swept["pressure"],
+        "length": np.full(200, 0.3),
+        "force": swept["force"],
+    }
     assert find_runs(Recording(by_length, "length"))[0].kind is ISOMETRIC
 
 
@@ -373,25 +430,36 @@ def test_a_relaxation_at_constant_pressure_and_length_is_isobaric():
 
 def test_a_table_of_isobars_has_one_run_per_isobar():
     pressures, contractions = (
-        g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0, 0.25, 11), indexing="ij")
+        g.ravel()
+        for g in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0, 0.25, 11), indexing="ij")
     )
     table = Recording(
-        {"pressure": pressures, "contraction": contractions, "force": pressures * (0.01 - 0.03 * contractions)}, "t"
+        {
+            "pressure": pressures,
+            "contraction": contractions,
+            "force": pressures * (0.01 - 0.03 * contractions),
+        },
+        "t",
     )
     found = find_runs(table)
     assert [run.kind for run in found] == [ISOBARIC] * 6
     assert [run.constant_value for run in found] == pytest.approx(np.linspace(1e5, 6e5, 6))
-    assert [(r.interval.start, r.interval.stop) for r in found] == [(11 * i, 11 * i + 11) for i in range(6)]
+    assert [(r.interval.start, r.interval.stop) for r in found] == [
+        (11 * i, 11 * i + 11) for i in range(6)
+    ]
 
 
 def test_constant_pressure_stated_to_be_an_isometric_sweep_is_rejected():
     noise = RANDOM(0).normal(0, 1, 200)
     resting = timed(3e5 + 100 * noise, force=200 + 0.5 * noise, length=np.full(200, 0.28))
     with pytest.raises(
-        ColumnError, match=r"synthetic: no measured quantity varies \(pressure 299\.\d to 300(\.\d)? kPa"
+        ColumnError,
+        match=r"synthetic: no measured quantity varies \(pressure 299\.\d to 300(\.\d)? kPa",
     ):
         check_swept(resting, find_runs(resting))
-    isobaric = timed(3e5 + 100 * noise, force=np.linspace(0, 900, 200), length=np.linspace(0.25, 0.3, 200))
+    isobaric = timed(
+        3e5 + 100 * noise, force=np.linspace(0, 900, 200), length=np.linspace(0.25, 0.3, 200)
+    )
     check_swept(isobaric, find_runs(isobaric))
     said = isobaric.with_constants(run="isometric")
     with pytest.raises(ColumnError, match="stated to be isometric, but the data are isobaric"):
@@ -413,7 +481,9 @@ def test_rate_jitter_gaps_repeated_and_decreasing_times():
     assert seen.jitter == pytest.approx(0.02, rel=0.25)
     assert [(g.row, round(g.duration, 6)) for g in seen.gaps] == [(100, 2.0)]
     assert (seen.repeated_rows, seen.backward_rows) == ((200,), (301,))
-    texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 401)).with_columns(time=time)).findings]
+    texts = [
+        f.text for f in inspect(timed(np.linspace(0, 6e5, 401)).with_columns(time=time)).findings
+    ]
     assert texts[0].startswith("time repeats in 1 row, first in row 201")
     assert texts[1].startswith("time decreases in 1 row, first in row 302")
     assert texts[2].startswith("1 gap in time, the longest of 2 s after row 101")
@@ -426,8 +496,12 @@ def test_the_rate_of_rounded_time_stamps_is_that_of_the_rows():
     assert seen.rounded
     assert seen.rate == pytest.approx(20.0, rel=0.01)
     assert [gap.row for gap in seen.gaps] == [199]
-    texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 400)).with_columns(time=rounded)).findings]
-    assert "For stamps that the logger rounded, use time=UniformTime() of ColumnMapping." in texts[0]
+    texts = [
+        f.text for f in inspect(timed(np.linspace(0, 6e5, 400)).with_columns(time=rounded)).findings
+    ]
+    assert (
+        "For stamps that the logger rounded, use time=UniformTime() of ColumnMapping." in texts[0]
+    )
 
 
 def test_a_record_shorter_than_its_dynamics_is_reported():
@@ -440,7 +514,9 @@ def test_a_record_shorter_than_its_dynamics_is_reported():
     slow_sweep = inspect(timed(np.linspace(0, 6e5, 900))).findings
     assert not any("may be shorter" in f.text for f in slow_sweep)
     sweep = 6e5 * np.abs(1 - np.arange(200) / 100)
-    assert [f.serious for f in inspect(timed(sweep)).findings if "may be shorter" in f.text] == [False]
+    assert [f.serious for f in inspect(timed(sweep)).findings if "may be shorter" in f.text] == [
+        False
+    ]
 
 
 @given(values=st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40), with_time=st.booleans())
@@ -467,11 +543,17 @@ def test_a_recording_without_rows_is_inspected_with_the_sensors_of_others():
     _, _, chapter = inspection_chapters(inspect_all([whole, whole.rows(slice(0, 0))]))
     assert chapter.title == "synthetic: 0 rows"
     assert np.isfinite(inspect_all([whole])[0].sensors["force"].lower_limit)
-    assert chapter.tables[0].columns["min"].values == chapter.tables[0].columns["max"].values == [None] * 4
+    assert (
+        chapter.tables[0].columns["min"].values
+        == chapter.tables[0].columns["max"].values
+        == [None] * 4
+    )
 
 
 @pytest.mark.parametrize("width", [3, 5, 41])
-def test_the_moving_median_leaves_out_missing_values_and_shortens_its_windows_at_the_ends(width, monkeypatch):
+def test_the_moving_median_leaves_out_missing_values_and_shortens_its_windows_at_the_ends(
+    width, monkeypatch
+):
     monkeypatch.setattr(interval, "_MAX_WINDOW_VALUES", 100)
     values = np.random.default_rng(width).standard_normal(60).round(1)
     values[[7, 20, 21, 22]] = np.nan

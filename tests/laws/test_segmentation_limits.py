@@ -1,7 +1,9 @@
-"""Limits of the segmentation, each from both sides: outliers, gaps, saturation, constant quantities, ripple, reversals.
+"""Limits of the segmentation, each from both sides: outliers, gaps, saturation, constant
+quantities, ripple, reversals.
 
-The chosen numbers are those of the modules of `recording.segment`: eight standard deviations of an outlier, five sample
-times of a gap, five rows of a saturated sensor, 0.5 % contraction and 2 % pressure of a constant quantity.
+The chosen numbers are those of the modules of `recording.segment`: eight standard deviations of an
+outlier, five sample times of a gap, five rows of a saturated sensor, 0.5 % contraction and 2 %
+pressure of a constant quantity.
 """
 
 from __future__ import annotations
@@ -52,7 +54,9 @@ def test_an_outlier_differs_by_more_than_eight_standard_deviations(distance: flo
 
 
 @pytest.mark.parametrize(("missing", "count"), [(0.0, 0), (0.45, 0), (-0.2, 0), (-3.0, 1)])
-def test_a_rounded_turning_point_is_no_outlier_and_one_beyond_both_lines_is(missing: float, count: int):
+def test_a_rounded_turning_point_is_no_outlier_and_one_beyond_both_lines_is(
+    missing: float, count: int
+):
     force = 20.0 * (30.0 - np.abs(np.arange(61.0) - 30.0))
     force[30] -= 20.0 * missing
     assert len(find_outliers(timed(force=force), SENSOR)) == count
@@ -75,11 +79,19 @@ def test_the_noise_of_many_rows_is_their_standard_deviation():
 
 def test_readings_within_a_quarter_of_the_resolution_of_a_limit_are_at_the_limit():
     sensor = Sensor("force", 1.0, 0.1, lower_limit=-2.0, upper_limit=10.0)
-    assert sensor.censoring(np.array([-2.3, -1.8, -1.7, 9.7, 9.8, 10.3])).tolist() == [1, 1, 0, 0, -1, -1]
+    assert sensor.censoring(np.array([-2.3, -1.8, -1.7, 9.7, 9.8, 10.3])).tolist() == [
+        1,
+        1,
+        0,
+        0,
+        -1,
+        -1,
+    ]
 
 
 @pytest.mark.parametrize(
-    ("at_top", "elsewhere", "is_saturated"), [(4, 1, False), (5, 1, True), (6, 3, False), (7, 3, True)]
+    ("at_top", "elsewhere", "is_saturated"),
+    [(4, 1, False), (5, 1, True), (6, 3, False), (7, 3, True)],
 )
 def test_a_saturated_sensor_stays_at_its_limit_for_five_rows_and_twice_as_long_as_elsewhere(
     at_top: int, elsewhere: int, is_saturated: bool
@@ -115,7 +127,9 @@ def test_a_single_outlier_does_not_end_a_run():
 
 
 def ripple(width: float, crossings: int, stroke: float) -> Recording:
-    """A pressure that oscillates within a fraction of its maximum and crosses the middle so often, during a stroke."""
+    """A pressure that oscillates within a fraction of its maximum and crosses the middle so often,
+    during a stroke.
+    """
     phase = np.linspace(0.0, np.pi * crossings, 400) + 0.5 * np.pi
     pressure = 3e5 * (1.0 - 0.5 * width * (1.0 - np.sin(phase)))
     return timed(contraction=np.linspace(0.0, stroke, 400), pressure=pressure)
@@ -124,10 +138,14 @@ def ripple(width: float, crossings: int, stroke: float) -> Recording:
 @pytest.mark.parametrize(
     ("width", "crossings", "stroke", "is_constant"),
     [
-        (0.055, 7, 0.1, True), (0.065, 7, 0.1, False), (0.055, 3, 0.1, True), (0.055, 2, 0.1, False),
-        (0.055, 7, 0.022, True), (0.055, 7, 0.019, False),
+        (0.055, 7, 0.1, True),
+        (0.065, 7, 0.1, False),
+        (0.055, 3, 0.1, True),
+        (0.055, 2, 0.1, False),
+        (0.055, 7, 0.022, True),
+        (0.055, 7, 0.019, False),
     ],
-)  # fmt: skip
+)
 def test_a_pressure_that_ripples_within_six_per_cent_while_the_muscle_moves_is_constant(
     width: float, crossings: int, stroke: float, is_constant: bool
 ):
@@ -139,7 +157,9 @@ def test_a_pressure_that_ripples_within_six_per_cent_while_the_muscle_moves_is_c
 
 
 @pytest.mark.parametrize(("change", "is_slow"), [(0.009, True), (0.012, False)])
-def test_a_quasi_static_pressure_changes_by_less_than_one_per_cent_in_a_tenth_of_a_second(change: float, is_slow: bool):
+def test_a_quasi_static_pressure_changes_by_less_than_one_per_cent_in_a_tenth_of_a_second(
+    change: float, is_slow: bool
+):
     count = round(0.1 / change / 0.01)
     pressure = np.concatenate([np.linspace(0.0, 5e5, count), np.full(50, 5e5)])
     sensors = {"pressure": Sensor("pressure", 0.0, 0.0)}
@@ -148,8 +168,13 @@ def test_a_quasi_static_pressure_changes_by_less_than_one_per_cent_in_a_tenth_of
 
 @pytest.mark.parametrize(("reverse", "count"), [(9.5e3, 1), (10.5e3, 3)])
 def test_a_reversal_exceeds_ten_standard_deviations_of_the_sensor(reverse: float, count: int):
-    pressure = np.concatenate([np.linspace(0.0, 6e4, 60), np.linspace(6e4, 6e4 - reverse, 20),
-                               np.linspace(6e4 - reverse, 1e5, 60)])  # fmt: skip
+    pressure = np.concatenate(
+        [
+            np.linspace(0.0, 6e4, 60),
+            np.linspace(6e4, 6e4 - reverse, 20),
+            np.linspace(6e4 - reverse, 1e5, 60),
+        ]
+    )
     assert len(find_branches(timed(pressure=pressure), Sensor("pressure", 0.0, 1e3))) == count
 
 
@@ -174,6 +199,12 @@ def test_the_noise_of_a_length_makes_no_reversal_of_a_motion(std: float):
 def test_a_recording_without_rows_has_no_sensor_and_no_segment_and_does_not_count_beside_others():
     empty = timed(pressure=np.empty(0), contraction=np.empty(0), force=np.empty(0))
     found = inspect(empty)
-    assert (found.sensors, found.runs, found.branches, found.plateaus, found.quasi_static) == ({}, (), (), (), 0.0)
+    assert (found.sensors, found.runs, found.branches, found.plateaus, found.quasi_static) == (
+        {},
+        (),
+        (),
+        (),
+        0.0,
+    )
     other = timed(pressure=RANDOM(5).normal(0.0, 100.0, 50))
     assert estimate_sensors([empty, other]) == estimate_sensors([other])

@@ -1,5 +1,5 @@
-"""Behind a series spring the contractile part rests where both pull alike: found by Newton's method inside a bracket, it
-is what bisection finds, of numbers and of arrays, and after a few looks."""
+"""Behind a series spring the contractile part rests where both pull alike: found by Newton's method
+inside a bracket, it is what bisection finds, of numbers and of arrays, and after a few looks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,14 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core import autodiff, tree
-from airmuscle.physics import CubicSpring, EndStop, HuntCrossley, LinearSpring, SeriesSpring, VirtualWork
+from airmuscle.physics import (
+    CubicSpring,
+    EndStop,
+    HuntCrossley,
+    LinearSpring,
+    SeriesSpring,
+    VirtualWork,
+)
 from airmuscle.physics.muscle.series import find_largest_nonnegative
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))
@@ -21,16 +28,22 @@ def in_series(stiffness=2e5, **parts):
 
 
 def bisected(muscle, p, contraction):
-    """The greatest inner contractions at which the spring does not hold more than the contractile part pulls."""
-    (least, most), length = muscle.geometry.contraction_range, muscle.geometry.resting_length
+    """The greatest inner contractions at which the spring does not hold more than the contractile
+    part pulls.
+    """
+    least, most = muscle.geometry.contraction_range
+    length = muscle.geometry.resting_length
     here = muscle.internal_imbalance(p, contraction, contraction)
-    high = np.minimum(np.maximum(most, contraction), contraction + here / (muscle.series.stiffness * length))
+    high = np.minimum(
+        np.maximum(most, contraction), contraction + here / (muscle.series.stiffness * length)
+    )
     low = np.where(here < 0, np.minimum(least, contraction), contraction)
     high = np.where(here < 0, contraction, high)
     for _ in range(80):
         middle = 0.5 * (low + high)
         not_held = muscle.internal_imbalance(p, middle, contraction) >= 0
-        low, high = np.where(not_held, middle, low), np.where(not_held, high, middle)
+        low = np.where(not_held, middle, low)
+        high = np.where(not_held, high, middle)
     return low
 
 
@@ -46,7 +59,9 @@ INSIDE = {
 @pytest.mark.parametrize("muscle", INSIDE.values(), ids=INSIDE)
 @pytest.mark.parametrize("p", [-2e4, 0.0, 5e4, 5e5])
 def test_newtons_method_inside_finds_what_bisection_does(muscle, p):
-    """Also where what is out of balance is zero on a stretch, of which the far end is meant: no pressure, no spring."""
+    """Also where what is out of balance is zero on a stretch, of which the far end is meant: no
+    pressure, no spring.
+    """
     contractions = np.array([-0.09, -0.02, 0.0, 0.05, 0.1, 0.11, 0.25, 0.6])
     expected = bisected(muscle, p, contractions)
     together = muscle.steady_state(p, contractions)["inner_contraction"]
@@ -71,7 +86,8 @@ def test_a_law_that_is_not_closed_form_settles_too():
 
 def test_inside_it_settles_in_a_few_looks(monkeypatch):
     """It took fifty, and a thousand where the spring is slack at no pressure."""
-    looks, traced = [], autodiff.value_and_derivative
+    looks = []
+    traced = autodiff.value_and_derivative
 
     def counted(*given, **named):
         function = traced(*given, **named)
@@ -83,12 +99,16 @@ def test_inside_it_settles_in_a_few_looks(monkeypatch):
             for contraction in (-0.02, 0.0, 0.05, 0.2):
                 looks.clear()
                 muscle.steady_state(p, contraction)
-                flat = muscle.spring == LinearSpring(0.0) and p == 0.0  # no slope leads to the end of a stretch at zero
+                flat = (
+                    muscle.spring == LinearSpring(0.0) and p == 0.0
+                )  # no slope leads to the end of a stretch at zero
                 assert len(looks) <= (70 if flat else 20)
 
 
 def test_a_search_that_newtons_method_only_creeps_to_is_halved():
-    """Of -(x - a)^9 every step of Newton's leaves eight ninths of the way, of which 300 would be needed."""
+    """Of -(x - a)^9 every step of Newton's leaves eight ninths of the way, of which 300 would be
+    needed.
+    """
     looks = []
 
     def function(x):
@@ -106,7 +126,9 @@ def test_of_a_stretch_at_zero_the_far_end_is_meant():
         return np.maximum(0.1 - x, 0.0) - np.maximum(x - 0.2, 0.0), -1.0 * ((x < 0.1) | (x > 0.2))
 
     for start in (0.0, 0.15, 0.5):
-        found = find_largest_nonnegative(function, np.array([0.0]), np.array([0.5]), np.array([start]))
+        found = find_largest_nonnegative(
+            function, np.array([0.0]), np.array([0.5]), np.array([start])
+        )
         np.testing.assert_allclose(found, 0.2, rtol=0.0, atol=1e-14)
 
 
@@ -126,13 +148,18 @@ def test_a_table_of_muscles_settles_as_each_of_them():
 
 def test_a_value_comes_with_its_exact_slope_for_numbers_arrays_and_tables_of_parameters():
     braid = chosen_muscle().geometry
-    both, x = autodiff.value_and_derivative(braid, "volume", 1), np.linspace(0.0, 0.3, 7)
+    both = autodiff.value_and_derivative(braid, "volume", 1)
+    x = np.linspace(0.0, 0.3, 7)
     value, slope = both(0.1)
-    assert (value, slope) == pytest.approx((braid.volume(0.1), braid.volume_derivative(0.1)), rel=1e-14)
+    assert (value, slope) == pytest.approx(
+        (braid.volume(0.1), braid.volume_derivative(0.1)), rel=1e-14
+    )
     values, slopes = both(x.reshape(7, 1))
     assert values.shape == slopes.shape == (7, 1)
     np.testing.assert_allclose(values[:, 0], braid.volume(x), rtol=1e-14)
-    np.testing.assert_allclose(slopes[:, 0], [braid.volume_derivative(float(c)) for c in x], rtol=1e-14)
+    np.testing.assert_allclose(
+        slopes[:, 0], [braid.volume_derivative(float(c)) for c in x], rtol=1e-14
+    )
     radii = np.array([[0.01], [0.02]])
     table = tree.unflatten(braid, [radii, *tree.flatten(braid)[1:].tolist()])
     values, slopes = autodiff.value_and_derivative(table, "volume", 1)(x)

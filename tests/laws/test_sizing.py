@@ -1,8 +1,8 @@
 """Sizing: the shortest muscle whose law holds the load at both end points.
 
-lift   F(p_1, eps_1) = F_1/n,   F(p_2, eps_1 + S/L) = F_2/n,   S_F F <= F_max(eps) = min(F(p_max, eps), F_rated)
-joint  n r (F(p_c, eps_c) - F(p_min, eps_e)) = M,   eps_c - eps_e = r Theta/L
-air    m = p V/(R T) of both end points
+lift   F(p_1, eps_1) = F_1/n,   F(p_2, eps_1 + S/L) = F_2/n,   S_F F <= F_max(eps) = min(F(p_max,
+eps), F_rated) joint  n r (F(p_c, eps_c) - F(p_min, eps_e)) = M,   eps_c - eps_e = r Theta/L air
+m = p V/(R T) of both end points
 """
 
 from __future__ import annotations
@@ -66,7 +66,9 @@ def effective_length(length: float = 0.3) -> Entry:
     entry = am.load("sarosi-dmsp-20-400n")
     law = EffectiveLength(entry.characteristic, resting_length=length, dead_length=0.06)
     geometry = dataclasses.replace(am.load("dmsp-20-300").geometry, resting_length=length)
-    return dataclasses.replace(entry, name="with rigid ends", characteristic=law, geometry=geometry, checks=())
+    return dataclasses.replace(
+        entry, name="with rigid ends", characteristic=law, geometry=geometry, checks=()
+    )
 
 
 def force(choice: MuscleChoice, pressure: float, contraction: float) -> float:
@@ -80,55 +82,75 @@ def force(choice: MuscleChoice, pressure: float, contraction: float) -> float:
 @pytest.mark.parametrize("name", MUSCLES)
 @pytest.mark.parametrize("requirement", [LIFT, SPRING, FALLING])
 @pytest.mark.parametrize("count", [1, 2])
-def test_the_law_holds_the_load_at_both_ends_of_the_stroke(name: str, requirement: LiftRequirement, count: int):
+def test_the_law_holds_the_load_at_both_ends_of_the_stroke(
+    name: str, requirement: LiftRequirement, count: int
+):
     choice = choose(am.load(name), requirement, SIX_BAR, count)
-    first, last = choice.design.extended, choice.design.contracted
+    first = choice.design.extended
+    last = choice.design.contracted
     loads = requirement.load(0.0) / count, requirement.load(requirement.stroke) / count
     for point, load in zip((first, last), loads, strict=True):
         assert force(choice, point.pressure, point.contraction) == pytest.approx(load, rel=1e-9)
         assert SIX_BAR.safety_factor * load <= point.capacity * (1 + 1e-9)
         assert SIX_BAR.min_pressure <= point.pressure <= 6e5
-    assert (last.contraction - first.contraction) * choice.length == pytest.approx(requirement.stroke, rel=1e-9)
+    assert (last.contraction - first.contraction) * choice.length == pytest.approx(
+        requirement.stroke, rel=1e-9
+    )
     assert choice.design.reserve >= SIX_BAR.safety_factor - 1.0 - 1e-9
 
 
 @pytest.mark.parametrize("name", MUSCLES)
 @pytest.mark.parametrize("requirement", [LIFT, SPRING, FALLING])
-def test_the_reserve_is_that_of_the_worst_position_of_the_stroke(name: str, requirement: LiftRequirement):
-    """The capacity is convex in the contraction, so that a falling load can come closest to it between the ends."""
+def test_the_reserve_is_that_of_the_worst_position_of_the_stroke(
+    name: str, requirement: LiftRequirement
+):
+    """The capacity is convex in the contraction, so that a falling load can come closest to it
+    between the ends.
+    """
     choice = choose(am.load(name), requirement, SIX_BAR)
-    first, last = choice.design.extended.contraction, choice.design.contracted.contraction
+    first = choice.design.extended.contraction
+    last = choice.design.contracted.contraction
     eps = np.linspace(first, last, 301)
     load = np.linspace(requirement.load(0.0), requirement.load(requirement.stroke), 301)
     capacity = np.minimum(
-        [force(choice, choice.muscle.pressure_range[1], each) for each in eps], choice.muscle.max_force
+        [force(choice, choice.muscle.pressure_range[1], each) for each in eps],
+        choice.muscle.max_force,
     )
     assert choice.design.reserve == pytest.approx(np.min(capacity / load) - 1.0, abs=2e-3)
 
 
 @pytest.mark.parametrize("name", ["dmsp-10-250", "dmsp-20-300"])
 def test_the_reserve_of_a_lift_is_the_safety_factor_where_an_end_limits_the_length(name: str):
-    assert choose(am.load(name), LIFT, SIX_BAR).design.reserve == pytest.approx(SIX_BAR.safety_factor - 1.0, abs=1e-9)
+    assert choose(am.load(name), LIFT, SIX_BAR).design.reserve == pytest.approx(
+        SIX_BAR.safety_factor - 1.0, abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("inertia", [0.05, 20.0])
-def test_the_reserve_of_a_joint_is_the_safety_factor_where_the_length_is_the_shortest(inertia: float):
+def test_the_reserve_of_a_joint_is_the_safety_factor_where_the_length_is_the_shortest(
+    inertia: float,
+):
     for safety_factor in (1.5, 2.0):
         conditions = dataclasses.replace(SIX_BAR, safety_factor=safety_factor)
-        choice = choose(am.load("dmsp-20-300"), dataclasses.replace(JOINT, inertia=inertia), conditions)
+        choice = choose(
+            am.load("dmsp-20-300"), dataclasses.replace(JOINT, inertia=inertia), conditions
+        )
         assert choice.design.reserve == pytest.approx(safety_factor - 1.0, rel=1e-6)
 
 
 def test_the_load_is_the_weight_plus_force_and_spring():
     both = LiftRequirement(stroke=0.02, mass=3.0, force=10.0, stiffness=500.0)
     assert both.load(0.02) == 3.0 * STANDARD_GRAVITY + 10.0 + 500.0 * 0.02
-    assert both.work == pytest.approx((3.0 * STANDARD_GRAVITY + 10.0) * 0.02 + 0.5 * 500.0 * 0.02**2)
+    assert both.work == pytest.approx(
+        (3.0 * STANDARD_GRAVITY + 10.0) * 0.02 + 0.5 * 500.0 * 0.02**2
+    )
 
 
 @pytest.mark.parametrize(("load", "travel"), [(0.5, 1.0), (1.0, 0.25), (0.3, 0.4)])
 def test_a_reduced_requirement_has_the_fraction_of_load_and_motion(load: float, travel: float):
     full = LiftRequirement(stroke=0.03, mass=4.0, force=80.0, stiffness=4000.0)
-    lift, joint = full.reduced(load, travel), JOINT.reduced(load, travel)
+    lift = full.reduced(load, travel)
+    joint = JOINT.reduced(load, travel)
     assert lift.stroke == pytest.approx(travel * full.stroke)
     assert lift.load(0.0) == pytest.approx(load * full.load(0.0))
     assert lift.load(lift.stroke) == pytest.approx(load * full.load(full.stroke))
@@ -141,7 +163,8 @@ def test_a_reduced_requirement_has_the_fraction_of_load_and_motion(load: float, 
 def test_the_muscles_hold_the_torque_at_the_ends_of_the_angle(name: str):
     choice = choose(am.load(name), JOINT, SIX_BAR)
     design = choice.design
-    rest, pulling = design.extended, design.contracted
+    rest = design.extended
+    pulling = design.contracted
     slack = max(force(choice, rest.pressure, rest.contraction), 0.0)
     pull = force(choice, pulling.pressure, pulling.contraction)
     assert design.radius * (pull - slack) == pytest.approx(JOINT.torque, rel=1e-9)
@@ -154,8 +177,11 @@ def test_the_muscles_hold_the_torque_at_the_ends_of_the_angle(name: str):
 def test_the_extended_muscle_of_a_joint_accelerates_the_inertia():
     heavy = dataclasses.replace(JOINT, inertia=20.0)
     choice = choose(am.load("dmsp-20-300"), heavy, SIX_BAR)
-    design, muscle = choice.design, choice.muscle
-    torque = heavy.torque + heavy.inertia * 0.5 * heavy.angle * (2 * math.pi / SIX_BAR.cycle_time) ** 2
+    design = choice.design
+    muscle = choice.muscle
+    torque = (
+        heavy.torque + heavy.inertia * 0.5 * heavy.angle * (2 * math.pi / SIX_BAR.cycle_time) ** 2
+    )
     opposing = float(muscle.floor(design.contracted.contraction))
     reached = design.radius * (design.extended.capacity - opposing)
     assert reached == pytest.approx(1.5 * torque, rel=1e-6)  # it limits: the length is the shortest
@@ -165,13 +191,23 @@ def test_the_extended_muscle_of_a_joint_accelerates_the_inertia():
 # Shortest length
 
 
-def some_mounting_suffices(entry: Entry, requirement: LiftRequirement, length: float, count: int = 1) -> bool:
-    """Whether any contraction at the start meets the requirement with this length: independent of the search."""
-    muscle = static_muscle(am.files.library.scaling.scale_entry(entry, resting_length=length), SIX_BAR)
+def some_mounting_suffices(
+    entry: Entry, requirement: LiftRequirement, length: float, count: int = 1
+) -> bool:
+    """Whether any contraction at the start meets the requirement with this length: independent of
+    the search.
+    """
+    muscle = static_muscle(
+        am.files.library.scaling.scale_entry(entry, resting_length=length), SIX_BAR
+    )
     low, high = muscle.contraction_range
     starts = np.linspace(low, high, 4001)[:, None]
     displacement, load = requirement.path
-    inertial = requirement.mass * (0.5 * requirement.stroke - displacement) * (2 * math.pi / SIX_BAR.cycle_time) ** 2
+    inertial = (
+        requirement.mass
+        * (0.5 * requirement.stroke - displacement)
+        * (2 * math.pi / SIX_BAR.cycle_time) ** 2
+    )
     contraction = starts + displacement / length
     inside = contraction[:, -1] <= high
     strong = muscle.capacity(contraction) >= 1.5 * np.maximum(load, load + inertial) / count
@@ -180,12 +216,17 @@ def some_mounting_suffices(entry: Entry, requirement: LiftRequirement, length: f
 
 
 @pytest.mark.parametrize("requirement", [LIFT, SPRING, FALLING])
-@pytest.mark.parametrize("entry", [am.load("dmsp-10-250"), am.load("dmsp-20-300"), effective_length()],
-                         ids=lambda e: e.name)  # fmt: skip
+@pytest.mark.parametrize(
+    "entry",
+    [am.load("dmsp-10-250"), am.load("dmsp-20-300"), effective_length()],
+    ids=lambda e: e.name,
+)
 def test_no_shorter_muscle_meets_the_requirement(entry: Entry, requirement: LiftRequirement):
     length = choose(entry, requirement, SIX_BAR).length
     assert some_mounting_suffices(entry, requirement, length * 1.002)
-    assert not any(some_mounting_suffices(entry, requirement, length * part) for part in (0.999, 0.97, 0.8))
+    assert not any(
+        some_mounting_suffices(entry, requirement, length * part) for part in (0.999, 0.97, 0.8)
+    )
 
 
 def test_no_shorter_muscle_holds_the_torque_of_a_joint():
@@ -193,7 +234,9 @@ def test_no_shorter_muscle_holds_the_torque_of_a_joint():
     choice = choose(am.load("dmsp-20-300"), strong, SIX_BAR)
     muscle = choice.muscle
     eps = np.linspace(*muscle.contraction_range, 1501)
-    arms = np.maximum(eps - eps[:, None], 0.0) * 0.999 * choice.length / JOINT.angle  # rows: extended
+    arms = (
+        np.maximum(eps - eps[:, None], 0.0) * 0.999 * choice.length / JOINT.angle
+    )  # rows: extended
     torque = arms * (muscle.capacity(eps) - muscle.floor(eps)[:, None])
     assert torque.max() < 1.5 * strong.torque
     assert torque.max() == pytest.approx(0.999 * 1.5 * strong.torque, rel=1e-3)
@@ -208,43 +251,67 @@ def test_the_muscles_on_both_sides_of_a_pulley_do_not_touch(name: str, torque: f
     thickest = choice.diameter if choice.entry.geometry is not None else 1.75 * nominal
     assert 2 * choice.design.radius >= 1.1 * thickest * (1 - 1e-3)
     assert choice.length >= 3 * nominal
-    muscle, eps = choice.muscle, np.linspace(*choice.muscle.contraction_range, 801)
+    muscle = choice.muscle
+    eps = np.linspace(*choice.muscle.contraction_range, 801)
     radius = (eps - eps[:, None]) * 0.99 * choice.length / JOINT.angle  # rows: extended
     loads = count * np.maximum(radius, 0.0) * (muscle.capacity(eps) - muscle.floor(eps)[:, None])
     room = 2 * radius >= 1.1 * muscle.outer_diameter(eps)
-    assert choice.length == 3 * nominal or not (room & (loads >= 1.5 * torque)).any()  # none is shorter
+    assert (
+        choice.length == 3 * nominal or not (room & (loads >= 1.5 * torque)).any()
+    )  # none is shorter
 
 
 def test_where_the_pulley_decides_the_muscles_are_as_close_as_permitted():
     choice = choose(am.load("dmsp-20-300"), dataclasses.replace(JOINT, torque=0.05), SIX_BAR)
-    assert 2 * choice.design.radius == pytest.approx(1.1 * choice.diameter, rel=2e-3)  # the outline has 33 points
+    assert 2 * choice.design.radius == pytest.approx(
+        1.1 * choice.diameter, rel=2e-3
+    )  # the outline has 33 points
 
 
 def test_the_radii_of_a_longer_muscle_are_those_with_which_it_meets_the_requirement():
     requirement = dataclasses.replace(JOINT, torque=20.0)
     choice = choose(am.load("dmsp-20-300"), requirement, SIX_BAR)
-    muscle, eps = choice.muscle, np.linspace(*choice.muscle.contraction_range, 1201)
+    muscle = choice.muscle
+    eps = np.linspace(*choice.muscle.contraction_range, 1201)
     radius = (eps - eps[:, None]) * 1.1 * choice.length / JOINT.angle  # rows: extended
     inertial = requirement.acceleration_torque(SIX_BAR.cycle_time)
     enough = radius * (muscle.capacity(eps) - muscle.floor(eps)[:, None]) >= 1.5 * 20.0
-    enough &= radius * (muscle.capacity(eps)[:, None] - muscle.floor(eps)) >= 1.5 * (20.0 + inertial)
+    enough &= radius * (muscle.capacity(eps)[:, None] - muscle.floor(eps)) >= 1.5 * (
+        20.0 + inertial
+    )
     possible = radius[enough & (2 * radius >= 1.1 * muscle.outer_diameter(eps))]
     step = 2 * 1.1 * choice.length / JOINT.angle * np.ptp(eps) / 128  # of the grid of the search
     assert choice.design.radii[0] == pytest.approx(possible.min(), abs=step)
     assert choice.design.radii[1] == pytest.approx(possible.max(), abs=step)
     used = np.array(choice.design.radii) * JOINT.angle / (1.1 * choice.length)
-    assert used * 128 / np.ptp(eps) == pytest.approx(np.round(used * 128 / np.ptp(eps)), abs=1e-6)  # of that length
+    assert used * 128 / np.ptp(eps) == pytest.approx(
+        np.round(used * 128 / np.ptp(eps)), abs=1e-6
+    )  # of that length
 
 
 @pytest.mark.parametrize(("torque", "inertia", "deciding"), [(0.3, 0.0, 0), (0.1, 2.0, 1)])
-def test_the_reserve_of_a_joint_is_that_of_the_end_with_less(torque: float, inertia: float, deciding: int):
+def test_the_reserve_of_a_joint_is_that_of_the_end_with_less(
+    torque: float, inertia: float, deciding: int
+):
     requirement = dataclasses.replace(JOINT, torque=torque, inertia=inertia)
-    choice = choose(am.load("dmsp-20-300"), requirement, SIX_BAR)  # longer than the torques need: the pulley decides
-    rest, pulling, arm = choice.design.extended, choice.design.contracted, choice.design.radius
-    full = [force(choice, choice.muscle.pressure_range[1], point.contraction) for point in (pulling, rest)]
-    least = [max(force(choice, choice.muscle.pressure_range[0], each.contraction), 0.0) for each in (rest, pulling)]
+    choice = choose(
+        am.load("dmsp-20-300"), requirement, SIX_BAR
+    )  # longer than the torques need: the pulley decides
+    rest = choice.design.extended
+    pulling = choice.design.contracted
+    arm = choice.design.radius
+    full = [
+        force(choice, choice.muscle.pressure_range[1], point.contraction)
+        for point in (pulling, rest)
+    ]
+    least = [
+        max(force(choice, choice.muscle.pressure_range[0], each.contraction), 0.0)
+        for each in (rest, pulling)
+    ]
     needed = torque, torque + inertia * 0.5 * JOINT.angle * (2 * math.pi / SIX_BAR.cycle_time) ** 2
-    factors = [arm * (high - low) / each for high, low, each in zip(full, least, needed, strict=True)]
+    factors = [
+        arm * (high - low) / each for high, low, each in zip(full, least, needed, strict=True)
+    ]
     assert np.argmin(factors) == deciding
     assert factors[deciding] > 1.59
     assert factors[1 - deciding] > 1.2 * factors[deciding]
@@ -253,20 +320,31 @@ def test_the_reserve_of_a_joint_is_that_of_the_end_with_less(torque: float, iner
 
 def test_a_pulley_without_room_for_the_muscles_states_the_radius_that_is_needed():
     small = dataclasses.replace(JOINT, torque=0.1)
-    with pytest.raises(SolveError, match=r"pulley has a radius of at most .* mm thick at pressure, need \S+ mm"):
+    with pytest.raises(
+        SolveError, match=r"pulley has a radius of at most .* mm thick at pressure, need \S+ mm"
+    ):
         choose(am.load("dmsp-20-300"), small, dataclasses.replace(SIX_BAR, max_length=0.08))
 
 
 def test_the_load_of_a_fast_lift_is_accelerated_and_does_not_overshoot():
-    law, fast = am.load("dmsp-20-300"), dataclasses.replace(SIX_BAR, cycle_time=0.4)
+    law = am.load("dmsp-20-300")
+    fast = dataclasses.replace(SIX_BAR, cycle_time=0.4)
     heavy = dataclasses.replace(LIFT, mass=63.0)
     choice = choose(law, heavy, fast)
     inertial = heavy.mass * 0.5 * heavy.stroke * (2 * math.pi / 0.4) ** 2
-    assert 1.5 * (heavy.load(0.0) + inertial) <= choice.design.extended.capacity < 1.6 * (heavy.load(0.0) + inertial)
+    assert (
+        1.5 * (heavy.load(0.0) + inertial)
+        <= choice.design.extended.capacity
+        < 1.6 * (heavy.load(0.0) + inertial)
+    )
     assert choice.design.reserve >= 0.5 - 1e-9
-    with pytest.raises(SolveError, match=r"150\d N is needed"):  # 1.5 times the load that is accelerated at the start
+    with pytest.raises(
+        SolveError, match=r"150\d N is needed"
+    ):  # 1.5 times the load that is accelerated at the start
         choose(law, heavy, dataclasses.replace(SIX_BAR, cycle_time=0.36))
-    with pytest.raises(SolveError, match=r"with a cycle of 0.1 s, the load pulls with -\S+ N at 40 mm.*overshoot"):
+    with pytest.raises(
+        SolveError, match=r"with a cycle of 0.1 s, the load pulls with -\S+ N at 40 mm.*overshoot"
+    ):
         choose(law, LIFT, dataclasses.replace(SIX_BAR, cycle_time=0.1))
 
 
@@ -278,7 +356,11 @@ def test_a_requirement_states_the_load_as_it_is_given():
 def test_a_law_that_depends_on_the_length_needs_the_length_at_which_it_is_evaluated():
     entry = effective_length()
     choice = choose(entry, LIFT, SIX_BAR)
-    assert choice.entry.characteristic.resting_length == choice.length == choice.entry.geometry.resting_length
+    assert (
+        choice.entry.characteristic.resting_length
+        == choice.length
+        == choice.entry.geometry.resting_length
+    )
     assert choice.length > 1.2 * choose(am.load("sarosi-dmsp-20-400n"), LIFT, SIX_BAR).length
 
 
@@ -305,7 +387,9 @@ def test_a_law_of_one_length_is_not_scaled():
         ("borzikova-monotone", ValidityRange(0.5e5, 3.5e5, 0.0, 0.3)),
     ],
 )
-def test_a_law_that_is_not_solved_for_the_force_is_sized_by_its_own_direction(name: str, limits: ValidityRange | None):
+def test_a_law_that_is_not_solved_for_the_force_is_sized_by_its_own_direction(
+    name: str, limits: ValidityRange | None
+):
     entry = am.load(name)
     entry = entry if limits is None else dataclasses.replace(entry, validity_range=limits)
     choice = choose(entry, LiftRequirement(stroke=0.02, force=60.0), SizingConditions(supply=4e5))
@@ -313,14 +397,20 @@ def test_a_law_that_is_not_solved_for_the_force_is_sized_by_its_own_direction(na
     for point in (choice.design.extended, choice.design.contracted):
         assert point.force == pytest.approx(60.0, rel=1e-9)
         if isinstance(law, PressureLaw):
-            assert float(law.pressure(point.contraction, 60.0)) == pytest.approx(point.pressure, rel=1e-9)
+            assert float(law.pressure(point.contraction, 60.0)) == pytest.approx(
+                point.pressure, rel=1e-9
+            )
         else:
-            assert float(law.contraction(point.pressure, 60.0)) == pytest.approx(point.contraction, rel=1e-9)
+            assert float(law.contraction(point.pressure, 60.0)) == pytest.approx(
+                point.contraction, rel=1e-9
+            )
 
 
 def test_a_muscle_is_used_up_to_the_end_of_its_table():
     for stroke in np.linspace(0.05, 0.09, 9):
-        choice = choose(am.load("festo-tool-dmsp-40"), LiftRequirement(stroke=float(stroke), mass=20.0), SIX_BAR)
+        choice = choose(
+            am.load("festo-tool-dmsp-40"), LiftRequirement(stroke=float(stroke), mass=20.0), SIX_BAR
+        )
         assert choice.design.contracted.contraction == pytest.approx(0.25, rel=1e-12)
 
 
@@ -329,12 +419,15 @@ def test_a_muscle_is_used_up_to_the_end_of_its_table():
 
 def test_two_muscles_in_parallel_each_hold_half_the_force():
     doubled = dataclasses.replace(LIFT, mass=2 * LIFT.mass)
-    one, two = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR), choose(am.load("dmsp-20-300"), doubled, SIX_BAR, 2)
+    one = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
+    two = choose(am.load("dmsp-20-300"), doubled, SIX_BAR, 2)
     assert two.length == pytest.approx(one.length, rel=1e-12)
     assert two.design.contracted.force == pytest.approx(one.design.contracted.force, rel=1e-12)
     assert two.air == pytest.approx(2 * one.air, rel=1e-9)
     same_load = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 2)
-    assert same_load.design.extended.force == pytest.approx(0.5 * one.design.extended.force, rel=1e-9)
+    assert same_load.design.extended.force == pytest.approx(
+        0.5 * one.design.extended.force, rel=1e-9
+    )
 
 
 def test_an_exact_number_is_the_only_one_that_is_tried():
@@ -348,15 +441,24 @@ def test_an_exact_number_is_the_only_one_that_is_tried():
 def test_a_load_that_decreases_over_the_stroke_takes_air_and_has_no_scenario():
     choice = choose(am.load("dmsp-20-300"), FALLING, SIX_BAR)
     assert choice.air > 0.0
-    with pytest.raises(SolveError, match="the scenario of a load that decreases over the stroke is not written"):
+    with pytest.raises(
+        SolveError, match="the scenario of a load that decreases over the stroke is not written"
+    ):
         scenario_text(choice)
 
 
 def test_a_number_that_is_neither_shorter_nor_takes_less_air_is_left_out():
     result = size_muscles(LIFT, SIX_BAR, [am.load("sarosi-dmsp-20-400n"), am.load("dmsp-20-300")])
-    by_name = {name: [c.count for c in result.choices if c.entry.name == name] for name in ("sarosi-dmsp-20-400n",)}
-    assert by_name["sarosi-dmsp-20-400n"] == [1]  # two are longer, because the least pressure limits them
-    assert choose(am.load("sarosi-dmsp-20-400n"), LIFT, SIX_BAR, 2).length > result.choices[-1].length
+    by_name = {
+        name: [c.count for c in result.choices if c.entry.name == name]
+        for name in ("sarosi-dmsp-20-400n",)
+    }
+    assert by_name["sarosi-dmsp-20-400n"] == [
+        1
+    ]  # two are longer, because the least pressure limits them
+    assert (
+        choose(am.load("sarosi-dmsp-20-400n"), LIFT, SIX_BAR, 2).length > result.choices[-1].length
+    )
 
 
 # Air and valves
@@ -365,9 +467,12 @@ def test_a_number_that_is_neither_shorter_nor_takes_less_air_is_left_out():
 @pytest.mark.parametrize("count", [1, 3])
 def test_the_air_of_a_cycle_is_the_difference_of_mass_by_the_gas_law(count: int):
     choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, count)
-    ambient, geometry = SIX_BAR.ambient, choice.entry.geometry
+    ambient = SIX_BAR.ambient
+    geometry = choice.entry.geometry
     masses = [
-        (point.pressure + ambient.pressure) * geometry.volume(point.contraction) / (GAS_CONSTANT * ambient.temperature)
+        (point.pressure + ambient.pressure)
+        * geometry.volume(point.contraction)
+        / (GAS_CONSTANT * ambient.temperature)
         for point in (choice.design.contracted, choice.design.extended)
     ]
     assert choice.air == pytest.approx(count * (masses[0] - masses[1]), rel=1e-12)
@@ -383,14 +488,21 @@ def test_a_joint_takes_the_air_of_both_muscles():
 def test_the_efficiency_is_the_work_per_available_energy_and_less_than_one():
     choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
     ratio = (6e5 + 101_325.0) / 101_325.0
-    assert choice.air_energy == pytest.approx(choice.air * GAS_CONSTANT * 293.15 * math.log(ratio), rel=1e-12)
+    assert choice.air_energy == pytest.approx(
+        choice.air * GAS_CONSTANT * 293.15 * math.log(ratio), rel=1e-12
+    )
     assert 0.0 < choice.efficiency == pytest.approx(LIFT.work / choice.air_energy, rel=1e-12)
     assert choice.efficiency < 1.0
 
 
 def test_a_muscle_without_geometry_has_no_air_and_no_diameter():
     choice = choose(am.load("festo-tool-dmsp-20"), LIFT, SIX_BAR)
-    assert (choice.air, choice.air_energy, choice.efficiency, choice.diameter) == (None, None, None, None)
+    assert (choice.air, choice.air_energy, choice.efficiency, choice.diameter) == (
+        None,
+        None,
+        None,
+        None,
+    )
     with pytest.raises(SolveError, match="has no geometry; valves and a scenario need it"):
         fill_valve(choice, 1.0)
 
@@ -398,15 +510,20 @@ def test_a_muscle_without_geometry_has_no_air_and_no_diameter():
 def test_a_valve_for_half_the_time_has_twice_the_conductance():
     choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
     for size in (fill_valve, discharge_valve):
-        assert size(choice, 0.5).conductance == pytest.approx(2 * size(choice, 1.0).conductance, rel=1e-12)
-    with pytest.raises(SolveError, match=r"sonic conductance of .*; allowed range: above 0 to 1000"):
+        assert size(choice, 0.5).conductance == pytest.approx(
+            2 * size(choice, 1.0).conductance, rel=1e-12
+        )
+    with pytest.raises(
+        SolveError, match=r"sonic conductance of .*; allowed range: above 0 to 1000"
+    ):
         fill_valve(choice, 1e-5)
 
 
 @pytest.mark.parametrize("size", [fill_valve, discharge_valve])
 def test_the_quasi_static_motion_through_a_valve_takes_the_wanted_time(size):
     choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
-    path, valve = air_path(choice), size(choice, 0.7)
+    path = air_path(choice)
+    valve = size(choice, 0.7)
     pressure = PchipInterpolator(path.mass, path.pressure)
     fills = size is fill_valve
 
@@ -440,13 +557,20 @@ def test_the_choices_are_ranked_by_air_then_length_and_by_other_criteria():
     assert unknown == sorted(unknown)
     lengths = [choice.length for choice in size_muscles(LIFT, SIX_BAR, entries, by_length).choices]
     assert lengths == sorted(lengths)
-    reserves = [choice.design.reserve for choice in size_muscles(LIFT, SIX_BAR, entries, by_reserve).choices]
+    reserves = [
+        choice.design.reserve for choice in size_muscles(LIFT, SIX_BAR, entries, by_reserve).choices
+    ]
     assert reserves == sorted(reserves, reverse=True)
 
 
 @pytest.mark.parametrize("sort", [by_air, by_count, by_diameter, by_length, by_reserve])
-def test_a_criterion_is_a_function_of_a_choice_which_it_names_where_it_receives_something_else(sort):
-    with pytest.raises(ParameterError, match=f"{sort.__name__}: choice must be an instance of MuscleChoice; it is 'x'"):
+def test_a_criterion_is_a_function_of_a_choice_which_it_names_where_it_receives_something_else(
+    sort,
+):
+    with pytest.raises(
+        ParameterError,
+        match=f"{sort.__name__}: choice must be an instance of MuscleChoice; it is 'x'",
+    ):
         sort("x")
 
 
@@ -470,7 +594,9 @@ def test_the_permitted_force_of_the_maker_limits_the_muscle():
 def test_an_outer_diameter_beyond_the_limit_is_refused():
     narrow = dataclasses.replace(SIX_BAR, max_diameter=0.02)
     assert choose(am.load("dmsp-10-250"), LIFT, narrow, 2).diameter < 0.02
-    with pytest.raises(ParameterError, match=r"at the contracted end is .* mm; at most 20 mm is allowed"):
+    with pytest.raises(
+        ParameterError, match=r"at the contracted end is .* mm; at most 20 mm is allowed"
+    ):
         choose(am.load("dmsp-20-300"), LIFT, narrow)
     with pytest.raises(ParameterError, match="diameter is not known"):
         choose(am.load("festo-tool-dmsp-20"), LIFT, narrow)
@@ -481,43 +607,55 @@ def test_an_outer_diameter_beyond_the_limit_is_refused():
 
 def test_an_unreachable_load_states_the_reason_and_what_is_reachable():
     result = size_muscles(dataclasses.replace(LIFT, mass=500.0), SIX_BAR, [am.load("dmsp-20-300")])
-    with pytest.raises(SolveError, match=r"force at 6 bar and 1.333 % is 1445 N; 2501 N is needed") as error:
+    with pytest.raises(
+        SolveError, match=r"force at 6 bar and 1.333 % is 1445 N; 2501 N is needed"
+    ) as error:
         result.check_reachable()
     assert "Reachable: " in str(error.value)
     assert "3 x dmsp-20-300" in str(error.value)
 
 
 def test_a_result_shows_its_choices_or_what_is_reachable():
-    found, none = (size_muscles(dataclasses.replace(LIFT, mass=mass), SIX_BAR, (am.load("dmsp-20-300"),))
-                   for mass in (20.0, 500.0))  # fmt: skip
+    found, none = (
+        size_muscles(dataclasses.replace(LIFT, mass=mass), SIX_BAR, (am.load("dmsp-20-300"),))
+        for mass in (20.0, 500.0)
+    )
     assert "The best choice is 1 x festo-dmsp-20" in str(pickle.loads(pickle.dumps(found)))
     assert "No muscle meets the requirement" in str(none)
     assert "Reachable: " in none._repr_html_()
 
 
 def test_what_is_stated_as_reachable_is_reachable_and_more_is_not():
-    entry, short = am.load("dmsp-20-300"), dataclasses.replace(SIX_BAR, max_length=0.15, max_count=1)
+    entry = am.load("dmsp-20-300")
+    short = dataclasses.replace(SIX_BAR, max_length=0.15, max_count=1)
     with pytest.raises(SolveError, match=r"over 40 mm: dmsp-20-300: with 150 mm") as error:
         size_muscles(LIFT, short, [entry]).check_reachable()
-    stroke = 1e-3 * float(re.search(r"196\.1 N\) over ([\d.]+) mm \(1 x dmsp-20-300", str(error.value))[1])
+    stroke = 1e-3 * float(
+        re.search(r"196\.1 N\) over ([\d.]+) mm \(1 x dmsp-20-300", str(error.value))[1]
+    )
     assert choose(entry, dataclasses.replace(LIFT, stroke=stroke), short).length <= 0.15
     with pytest.raises(SolveError):
         choose(entry, dataclasses.replace(LIFT, stroke=1.02 * stroke), short)
 
 
 def test_a_stroke_that_is_too_long_states_the_contraction():
-    with pytest.raises(SolveError, match="with 150 mm, the stroke needs a contraction of 28 %; 25 % is allowed"):
+    with pytest.raises(
+        SolveError, match="with 150 mm, the stroke needs a contraction of 28 %; 25 % is allowed"
+    ):
         choose(am.load("dmsp-20-300"), LIFT, dataclasses.replace(SIX_BAR, max_length=0.15))
 
 
 def test_a_supply_above_the_permitted_pressure_is_refused():
-    with pytest.raises(ParameterError, match="supply pressure of 9 bar exceeds the permitted 6 bar; reduce it"):
+    with pytest.raises(
+        ParameterError, match="supply pressure of 9 bar exceeds the permitted 6 bar; reduce it"
+    ):
         choose(am.load("dmsp-20-300"), LIFT, SizingConditions(supply=9e5))
 
 
 def test_a_supply_below_the_validity_range_is_refused():
     with pytest.raises(
-        ParameterError, match=r"its law is valid from 3 to 6\.2 bar; the working range is 0\.1 to 2 bar"
+        ParameterError,
+        match=r"its law is valid from 3 to 6\.2 bar; the working range is 0\.1 to 2 bar",
     ):
         choose(am.load("festo-tool-dmsp-10"), LIFT, SizingConditions(supply=2e5))
 
@@ -526,18 +664,22 @@ def test_a_load_below_the_least_force_is_refused():
     entry = am.load("sarosi-dmsp-20-400n")
     narrow = dataclasses.replace(entry, validity_range=ValidityRange(1e5, 5e5, 0.0, 0.05))
     with pytest.raises(
-        SolveError, match=r"the load at the start, 9.807 N, is less than the force at the least pressure"
+        SolveError,
+        match=r"the load at the start, 9.807 N, is less than the force at the least pressure",
     ):
         choose(narrow, dataclasses.replace(LIFT, mass=1.0, stroke=0.01), SIX_BAR)
 
 
 def test_a_joint_beyond_the_length_states_the_torque():
-    with pytest.raises(SolveError, match=r"with 60 mm, the torque at the ends is at most .* N m; 7.5 N m is needed"):
+    with pytest.raises(
+        SolveError, match=r"with 60 mm, the torque at the ends is at most .* N m; 7.5 N m is needed"
+    ):
         choose(am.load("dmsp-20-300"), JOINT, dataclasses.replace(SIX_BAR, max_length=0.06))
 
 
 def test_a_joint_limited_by_its_inertia_states_the_torque_with_that_of_the_inertia():
-    heavy, short = dataclasses.replace(JOINT, inertia=100.0), dataclasses.replace(SIX_BAR, max_length=0.15)
+    heavy = dataclasses.replace(JOINT, inertia=100.0)
+    short = dataclasses.replace(SIX_BAR, max_length=0.15)
     torque = heavy.torque + heavy.acceleration_torque(short.cycle_time)
     with pytest.raises(SolveError, match=r"with that of the inertia") as error:
         choose(am.load("dmsp-20-300"), heavy, short)
@@ -552,45 +694,60 @@ def test_a_joint_limited_by_its_inertia_states_the_torque_with_that_of_the_inert
         choose(am.load("dmsp-20-300"), heavy.reduced(load=1.001 * share), short)
 
 
-@pytest.mark.parametrize("make", [
-    lambda: LiftRequirement(stroke=0.0, mass=1.0),
-    lambda: LiftRequirement(stroke=-0.04, mass=1.0),
-    lambda: LiftRequirement(stroke=math.nan, mass=1.0),
-    lambda: LiftRequirement(stroke=0.04, mass=-1.0),
-    lambda: LiftRequirement(stroke=0.04, force=math.inf),
-    lambda: LiftRequirement(stroke=0.04),
-    lambda: LiftRequirement(stroke=0.04, force=100.0, stiffness=-5000.0),
-    lambda: LiftRequirement(stroke="40 kg", mass=1.0),
-    lambda: JointRequirement(angle=0.0, torque=1.0),
-    lambda: JointRequirement(angle=1.0, torque=-1.0),
-    lambda: JointRequirement(angle=1.0, torque=0.0),
-    lambda: JointRequirement(angle=7.0, torque=1.0),
-    lambda: SizingConditions(supply=0.0),
-    lambda: SizingConditions(supply=math.nan),
-    lambda: SizingConditions(supply=6e5, safety_factor=1.0),
-    lambda: SizingConditions(supply=6e5, cycle_time=0.0),
-    lambda: SizingConditions(supply=6e5, max_count=0),
-    lambda: SizingConditions(supply=6e5, max_count=True),
-    lambda: SizingConditions(supply=2e4, min_pressure=3e4),
-    lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 0),
-    lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 1.5),
-    lambda: size_muscles(LIFT, SIX_BAR, []),
-    lambda: size_muscles(LIFT, SIX_BAR, ["dmsp-20-300"]),
-    lambda: size_muscles("20 kg", SIX_BAR),
-    lambda: size_muscles(LIFT, SIX_BAR, [am.load("dmsp-20-300")], sort="air"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: LiftRequirement(stroke=0.0, mass=1.0),
+        lambda: LiftRequirement(stroke=-0.04, mass=1.0),
+        lambda: LiftRequirement(stroke=math.nan, mass=1.0),
+        lambda: LiftRequirement(stroke=0.04, mass=-1.0),
+        lambda: LiftRequirement(stroke=0.04, force=math.inf),
+        lambda: LiftRequirement(stroke=0.04),
+        lambda: LiftRequirement(stroke=0.04, force=100.0, stiffness=-5000.0),
+        lambda: LiftRequirement(stroke="40 kg", mass=1.0),
+        lambda: JointRequirement(angle=0.0, torque=1.0),
+        lambda: JointRequirement(angle=1.0, torque=-1.0),
+        lambda: JointRequirement(angle=1.0, torque=0.0),
+        lambda: JointRequirement(angle=7.0, torque=1.0),
+        lambda: SizingConditions(supply=0.0),
+        lambda: SizingConditions(supply=math.nan),
+        lambda: SizingConditions(supply=6e5, safety_factor=1.0),
+        lambda: SizingConditions(supply=6e5, cycle_time=0.0),
+        lambda: SizingConditions(supply=6e5, max_count=0),
+        lambda: SizingConditions(supply=6e5, max_count=True),
+        lambda: SizingConditions(supply=2e4, min_pressure=3e4),
+        lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 0),
+        lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 1.5),
+        lambda: size_muscles(LIFT, SIX_BAR, []),
+        lambda: size_muscles(LIFT, SIX_BAR, ["dmsp-20-300"]),
+        lambda: size_muscles("20 kg", SIX_BAR),
+        lambda: size_muscles(LIFT, SIX_BAR, [am.load("dmsp-20-300")], sort="air"),
+    ],
+)
 def test_wrong_input_is_refused_with_a_sentence(make):
     with pytest.raises(AirmuscleError) as error:
         make()
-    assert re.search(r"allowed range|must be|give |cannot be converted|expected", str(error.value)), str(error.value)
+    assert re.search(
+        r"allowed range|must be|give |cannot be converted|expected", str(error.value)
+    ), str(error.value)
 
 
 def test_a_new_muscle_of_ones_own_is_sized_as_those_of_the_library():
     law = am.load("dmsp-20-300").characteristic
     assert isinstance(law, MartensBoblan2017)
-    own = Entry("own", "A muscle of my own", "chosen", law, law.geometry,
-                validity_range=ValidityRange(3e4, 7e5, 0.0, 0.25), ratings=Ratings(max_force=1200.0))  # fmt: skip
-    assert choose(own, LIFT, SIX_BAR).length < choose(am.load("dmsp-20-300"), LIFT, SIX_BAR).length * 1.01
+    own = Entry(
+        "own",
+        "A muscle of my own",
+        "chosen",
+        law,
+        law.geometry,
+        validity_range=ValidityRange(3e4, 7e5, 0.0, 0.25),
+        ratings=Ratings(max_force=1200.0),
+    )
+    assert (
+        choose(own, LIFT, SIX_BAR).length
+        < choose(am.load("dmsp-20-300"), LIFT, SIX_BAR).length * 1.01
+    )
 
 
 def test_the_work_of_a_joint_is_the_torque_over_the_angle_in_both_directions():
@@ -598,10 +755,16 @@ def test_the_work_of_a_joint_is_the_torque_over_the_angle_in_both_directions():
 
 
 def test_the_diameter_is_twice_the_largest_radius_or_that_of_a_braid_at_25_per_cent():
-    """Without a geometry: a braid of 25 degrees, contracted by 25 %, is sin(theta)/sin(25) = 1.75 times as thick."""
+    """Without a geometry: a braid of 25 degrees, contracted by 25 %, is sin(theta)/sin(25) = 1.75
+    times as thick.
+    """
     cylinder = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR).muscle
-    assert cylinder.diameter(0.1) == pytest.approx(2 * max(cylinder.entry.geometry.outline(0.1)[1]), rel=1e-12)
-    assert cylinder.outer_diameter(np.array([0.1])) == pytest.approx(cylinder.diameter(0.1), rel=1e-3)
+    assert cylinder.diameter(0.1) == pytest.approx(
+        2 * max(cylinder.entry.geometry.outline(0.1)[1]), rel=1e-12
+    )
+    assert cylinder.outer_diameter(np.array([0.1])) == pytest.approx(
+        cylinder.diameter(0.1), rel=1e-3
+    )
     theta = math.acos(0.75 * math.cos(math.radians(25.0)))
     table = choose(am.load("festo-tool-dmsp-40"), LIFT, SIX_BAR).muscle
     ratio = table.outer_diameter(np.array([0.1])) / 0.040
@@ -612,7 +775,11 @@ def test_the_row_of_a_choice_states_air_a_minute_and_efficiency_of_the_choice():
     choice = choose(am.load("dmsp-20-300"), LIFT, dataclasses.replace(SIX_BAR, cycle_time=3.0))
     result = SizingResult(LIFT, choice.conditions, (choice,), (), (choice.entry,))
     (table,) = [each for each in result.chapter().tables if each.name == "air"]
-    row = {name: column.values[0] for name, column in table.columns.items() if hasattr(column, "values")}
+    row = {
+        name: column.values[0]
+        for name, column in table.columns.items()
+        if hasattr(column, "values")
+    }
     assert row["air a minute"] == pytest.approx(20 * row["air a cycle"], rel=1e-12)
     assert row["air a cycle"] == pytest.approx(choice.reference_volume, rel=1e-12)
     assert row["efficiency"] == pytest.approx(choice.efficiency, rel=1e-12)

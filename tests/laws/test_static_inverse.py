@@ -1,6 +1,7 @@
-"""The static inverse is the root of F(p, eps) = F for every traceable force law: the force at its pressure is the wanted
-one to 1e-9 of the force range, and a force that the range cannot produce gives the nearer limit. Of an antagonistic
-joint, the pressures give the wanted torque and stiffness, and where they cannot, the torque.
+"""The static inverse is the root of F(p, eps) = F for every traceable force law: the force at its
+pressure is the wanted one to 1e-9 of the force range, and a force that the range cannot produce
+gives the nearer limit. Of an antagonistic joint, the pressures give the wanted torque and
+stiffness, and where they cannot, the torque.
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ from airmuscle.control import StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.errors import ParameterError
 from airmuscle.files.library import LAWS as LAW_FILES
-from airmuscle.physics import CubicSpring, EndStop, ForceLaw, HuntCrossley, SeriesSpring, ValidityRange, as_force_law
+from airmuscle.physics import (
+    CubicSpring,
+    EndStop,
+    ForceLaw,
+    HuntCrossley,
+    SeriesSpring,
+    ValidityRange,
+    as_force_law,
+)
 
 
 def force_laws():
@@ -42,7 +51,8 @@ def test_the_force_at_the_pressure_of_the_inverse_is_the_wanted_one(name):
     force = inverse.force(pressure, contraction)
     rising = (np.diff(force, axis=0) > 0).all(axis=0)
     assert rising.sum() >= 5
-    taut, contractions = force[:, rising], np.broadcast_to(contraction, force.shape)[:, rising]
+    taut = force[:, rising]
+    contractions = np.broadcast_to(contraction, force.shape)[:, rising]
     found = inverse.pressure(contractions, taut)
     assert np.abs(inverse.force(found, contractions) - taut).max() <= 1e-9 * np.abs(taut).max()
 
@@ -58,7 +68,8 @@ def test_the_inverse_of_a_muscle_includes_its_parallel_spring_and_its_end_stop(c
     """In front of the stop and behind it, where the stop carries a part of the tension."""
     stop = EndStop(0.1, HuntCrossley(1e6))
     muscle = dataclasses.replace(MUSCLES[0], spring=CubicSpring(2000.0, 20.0), stop=stop)
-    pressure, length = np.linspace(2e5, 5e5, 7), muscle.geometry.resting_length
+    pressure = np.linspace(2e5, 5e5, 7)
+    length = muscle.geometry.resting_length
     spring = 2000.0 * contraction * length * (1.0 + 20.0 * contraction**2)
     carried = spring + 1e6 * (max(contraction - 0.1, 0.0) * length) ** 1.5
     tension = muscle.contractile.force(pressure, contraction) - carried
@@ -71,11 +82,21 @@ def test_the_feed_forward_pressure_carries_the_load_and_accelerates_the_mass_at_
     named, load, acceleration
 ):
     law = StaticFeedForward(
-        StaticInverse(MUSCLES[0]), "pressure", 0.3, load=120.0, mass=8.0, offset=0.04, load_setpoint=named,
+        StaticInverse(MUSCLES[0]),
+        "pressure",
+        0.3,
+        load=120.0,
+        mass=8.0,
+        offset=0.04,
+        load_setpoint=named,
         acceleration_setpoint="acceleration",
-    )  # fmt: skip
-    pressure = law.command({"position": 0.02, "acceleration": acceleration, "load": load})["pressure"]
-    assert MUSCLES[0].tension(pressure, 0.04 + 0.02 / 0.3) == pytest.approx(load + 8.0 * acceleration, rel=1e-9)
+    )
+    pressure = law.command({"position": 0.02, "acceleration": acceleration, "load": load})[
+        "pressure"
+    ]
+    assert MUSCLES[0].tension(pressure, 0.04 + 0.02 / 0.3) == pytest.approx(
+        load + 8.0 * acceleration, rel=1e-9
+    )
 
 
 def test_the_inverse_of_an_approximated_law_errs_by_no_more_than_its_stated_error():
@@ -87,7 +108,9 @@ def test_the_inverse_of_an_approximated_law_errs_by_no_more_than_its_stated_erro
         for pressure in (0.8e5, 1.5e5, 2.2e5):
             force = float(law.force(pressure, contraction))
             slope = surrogate.slopes(pressure, contraction).by_pressure
-            assert abs(inverse.pressure(contraction, force) - pressure) <= surrogate.max_error / slope
+            assert (
+                abs(inverse.pressure(contraction, force) - pressure) <= surrogate.max_error / slope
+            )
 
 
 def test_the_inverse_is_traced_with_its_derivatives():
@@ -98,9 +121,13 @@ def test_the_inverse_is_traced_with_its_derivatives():
 
 
 def test_what_cannot_be_inverted_is_refused():
-    with pytest.raises(ParameterError, match=r"has no closed form\. Approximate it first: as_force_law"):
+    with pytest.raises(
+        ParameterError, match=r"has no closed form\. Approximate it first: as_force_law"
+    ):
         StaticInverse(untraceable())
-    spring = dataclasses.replace(MUSCLES[0], series=SeriesSpring(2e5), damper=am.LinearDamper(200.0))
+    spring = dataclasses.replace(
+        MUSCLES[0], series=SeriesSpring(2e5), damper=am.LinearDamper(200.0)
+    )
     with pytest.raises(ParameterError, match="has a series spring, whose stretch"):
         StaticInverse(spring)
     with pytest.raises(ParameterError, match="min_pressure 700000 must be less than max_pressure"):
@@ -119,7 +146,9 @@ def untraceable() -> ForceLaw:
 
 @given(st.floats(-0.5, 0.5), st.floats(1.0e5, 4e5), st.floats(1.0e5, 4e5))
 def test_torque_and_stiffness_of_two_pressures_give_these_pressures(angle, first, second):
-    torque, stiffness = (float(getattr(INVERSE, name)(first, second, angle)) for name in ("torque", "stiffness"))
+    torque, stiffness = (
+        float(getattr(INVERSE, name)(first, second, angle)) for name in ("torque", "stiffness")
+    )
     found = INVERSE.pressures(angle, torque, stiffness)
     assert found == pytest.approx((first, second), rel=1e-8)
 
@@ -133,13 +162,17 @@ def test_beyond_the_range_of_stiffness_the_torque_remains():
 
 
 def test_a_stiffness_that_would_slacken_a_muscle_keeps_both_at_the_minimum_tension():
-    """Without this limit the unclamped force law answers with a pressure at which the muscle is slack."""
+    """Without this limit the unclamped force law answers with a pressure at which the muscle is
+    slack.
+    """
     inverse = dataclasses.replace(INVERSE, min_pressure=0.0)
     first, second = inverse.pressures(0.3, 0.5, 0.0)
     lowest = inverse.slack_limits(0.3)
     lengths = [muscle.geometry.resting_length for muscle in MUSCLES]
     contractions = MECHANISM.contractions({"angle": 0.3}, lengths)
-    tensions = [m.static_force(p, c) for m, p, c in zip(MUSCLES, (first, second), contractions, strict=True)]
+    tensions = [
+        m.static_force(p, c) for m, p, c in zip(MUSCLES, (first, second), contractions, strict=True)
+    ]
     assert min(tensions) == pytest.approx(inverse.min_tension, rel=1e-6)
     assert first >= lowest[0]
     assert second >= lowest[1]

@@ -1,4 +1,6 @@
-"""Models of one specimen: springs of Reynolds and Serres in N/mm, pressure of Hunt with the direction of motion."""
+"""Models of one specimen: springs of Reynolds and Serres in N/mm, pressure of Hunt with the
+direction of motion.
+"""
 
 from __future__ import annotations
 
@@ -29,8 +31,14 @@ def test_the_spring_of_reynolds_is_the_printed_one_for_every_length(law):
 def test_the_two_lines_of_serres_intersect_at_the_printed_pressure():
     """32.7 - 0.0321 P up to 314 kPa, 17 + 0.0179 P beyond, in N/mm."""
     law = Serres2009(0.2)
-    for kilopascal, expected in ((150, 32.7 - 0.0321 * 150), (313, 32.7 - 0.0321 * 313), (315, 17 + 0.0179 * 315)):
-        assert law.stiffness(kilopascal * 1e3, 0.05) / 0.2 == pytest.approx(expected * 1e3, rel=1e-12)
+    for kilopascal, expected in (
+        (150, 32.7 - 0.0321 * 150),
+        (313, 32.7 - 0.0321 * 313),
+        (315, 17 + 0.0179 * 315),
+    ):
+        assert law.stiffness(kilopascal * 1e3, 0.05) / 0.2 == pytest.approx(
+            expected * 1e3, rel=1e-12
+        )
     assert pytest.approx(314.0) == (32.7 - 17) / (0.0321 + 0.0179)
 
 

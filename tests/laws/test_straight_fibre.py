@@ -1,7 +1,9 @@
-"""Straight fibres: the integrals of every meridian are those of its curve, and its arc is the fibre length.
+"""Straight fibres: the integrals of every meridian are those of its curve, and its arc is the fibre
+length.
 
-Reference values are of the muscle of Table 1 of Saga et al. 2007 (l0 = 72 mm, r0 = 6 mm), computed from the closed
-forms independently of this code. dV/deps is exact, and the tension of the ideal muscle is (p dV/deps)/L0.
+Reference values are of the muscle of Table 1 of Saga et al. 2007 (l0 = 72 mm, r0 = 6 mm), computed
+from the closed forms independently of this code. dV/deps is exact, and the tension of the ideal
+muscle is (p dV/deps)/L0.
 """
 
 import numpy as np
@@ -27,8 +29,12 @@ from airmuscle.physics import (
 )
 from airmuscle.physics.muscle.geometry.meridian import stumpff
 
-L0, D0 = 0.072, 0.012
-CIRCLE, CATENARY, TRUE_ARC, PARABOLA = CircularArc(), Catenary(), TrueArcParabola(), Parabola()
+L0 = 0.072
+D0 = 0.012
+CIRCLE = CircularArc()
+CATENARY = Catenary()
+TRUE_ARC = TrueArcParabola()
+PARABOLA = Parabola()
 MERIDIANS = (CIRCLE, CATENARY, TRUE_ARC, PARABOLA)
 KEEP_THEIR_ARC = (CIRCLE, CATENARY, TRUE_ARC)
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
@@ -63,7 +69,8 @@ OUTLINES = """
 NAMES = {"circle": CIRCLE, "catenary": CATENARY, "true-arc": TRUE_ARC, "parabola": PARABOLA}
 ROWS = [line.split() for line in OUTLINES.strip().splitlines()]
 
-# exact outline: contraction %, mu, theta0, R mm, phi0 deg, F/p mm2, V mm3, Int r dx mm2, G mm2, Q mm3
+# exact outline: contraction %, mu, theta0, R mm, phi0 deg, F/p mm2, V mm3, Int r dx mm2, G mm2, Q
+# mm3
 EXACT = """
 1 0.0195524 0.959971 10.46128 13.1548 8448.226 18282.69 636.9107 210.5410 746.089
 5 0.0703416 1.184359 15.91973 28.4419 4863.313 35726.51 857.9861 462.2634 3623.047
@@ -101,7 +108,8 @@ def tube(meridian, rings=0):
 @pytest.mark.parametrize("row", ROWS, ids=lambda r: f"{r[1]}-{r[0]}")
 def test_outlines_agree_with_the_reference_table(row):
     percent, name, shape, radius, slope, volume, section, arc_excess = row
-    contraction, meridian = float(percent) / 100, NAMES[name]
+    contraction = float(percent) / 100
+    meridian = NAMES[name]
     segment = tube(meridian).segment(contraction)
     found = {
         "circle": lambda: np.sqrt(meridian.angle_squared(contraction)),
@@ -123,8 +131,10 @@ def test_integrals_are_those_of_the_profile(meridian, contraction):
     segment = tube(meridian).segment(contraction)
     points = 20001
     x, r = meridian.profile(contraction, L0, D0 / 2, np.linspace(-1, 1, points))
-    dx, dr = np.diff(x), np.diff(r)
-    ds, middle = np.hypot(dx, dr), (r[1:] + r[:-1]) / 2
+    dx = np.diff(x)
+    dr = np.diff(r)
+    ds = np.hypot(dx, dr)
+    middle = (r[1:] + r[:-1]) / 2
     rise = middle - D0 / 2
     assert segment.length == pytest.approx(dx.sum(), rel=1e-12)
     assert segment.arc == pytest.approx(ds.sum(), rel=1e-7)
@@ -133,7 +143,9 @@ def test_integrals_are_those_of_the_profile(meridian, contraction):
     assert segment.arc_excess == pytest.approx((rise * ds).sum(), rel=1e-6)
     assert segment.arc_excess_squared == pytest.approx((rise**2 * ds).sum(), rel=1e-6)
     assert segment.volume == pytest.approx((np.pi * middle**2 * dx).sum(), rel=1e-6)
-    assert np.arctan2(segment.end_sine, segment.end_cosine) == pytest.approx(np.arctan2(dr[0], dx[0]), abs=2e-4)
+    assert np.arctan2(segment.end_sine, segment.end_cosine) == pytest.approx(
+        np.arctan2(dr[0], dx[0]), abs=2e-4
+    )
 
 
 @pytest.mark.parametrize("meridian", KEEP_THEIR_ARC, ids=lambda m: type(m).__name__)
@@ -141,20 +153,32 @@ def test_newton_solves_the_shape_equation_to_rounding_over_its_whole_range(merid
     contraction = np.concatenate([np.geomspace(1e-12, 0.01, 40), np.linspace(0.011, 0.5, 200)])
     if meridian is CIRCLE:
         z = meridian.angle_squared(contraction)
-        solved = [brentq(lambda a, c=c: np.sin(a) / a - (1 - c), 0.05, 2.0, xtol=1e-15) for c in (0.1, 0.3, 0.45)]
+        solved = [
+            brentq(lambda a, c=c: np.sin(a) / a - (1 - c), 0.05, 2.0, xtol=1e-15)
+            for c in (0.1, 0.3, 0.45)
+        ]
         error = z * stumpff(3, -z) / contraction - 1
     elif meridian is CATENARY:
         z = meridian.shape_squared(contraction)
-        solved = [brentq(lambda u, c=c: u / np.sinh(u) - (1 - c), 0.05, 3.0, xtol=1e-15) for c in (0.1, 0.3, 0.45)]
+        solved = [
+            brentq(lambda u, c=c: u / np.sinh(u) - (1 - c), 0.05, 3.0, xtol=1e-15)
+            for c in (0.1, 0.3, 0.45)
+        ]
         error = z * stumpff(3, z) / (contraction / (1 - contraction)) - 1
     else:
         z = meridian.slope_squared(contraction)
         solved = [brentq(_true_arc, 0.05, 5.0, args=(c,), xtol=1e-15) for c in (0.1, 0.3, 0.45)]
-        arc = np.array([quad(lambda t, a=a: a * t * t / (1 + np.sqrt(1 + a * t * t)), 0, 1)[0] for a in z])
+        arc = np.array(
+            [quad(lambda t, a=a: a * t * t / (1 + np.sqrt(1 + a * t * t)), 0, 1)[0] for a in z]
+        )
         error = arc / (contraction / (1 - contraction)) - 1
     assert np.abs(error).max() < 5e-15
-    method = {CIRCLE: "angle_squared", CATENARY: "shape_squared", TRUE_ARC: "slope_squared"}[meridian]
-    assert [np.sqrt(getattr(meridian, method)(c)) for c in (0.1, 0.3, 0.45)] == pytest.approx(solved, rel=3e-15)
+    method = {CIRCLE: "angle_squared", CATENARY: "shape_squared", TRUE_ARC: "slope_squared"}[
+        meridian
+    ]
+    assert [np.sqrt(getattr(meridian, method)(c)) for c in (0.1, 0.3, 0.45)] == pytest.approx(
+        solved, rel=3e-15
+    )
 
 
 def _true_arc(u, contraction):
@@ -176,7 +200,9 @@ def test_the_closed_form_derivatives_of_the_circle_are_those_of_its_integrals():
     shape = tube(CIRCLE)
     z = CIRCLE.angle_squared(contraction)
     growth = CIRCLE.derivatives_times_angle(z, L0, D0 / 2)
-    assert growth.volume / np.sqrt(z) == pytest.approx(autodiff.derivative(shape, "volume", contraction), rel=1e-12)
+    assert growth.volume / np.sqrt(z) == pytest.approx(
+        autodiff.derivative(shape, "volume", contraction), rel=1e-12
+    )
     step = 1e-3 * contraction
     for name in ("arc_excess", "arc_excess_squared"):
         ends = [getattr(shape.segment(contraction + n * step), name) for n in (-2, -1, 1, 2)]
@@ -186,13 +212,17 @@ def test_the_closed_form_derivatives_of_the_circle_are_those_of_its_integrals():
 
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
 def test_small_contractions_are_accurate(meridian):
-    """To first order in sqrt(eps): tan(phi0) = sqrt(6 eps), G = l0^2 sqrt(6 eps)/6, Q = l0^3 6 eps/30."""
+    """To first order in sqrt(eps): tan(phi0) = sqrt(6 eps), G = l0^2 sqrt(6 eps)/6, Q = l0^3 6
+    eps/30.
+    """
     for contraction in (1e-14, 1e-10, 1e-8):
         u = np.sqrt(6 * contraction)
         segment = tube(meridian).segment(contraction)
         assert segment.end_slope == pytest.approx(u, rel=20 * u + 1e-15)
         assert segment.arc_excess == pytest.approx(L0**2 * u / 6, rel=20 * u**2 + 1e-15)
-        assert segment.arc_excess_squared == pytest.approx(L0**3 * u**2 * 8 / 15 / 16, rel=20 * u**2 + 1e-15)
+        assert segment.arc_excess_squared == pytest.approx(
+            L0**3 * u**2 * 8 / 15 / 16, rel=20 * u**2 + 1e-15
+        )
 
 
 def test_rest_is_a_cylinder():
@@ -227,7 +257,8 @@ def test_contractions_of_maximum_volume_agree_with_the_reference(shape, percent)
 def test_the_exact_outline_agrees_with_its_reference_table(row):
     contraction = row[0] / 100
     shape = PleatedTube(L0, D0)
-    ellipse, segment = shape.elliptic_outline(contraction), shape.segment(contraction)
+    ellipse = shape.elliptic_outline(contraction)
+    segment = shape.segment(contraction)
     found = (
         ellipse.parameter,
         ellipse.angle,
@@ -252,10 +283,17 @@ def test_rings_divide_the_exact_muscle(rings):
 
 
 def test_free_contraction_with_rings_and_of_a_slender_muscle():
-    assert [round(100 * PleatedTube(L0, D0, n).free_contraction, 4) for n in (0, 1, 2)] == [46.8835, 40.2520, 34.5741]
+    assert [round(100 * PleatedTube(L0, D0, n).free_contraction, 4) for n in (0, 1, 2)] == [
+        46.8835,
+        40.2520,
+        34.5741,
+    ]
     slender = PleatedTube(20.0, 2e-4)
     assert 100 * slender.free_contraction == pytest.approx(54.3053, abs=2e-3)
-    ends = [1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).max_radius for n in (0, 1, 2)]
+    ends = [
+        1e3 * PleatedTube(L0, D0, n).segment(PleatedTube(L0, D0, n).free_contraction).max_radius
+        for n in (0, 1, 2)
+    ]
     assert np.round(ends, 4).tolist() == [32.0365, 18.3115, 13.7465]
 
 
@@ -269,14 +307,20 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
     growth = ends @ weights / step
     scale = np.pi * shape.end_radius**2
-    assert shape.effective_area(contraction) == pytest.approx(growth / L0, rel=1e-9, abs=1e-8 * scale)
-    assert shape.volume_derivative(contraction) == pytest.approx(growth, rel=1e-9, abs=1e-8 * scale * L0)
+    assert shape.effective_area(contraction) == pytest.approx(
+        growth / L0, rel=1e-9, abs=1e-8 * scale
+    )
+    assert shape.volume_derivative(contraction) == pytest.approx(
+        growth, rel=1e-9, abs=1e-8 * scale * L0
+    )
 
 
 @given(contraction=st.floats(1e-6, 0.49))
 @pytest.mark.slow
 def test_the_exact_half_shell_balances(contraction):
-    """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell is balanced at its ends."""
+    """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell is
+    balanced at its ends.
+    """
     shape = PleatedTube(L0, D0)
     segment, mu = shape.segment(contraction), shape.elliptic_outline(contraction).parameter
     fibre = segment.max_radius**2 / (2 * mu)
@@ -308,7 +352,9 @@ def test_the_exact_outline_solves_its_differential_equation(contraction):
 
 
 def test_small_contraction_of_the_exact_outline_follows_its_limit():
-    """F/p -> pi r0 l0/sqrt(6 eps) + pi (l0^2/5 - r0^2): too large by 2.6e-4, 2.6e-3, 2.7e-2 at 1e-4, 1e-3, 1e-2."""
+    """F/p -> pi r0 l0/sqrt(6 eps) + pi (l0^2/5 - r0^2): too large by 2.6e-4, 2.6e-3, 2.7e-2 at
+    1e-4, 1e-3, 1e-2.
+    """
     contraction = np.array([1e-4, 1e-3, 1e-2])
     r0 = D0 / 2
     limit = np.pi * r0 * L0 / np.sqrt(6 * contraction) + np.pi * (L0**2 / 5 - r0**2)
@@ -318,8 +364,11 @@ def test_small_contraction_of_the_exact_outline_follows_its_limit():
 
 @given(contraction=st.floats(0.02, 0.44), rings=st.integers(1, 4))
 def test_rings_are_segments_in_series(contraction, rings):
-    whole, part = tube(CIRCLE, rings), StraightFibre(L0 / (rings + 1), D0, 0, CIRCLE)
-    assert whole.volume(contraction) == pytest.approx((rings + 1) * part.volume(contraction), rel=1e-14)
+    whole = tube(CIRCLE, rings)
+    part = StraightFibre(L0 / (rings + 1), D0, 0, CIRCLE)
+    assert whole.volume(contraction) == pytest.approx(
+        (rings + 1) * part.volume(contraction), rel=1e-14
+    )
     x, r = whole.outline(contraction, 601)
     assert x[-1] - x[0] == pytest.approx(L0 * (1 - contraction), rel=1e-12)
     assert r.max() <= part.segment(contraction).max_radius * (1 + 1e-12)
@@ -328,25 +377,37 @@ def test_rings_are_segments_in_series(contraction, rings):
 
 
 def test_fibre_sums():
-    assert [round(s.sum_of_sines(16), 5) for s in (PrintedFibreSum(), HalfShellFibreSum())] == [4.93074, 5.12583]
+    assert [round(s.sum_of_sines(16), 5) for s in (PrintedFibreSum(), HalfShellFibreSum())] == [
+        4.93074,
+        5.12583,
+    ]
     assert UniformFibreSum().sum_of_sines(16) == pytest.approx(5.092958, abs=5e-7)
     assert UserDefinedFibreSum(5.0).sum_of_sines(16) == 5.0
     angles = np.pi / 16 * (2 * np.arange(9) + 1)
     assert PrintedFibreSum().sum_of_sines(16) == pytest.approx(np.sin(angles).sum(), rel=1e-14)
-    assert HalfShellFibreSum().sum_of_sines(16) == pytest.approx(np.sin(angles[:-1]).sum(), rel=1e-14)
-    assert HalfShellFibreSum().sum_of_sines(4000) == pytest.approx(UniformFibreSum().sum_of_sines(4000), rel=1e-6)
+    assert HalfShellFibreSum().sum_of_sines(16) == pytest.approx(
+        np.sin(angles[:-1]).sum(), rel=1e-14
+    )
+    assert HalfShellFibreSum().sum_of_sines(4000) == pytest.approx(
+        UniformFibreSum().sum_of_sines(4000), rel=1e-6
+    )
 
 
 def test_impossible_values_are_errors():
     with pytest.raises(
-        GeometryLimitError, match=r"StraightFibre: a contraction of 60 % is outside its range, 0 to 50 %"
+        GeometryLimitError,
+        match=r"StraightFibre: a contraction of 60 % is outside its range, 0 to 50 %",
     ):
         tube(CIRCLE).volume(0.6)
     with pytest.raises(GeometryLimitError, match=r"contraction of -1 % is outside its range"):
         tube(PARABOLA).volume(np.array([0.1, -0.01]))
-    with pytest.raises(GeometryLimitError, match="PleatedTube: a contraction of 51 % is outside its range"):
+    with pytest.raises(
+        GeometryLimitError, match="PleatedTube: a contraction of 51 % is outside its range"
+    ):
         PleatedTube(L0, D0).volume(0.51)
     with pytest.raises(ParameterError, match="StraightFibre: rings is -1; allowed range: 0 to"):
         tube(CIRCLE, -1)
-    with pytest.raises(ParameterError, match=r"end_diameter \(d_0, diameter at the ends and rings\) is 12 m"):
+    with pytest.raises(
+        ParameterError, match=r"end_diameter \(d_0, diameter at the ends and rings\) is 12 m"
+    ):
         StraightFibre(L0, 12.0)

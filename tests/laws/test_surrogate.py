@@ -1,4 +1,6 @@
-"""A polynomial surrogate errs by no more than its estimated maximum error, wherever its law has a solution."""
+"""A polynomial surrogate errs by no more than its estimated maximum error, wherever its law has a
+solution.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +13,35 @@ from widths import widened
 from airmuscle.errors import AirmuscleWarning, SolveError
 from airmuscle.files import library
 from airmuscle.physics import Braid, ChouHannaford1996, Tabulated, ValidityRange, as_force_law
-from airmuscle.physics.muscle.characteristic.polynomial_surrogate import estimate_maximum, values_or_nan
+from airmuscle.physics.muscle.characteristic.polynomial_surrogate import (
+    estimate_maximum,
+    values_or_nan,
+)
 
-SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))
+SMALL = Tabulated(
+    (1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0)
+)
 PARTLY_SOLVED = [(5e4, 4e5, 0.01, 0.12), (1e5, 3.5e5, 0.02, 0.3)]
-"""Ranges of borzikova-monotone in which its error is largest at the edge of the region with a solution."""
+"""Ranges of borzikova-monotone in which its error is largest at the edge of the region with a
+solution.
+"""
 OTHERS = [
-    "festo-tool-dmsp-20", "dmsp-20-300", "hunt2017-festo-10", "festo-tool-dmsp-10", "festo-tool-dmsp-40",
+    "festo-tool-dmsp-20",
+    "dmsp-20-300",
+    "hunt2017-festo-10",
+    "festo-tool-dmsp-10",
+    "festo-tool-dmsp-40",
     "sarosi-dmsp-10",
-]  # fmt: skip
-CASES = [*(("borzikova-monotone", limits) for limits in PARTLY_SOLVED), *((name, None) for name in OTHERS)]
+]
+CASES = [
+    *(("borzikova-monotone", limits) for limits in PARTLY_SOLVED),
+    *((name, None) for name in OTHERS),
+]
 
 
-@pytest.mark.parametrize(("name", "limits"), widened(CASES, lambda *case: case in (CASES[0], *CASES[2:5])))
+@pytest.mark.parametrize(
+    ("name", "limits"), widened(CASES, lambda *case: case in (CASES[0], *CASES[2:5]))
+)
 def test_no_point_errs_by_more_than_the_estimated_maximum_error(name, limits):
     entry = library.load(name)
     validity_range = ValidityRange(*limits) if limits else entry.validity_range
@@ -33,7 +51,9 @@ def test_no_point_errs_by_more_than_the_estimated_maximum_error(name, limits):
     p, c = _points(validity_range)
     error = np.abs(surrogate.force(p, c) - values_or_nan(entry.characteristic.force, p, c))
     assert 0.5 * surrogate.max_error <= np.nanmax(error) <= surrogate.max_error
-    assert 1.05 * np.nanmax(error) <= surrogate.max_error * (1 + 2e-3)  # the margin remains for what is not searched
+    assert 1.05 * np.nanmax(error) <= surrogate.max_error * (
+        1 + 2e-3
+    )  # the margin remains for what is not searched
     assert 1.0 - np.isnan(error).mean() == pytest.approx(surrogate.coverage, abs=0.03)
 
 
@@ -51,7 +71,10 @@ def _points(validity_range: ValidityRange) -> tuple[np.ndarray, ...]:
     spans = validity_range.pressure, validity_range.contraction
     grid = np.meshgrid(*(np.linspace(*span, 101) for span in spans))
     generator = np.random.default_rng(8)
-    return tuple(np.append(g.ravel(), generator.uniform(*span, 5000)) for g, span in zip(grid, spans, strict=True))
+    return tuple(
+        np.append(g.ravel(), generator.uniform(*span, 5000))
+        for g, span in zip(grid, spans, strict=True)
+    )
 
 
 def test_a_law_has_a_solution_at_the_same_points_one_by_one_and_all_at_once():
@@ -68,14 +91,18 @@ def test_a_law_has_a_solution_at_the_same_points_one_by_one_and_all_at_once():
 
 def test_a_surrogate_of_a_polynomial_is_exact():
     law = ChouHannaford1996(Braid(0.01, 0.4363, 0.3))
-    surrogate = as_force_law(law, ValidityRange(5e4, 6e5, 0.0, 0.3), degree=3)  # linear in p, quadratic in eps
+    surrogate = as_force_law(
+        law, ValidityRange(5e4, 6e5, 0.0, 0.3), degree=3
+    )  # linear in p, quadratic in eps
     assert surrogate.max_error < 1e-9
     assert surrogate.force(3.3e5, 0.123) == pytest.approx(law.force(3.3e5, 0.123), rel=1e-12)
 
 
 def test_a_surrogate_warns_where_the_model_has_no_solution():
     validity_range = ValidityRange(1e5, 2e5, 0.0, 0.2)
-    with pytest.warns(AirmuscleWarning, match=r"Tabulated has no solution on \d\d % of the validity range"):
+    with pytest.warns(
+        AirmuscleWarning, match=r"Tabulated has no solution on \d\d % of the validity range"
+    ):
         surrogate = as_force_law(SMALL, validity_range, degree=3)
     assert 0.4 < surrogate.coverage < 0.6
     with pytest.raises(SolveError, match="0 of 400 points of the validity range"):
@@ -84,7 +111,9 @@ def test_a_surrogate_warns_where_the_model_has_no_solution():
 
 def test_a_surrogate_of_an_unbounded_force_is_refused():
     law = library.load("saga2007").characteristic
-    with pytest.raises(SolveError, match=r"force of Saga2007 is unbounded at a contraction of 0 % and 50 kPa"):
+    with pytest.raises(
+        SolveError, match=r"force of Saga2007 is unbounded at a contraction of 0 % and 50 kPa"
+    ):
         as_force_law(law, ValidityRange(5e4, 2e5, 0.0, 0.3))
     assert as_force_law(law, ValidityRange(5e4, 2e5, 0.02, 0.3)).max_error < 5.0
 

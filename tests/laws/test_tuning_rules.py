@@ -1,7 +1,9 @@
-"""Tuning rules give the published settings, and identification recovers the model from its own step response.
+"""Tuning rules give the published settings, and identification recovers the model from its own step
+response.
 
-SIMC with a closed-loop time constant equal to the dead time has a gain margin of pi, a phase margin of 61.4 degrees and
-a maximum sensitivity of 1.59 on every first-order plant whose integral time is its time constant (Skogestad 2003).
+SIMC with a closed-loop time constant equal to the dead time has a gain margin of pi, a phase margin
+of 61.4 degrees and a maximum sensitivity of 1.59 on every first-order plant whose integral time is
+its time constant (Skogestad 2003).
 """
 
 from __future__ import annotations
@@ -43,7 +45,11 @@ def loop_gain(model, settings, frequency):
         plant = model.gain / (model.time_constant * s + 1) * np.exp(-model.dead_time * s)
     else:
         plant = model.rate / s * np.exp(-model.dead_time * s)
-    return plant * settings.gain * (1 + 1 / (settings.integral_time * s) + settings.derivative_time * s)
+    return (
+        plant
+        * settings.gain
+        * (1 + 1 / (settings.integral_time * s) + settings.derivative_time * s)
+    )
 
 
 def maximum_sensitivity(model, settings):
@@ -74,15 +80,27 @@ def test_simc_has_its_published_margins(constant):
 
 
 def test_amigo_settings_are_those_of_the_rule():
-    pi, pid = amigo_pi(PLANT), amigo_pid(PLANT)
+    pi = amigo_pi(PLANT)
+    pid = amigo_pid(PLANT)
     assert pi.gain == pytest.approx(0.075 + (0.35 - 10 / 121) * 5)
     assert pi.integral_time == pytest.approx(0.35 + 1300 / 227)
     assert pid.gain == pytest.approx(4.7 / 2)
-    assert (pid.integral_time, pid.derivative_time) == (pytest.approx(8.4 / 2), pytest.approx(5 / 10.3))
-    assert (pid.setpoint_weight, amigo_pid(FirstOrderDeadTime(1.0, 1.0, 2.0)).setpoint_weight) == (0.0, 1.0)
-    assert (amigo_pi(LEVEL).gain, amigo_pi(LEVEL).integral_time) == (pytest.approx(0.35), pytest.approx(26.8))
+    assert (pid.integral_time, pid.derivative_time) == (
+        pytest.approx(8.4 / 2),
+        pytest.approx(5 / 10.3),
+    )
+    assert (pid.setpoint_weight, amigo_pid(FirstOrderDeadTime(1.0, 1.0, 2.0)).setpoint_weight) == (
+        0.0,
+        1.0,
+    )
+    assert (amigo_pi(LEVEL).gain, amigo_pi(LEVEL).integral_time) == (
+        pytest.approx(0.35),
+        pytest.approx(26.8),
+    )
     level = amigo_pid(LEVEL)
-    assert (level.gain, level.integral_time, level.derivative_time) == pytest.approx((0.45, 16.0, 1.0))
+    assert (level.gain, level.integral_time, level.derivative_time) == pytest.approx(
+        (0.45, 16.0, 1.0)
+    )
 
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 3.0, 10.0])
@@ -114,7 +132,9 @@ def test_a_first_order_step_response_is_recovered():
 def test_noise_changes_a_recovered_step_response_by_little(zero):
     time = np.linspace(-20.0, 80.0, 5001)
     noise = np.random.default_rng(2).normal(0.0, 0.03, time.size)
-    noise[(time >= 0.0) & (time < 0.01)] = 0.3  # the row of the step alone is far from the mean of the rows before it
+    noise[(time >= 0.0) & (time < 0.01)] = (
+        0.3  # the row of the step alone is far from the mean of the rows before it
+    )
     output = 5.0 - 3.0 * PLANT.step_response(np.maximum(time, 0.0)) + noise
     found = first_order_of_step(time + zero, output, step=-3.0, step_time=zero)
     assert found.gain == pytest.approx(2.0, rel=3e-3)
@@ -126,7 +146,9 @@ def test_a_swing_below_a_level_after_an_overshoot_does_not_delay_the_level():
     time = np.linspace(0.0, 40.0, 2001)
     swinging = 1.0 - np.exp(-0.1 * time) * np.cos(2.0 * time)
     found = first_order_of_step(time, swinging, step=1.0)
-    assert found.time_constant + found.dead_time == pytest.approx(time[np.argmax(swinging >= 1 - np.exp(-1))], abs=0.02)
+    assert found.time_constant + found.dead_time == pytest.approx(
+        time[np.argmax(swinging >= 1 - np.exp(-1))], abs=0.02
+    )
 
 
 def test_an_integrating_step_response_is_recovered():
@@ -154,12 +176,15 @@ def test_the_initial_value_of_an_integrating_step_response_is_the_mean_of_the_ro
 @pytest.mark.parametrize("step_time", [-1.0, 19.5])
 def test_a_step_before_the_first_row_or_near_the_last_is_refused(step_time):
     time = np.linspace(0.0, 20.0, 201)
-    with pytest.raises(ParameterError, match=rf"the step is at {step_time:g} s; one row or more must be until then"):
+    with pytest.raises(
+        ParameterError, match=rf"the step is at {step_time:g} s; one row or more must be until then"
+    ):
         first_order_of_step(time, 1.0 - np.exp(-time), 1.0, step_time=step_time)
 
 
 def exact_ultimate_point(model):
-    low, high = 1e-6, math.pi / model.dead_time
+    low = 1e-6
+    high = math.pi / model.dead_time
     for _ in range(200):
         middle = (low + high) / 2
         phase = math.atan(middle * model.time_constant) + middle * model.dead_time
@@ -170,7 +195,9 @@ def exact_ultimate_point(model):
 def test_noise_about_the_middle_of_an_oscillation_does_not_shorten_its_period():
     time = 0.01 * np.arange(2000)
     noise = np.random.default_rng(1).normal(0.0, 0.05, time.size)
-    assert ultimate_point(time, np.sin(2 * np.pi * time) + noise, amplitude=1.0).period == pytest.approx(1.0, rel=5e-3)
+    assert ultimate_point(
+        time, np.sin(2 * np.pi * time) + noise, amplitude=1.0
+    ).period == pytest.approx(1.0, rel=5e-3)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
@@ -179,7 +206,9 @@ def test_noise_does_not_enlarge_the_amplitude_of_an_oscillation(noise, hysteresi
     time = 0.01 * np.arange(2000)
     output = np.sin(2 * np.pi * time) + np.random.default_rng(1).normal(0.0, noise, time.size)
     found = ultimate_point(time, output, amplitude=1.0, hysteresis=hysteresis)
-    assert found.gain == pytest.approx(4 / math.pi / math.sqrt(1 - hysteresis**2), rel=max(0.3 * noise, 1e-6))
+    assert found.gain == pytest.approx(
+        4 / math.pi / math.sqrt(1 - hysteresis**2), rel=max(0.3 * noise, 1e-6)
+    )
 
 
 @pytest.mark.parametrize("rows", [7, 20, 80])
@@ -194,8 +223,11 @@ def test_the_amplitude_of_a_triangular_oscillation_is_half_its_range(rows):
 @pytest.mark.parametrize("rows", [60, 200])
 @pytest.mark.parametrize("dead_time", [0.1, 0.3, 1.0])
 def test_the_amplitude_of_a_relay_oscillation_is_that_of_its_corners(dead_time, rows):
-    """First order with gain 2 and T = 1: a = 2 (1 - exp(-L)), half a period L + ln(2 - exp(-L)), exponential arcs."""
-    amplitude, half = 2 * (1 - math.exp(-dead_time)), dead_time + math.log(2 - math.exp(-dead_time))
+    """First order with gain 2 and T = 1: a = 2 (1 - exp(-L)), half a period L + ln(2 - exp(-L)),
+    exponential arcs.
+    """
+    amplitude = 2 * (1 - math.exp(-dead_time))
+    half = dead_time + math.log(2 - math.exp(-dead_time))
     time = 2 * half / (rows + 0.37) * np.arange(20 * rows)
     part, rising = np.modf(time / half + 0.2)
     arc = 2.0 - (2.0 + amplitude) * np.exp(-part * half)
@@ -203,7 +235,9 @@ def test_the_amplitude_of_a_relay_oscillation_is_that_of_its_corners(dead_time, 
     assert found.gain == pytest.approx(4 / (math.pi * amplitude), rel=2e-3)
     assert found.period == pytest.approx(2 * half, rel=1e-4)
     exact = exact_ultimate_point(FirstOrderDeadTime(2.0, 1.0, dead_time)).gain
-    assert found.gain / exact - 1 == pytest.approx({0.1: -0.182, 0.3: -0.166, 1.0: -0.109}[dead_time], abs=0.004)
+    assert found.gain / exact - 1 == pytest.approx(
+        {0.1: -0.182, 0.3: -0.166, 1.0: -0.109}[dead_time], abs=0.004
+    )
     assert "-19 % to +27 %" in found.note
 
 
@@ -211,15 +245,20 @@ def test_a_relay_finds_the_ultimate_point_and_the_model():
     exact = exact_ultimate_point(PLANT)
     model = exact.first_order(PLANT.gain)
     assert (model.time_constant, model.dead_time) == (pytest.approx(10.0), pytest.approx(1.0))
-    step, delay, y = 0.01, 100, 0.0
-    outputs, commands = [], [0.0] * delay
+    step = 0.01
+    delay = 100
+    y = 0.0
+    outputs = []
+    commands = [0.0] * delay
     for _ in range(8000):
         commands.append(-1.0 if y > 0 else 1.0)
         y += step / PLANT.time_constant * (PLANT.gain * commands[-1 - delay] - y)
         outputs.append(y)
     found = ultimate_point(step * np.arange(8000), outputs, amplitude=1.0)
     assert found.period == pytest.approx(exact.period, rel=0.05)
-    assert found.gain == pytest.approx(exact.gain, rel=0.25)  # the describing function is an approximation
+    assert found.gain == pytest.approx(
+        exact.gain, rel=0.25
+    )  # the describing function is an approximation
 
 
 def test_the_relay_experiment_runs_on_a_plant():
@@ -238,7 +277,12 @@ def test_the_relay_experiment_runs_on_a_plant():
     [
         (first_order_of_step, np.arange(5.0), np.arange(5.0), "at least 10 rows"),
         (first_order_of_step, np.zeros(20), np.zeros(20), "rising times"),
-        (first_order_of_step, np.arange(20.0), np.arange(20.0), "until it settles, or identify an integrator"),
+        (
+            first_order_of_step,
+            np.arange(20.0),
+            np.arange(20.0),
+            "until it settles, or identify an integrator",
+        ),
         (first_order_of_step, np.arange(20.0), np.full(20, np.nan), "must be finite"),
         (integrator_of_step, np.arange(20.0), np.zeros(20), "does not move"),
         (ultimate_point, np.arange(20.0), np.zeros(20), "Record for longer"),
@@ -263,11 +307,17 @@ def test_a_step_experiment_gives_starts_within_the_bounds():
     case = LoopCase("nominal", LIFT, loop, am.find_equilibrium(LIFT, pressure=1e5))
     experiment = step_experiment(case, duration=3.0)
     rise = experiment.output - experiment.output[0]
-    assert np.abs(0.2 * experiment.model.step_response(experiment.time) - rise).max() < 0.25 * np.ptp(rise)
+    assert np.abs(
+        0.2 * experiment.model.step_response(experiment.time) - rise
+    ).max() < 0.25 * np.ptp(rise)
     assert experiment.model.dead_time >= 0.005
-    starts = rule_starts(rule_settings(experiment.model), {"gain": (1e-6, 2e-6), "integral_time": (0.01, 100.0)})
+    starts = rule_starts(
+        rule_settings(experiment.model), {"gain": (1e-6, 2e-6), "integral_time": (0.01, 100.0)}
+    )
     assert [set(each) for each in starts] == [{"gain", "integral_time"}] * 3
     assert all(1e-6 <= each["gain"] <= 2e-6 for each in starts)
-    other = LoopCase("relay", LIFT, ControlLoop(OnOffController("pressure", "fill"), 0.01, loop.setpoint))
+    other = LoopCase(
+        "relay", LIFT, ControlLoop(OnOffController("pressure", "fill"), 0.01, loop.setpoint)
+    )
     with pytest.raises(ParameterError, match="rules are for a PID alone"):
         step_experiment(other, duration=1.0)

@@ -1,7 +1,8 @@
-"""Valves in series and in parallel as one, judged by the pressure between them found by root search.
+"""Valves in series and in parallel as one, judged by the pressure between them found by root
+search.
 
-At choke and near equal pressures the equivalent valve is exact; between, an ellipse stands for a curve that is none,
-and is off by no more than its docstring says. In series the order matters.
+At choke and near equal pressures the equivalent valve is exact; between, an ellipse stands for a
+curve that is none, and is off by no more than its docstring says. In series the order matters.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from scipy.optimize import brentq
 from airmuscle.errors import ParameterError
 from airmuscle.physics import SubsonicIndexValve, Valve, in_parallel, in_series
 
-P1, T0 = 7e5, 293.15
+P1 = 7e5
+T0 = 293.15
 valves = st.builds(Valve, st.floats(1e-9, 1e-7), st.floats(0.0, 0.6))
 
 
@@ -27,13 +29,18 @@ def phi(ratio: float, b: float) -> float:
 
 
 def exact(parts: tuple[Valve, ...], ratio: float) -> float:
-    """Flow through valves in series over the upstream pressure, C phi of the whole, by nested root searches."""
+    """Flow through valves in series over the upstream pressure, C phi of the whole, by nested root
+    searches.
+    """
     if len(parts) == 1:
         return parts[0].conductance * phi(ratio, parts[0].critical_ratio)
-    first, rest = parts[0], parts[1:]
+    first = parts[0]
+    rest = parts[1:]
 
     def surplus(share: float) -> float:
-        return first.conductance * phi(share, first.critical_ratio) - share * exact(rest, ratio / share)
+        return first.conductance * phi(share, first.critical_ratio) - share * exact(
+            rest, ratio / share
+        )
 
     if surplus(1.0) >= 0:
         return first.conductance * phi(1.0, first.critical_ratio)
@@ -43,7 +50,9 @@ def exact(parts: tuple[Valve, ...], ratio: float) -> float:
 
 @given(valves, valves)
 def test_the_choked_conductance_in_series_is_exact(first, second):
-    assert in_series(first, second).conductance == pytest.approx(exact((first, second), 1e-6), rel=1e-9)
+    assert in_series(first, second).conductance == pytest.approx(
+        exact((first, second), 1e-6), rel=1e-9
+    )
 
 
 @given(valves, valves)
@@ -55,7 +64,9 @@ def test_near_equal_pressures_the_squares_of_the_flow_add_up(first, second):
 
 
 def off(whole: Valve, truth) -> float:
-    """The greatest difference from the truth over all pressure ratios, in shares of the choked flow."""
+    """The greatest difference from the truth over all pressure ratios, in shares of the choked
+    flow.
+    """
     ratios = np.linspace(0.01, 0.99, 50)
     differences = [whole.conductance * phi(r, whole.critical_ratio) - truth(r) for r in ratios]
     return float(np.abs(differences).max() / whole.conductance)
@@ -67,17 +78,26 @@ def pairs(ratios: tuple[float, ...]):
 
 
 @pytest.mark.parametrize(
-    ("ratios", "series", "parallel"), [((0.0, 0.2, 0.4, 0.6), 0.028, 0.053), ((0.2, 0.35, 0.5), 0.016, 0.0181)]
+    ("ratios", "series", "parallel"),
+    [((0.0, 0.2, 0.4, 0.6), 0.028, 0.053), ((0.2, 0.35, 0.5), 0.016, 0.0181)],
 )
-def test_between_they_are_off_by_what_the_docstrings_say_and_not_much_less(ratios, series, parallel):
-    in_line = max(off(in_series(a, b), lambda r, a=a, b=b: exact((a, b), r)) for a, b in pairs(ratios))
-    aside = max(off(in_parallel(a, b), lambda r, a=a, b=b: exact((a,), r) + exact((b,), r)) for a, b in pairs(ratios))
+def test_between_they_are_off_by_what_the_docstrings_say_and_not_much_less(
+    ratios, series, parallel
+):
+    in_line = max(
+        off(in_series(a, b), lambda r, a=a, b=b: exact((a, b), r)) for a, b in pairs(ratios)
+    )
+    aside = max(
+        off(in_parallel(a, b), lambda r, a=a, b=b: exact((a,), r) + exact((b,), r))
+        for a, b in pairs(ratios)
+    )
     assert 0.9 * series < in_line <= series
     assert 0.9 * parallel < aside <= parallel
 
 
 def test_the_order_matters_in_series():
-    wide, narrow = Valve(2e-8, 0.3), Valve(1e-8, 0.3)
+    wide = Valve(2e-8, 0.3)
+    narrow = Valve(1e-8, 0.3)
     assert in_series(narrow, wide).conductance == pytest.approx(0.9653e-8, rel=1e-4)
     assert in_series(wide, narrow).conductance == pytest.approx(0.9213e-8, rel=1e-4)
     assert in_parallel(wide, narrow) == in_parallel(narrow, wide)
@@ -98,7 +118,11 @@ def test_without_a_critical_ratio_the_rules_are_those_of_squares():
     assert whole.critical_ratio == pytest.approx(0.0, abs=1e-12)
 
 
-@given(st.lists(st.floats(1e-9, 1e-7), min_size=2, max_size=5), st.floats(0.0, 0.6), st.floats(0.0, 0.99))
+@given(
+    st.lists(st.floats(1e-9, 1e-7), min_size=2, max_size=5),
+    st.floats(0.0, 0.6),
+    st.floats(0.0, 0.99),
+)
 def test_valves_of_one_critical_ratio_side_by_side_are_exact(conductances, b, ratio):
     whole = in_parallel(*(Valve(c, b) for c in conductances))
     expected = sum(Valve(c, b).mass_flow(P1, ratio * P1, 1.0, T0) for c in conductances)
@@ -121,7 +145,8 @@ def test_three_in_series_stay_near_the_truth(order):
 
 
 def test_a_silencer_behind_an_exhaust_lessens_it_as_a_valve_in_series():
-    exhaust, silencer = Valve(1.2e-8, 0.2), Valve(3e-8, 0.5)
+    exhaust = Valve(1.2e-8, 0.2)
+    silencer = Valve(3e-8, 0.5)
     whole = in_series(exhaust, silencer)
     assert 0.9 * exhaust.conductance < whole.conductance < exhaust.conductance
     assert whole.mass_flow(2e5, 1e5, 1.0, T0) < exhaust.mass_flow(2e5, 1e5, 1.0, T0)
@@ -138,9 +163,12 @@ def test_what_has_no_equivalent_is_refused(rule):
     name = rule.__name__
     with pytest.raises(ParameterError, match=f"{name}: no valve is given; give at least one"):
         rule()
-    with pytest.raises(ParameterError, match=f"{name}: the conductance of argument 2 is 0; it must be positive"):
+    with pytest.raises(
+        ParameterError, match=f"{name}: the conductance of argument 2 is 0; it must be positive"
+    ):
         rule(Valve(1e-8, 0.3), Valve(0.0, 0.3))
     with pytest.raises(
-        ParameterError, match=f"{name}: argument 2 is SubsonicIndexValve; it must be a Valve, with C and b"
+        ParameterError,
+        match=f"{name}: argument 2 is SubsonicIndexValve; it must be a Valve, with C and b",
     ):
         rule(Valve(1e-8, 0.3), SubsonicIndexValve(1e-8, 0.3))

@@ -1,7 +1,8 @@
-"""What every orifice keeps: continuous, never uphill, monotone in both pressures, choked, reversible or one way.
+"""What every orifice keeps: continuous, never uphill, monotone in both pressures, choked,
+reversible or one way.
 
-ISO 6358-1:2013 with index m and cracking pressure dp_c, printed form: phi = (1 - ((r - b)/(1 - b - dp_c/p1))^2)^m.
-With m = 0.5 and dp_c = 0 it is Valve. A check valve passes one way.
+ISO 6358-1:2013 with index m and cracking pressure dp_c, printed form: phi = (1 - ((r - b)/(1 - b -
+dp_c/p1))^2)^m. With m = 0.5 and dp_c = 0 it is Valve. A check valve passes one way.
 """
 
 from __future__ import annotations
@@ -13,7 +14,14 @@ from hypothesis import strategies as st
 
 from airmuscle.core import autodiff, cite, ops
 from airmuscle.errors import ParameterError
-from airmuscle.physics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, CheckValve, Orifice, SubsonicIndexValve, Valve
+from airmuscle.physics import (
+    REFERENCE_DENSITY,
+    REFERENCE_TEMPERATURE,
+    CheckValve,
+    Orifice,
+    SubsonicIndexValve,
+    Valve,
+)
 
 T0 = REFERENCE_TEMPERATURE
 pressures = st.floats(2e4, 1.2e6)
@@ -45,16 +53,23 @@ def flow(law: Orifice, upstream, downstream):
 
 def printed(valve: SubsonicIndexValve, p1: float, p2: float) -> float:
     """Mass flow as ISO 6358-1:2013 has it, p1 > p2."""
-    r, b, crack = p2 / p1, valve.critical_ratio, valve.cracking_pressure / p1
+    r = p2 / p1
+    b = valve.critical_ratio
+    crack = valve.cracking_pressure / p1
     choked = valve.conductance * REFERENCE_DENSITY * p1
     if r >= 1 - crack:
         return 0.0
-    return choked if r <= b else choked * (1 - ((r - b) / (1 - b - crack)) ** 2) ** valve.subsonic_index
+    return (
+        choked
+        if r <= b
+        else choked * (1 - ((r - b) / (1 - b - crack)) ** 2) ** valve.subsonic_index
+    )
 
 
 @given(indexed, pressures, st.floats(0.0, 1.0))
 def test_away_from_the_laminar_chord_it_is_the_printed_formula(valve, p1, r):
-    p2, crack = r * p1, valve.cracking_pressure
+    p2 = r * p1
+    crack = valve.cracking_pressure
     assume((1 - valve.critical_ratio) * p1 - crack > 2e-3 * p1)
     assume(p1 - p2 > crack + 1.001e-3 * p1 or p1 - p2 < crack)
     expected = printed(valve, p1, p2)
@@ -63,13 +78,16 @@ def test_away_from_the_laminar_chord_it_is_the_printed_formula(valve, p1, r):
 
 @given(conductances, ratios, st.floats(0.97, 0.9999), pressures, pressures)
 def test_with_index_one_half_and_no_cracking_pressure_it_is_the_valve(c, b, laminar, one, other):
-    simple, general = Valve(c, b, laminar), SubsonicIndexValve(c, b, 0.5, 0.0, laminar)
+    simple = Valve(c, b, laminar)
+    general = SubsonicIndexValve(c, b, 0.5, 0.0, laminar)
     scale = c * REFERENCE_DENSITY * max(one, other)
     assert flow(general, one, other) == pytest.approx(flow(simple, one, other), abs=1e-9 * scale)
 
 
 def test_a_number_worked_out_by_hand():
-    """C = 1e-8, b = 0.2, m = 0.6, dp_c = 30 kPa, 500 to 400 kPa: x = 0.6/0.74, phi = 0.342586^0.6 = 0.525850."""
+    """C = 1e-8, b = 0.2, m = 0.6, dp_c = 30 kPa, 500 to 400 kPa: x = 0.6/0.74, phi = 0.342586^0.6 =
+    0.525850.
+    """
     valve = SubsonicIndexValve(1e-8, 0.2, 0.6, 30e3)
     assert flow(valve, 5e5, 4e5) == pytest.approx(1e-8 * 1.185 * 5e5 * 0.525850, rel=2e-6)
 
@@ -111,7 +129,9 @@ def test_a_vacuum_chokes_it(law, p1):
 @given(reversible, pressures, pressures)
 def test_a_check_valve_is_its_orifice_one_way_and_shut_the_other(law, one, other):
     check = CheckValve(law)
-    assert flow(check, max(one, other), min(one, other)) == flow(law, max(one, other), min(one, other))
+    assert flow(check, max(one, other), min(one, other)) == flow(
+        law, max(one, other), min(one, other)
+    )
     assert flow(check, min(one, other), max(one, other)) == 0.0
 
 
@@ -122,23 +142,33 @@ def test_below_its_cracking_pressure_it_is_shut_and_above_it_opens():
 
 
 def test_where_cracking_takes_up_all_of_the_subsonic_range_it_opens_over_the_laminar_one():
-    """b = 0.6 and dp_c = 3 bar at 4 bar: 1 - b - dp_c/p1 < 0, where the printed formula has no meaning."""
-    valve, p1 = SubsonicIndexValve(1e-8, 0.6, 0.5, 3e5), 4e5
+    """b = 0.6 and dp_c = 3 bar at 4 bar: 1 - b - dp_c/p1 < 0, where the printed formula has no
+    meaning.
+    """
+    valve = SubsonicIndexValve(1e-8, 0.6, 0.5, 3e5)
+    p1 = 4e5
     choked = 1e-8 * REFERENCE_DENSITY * p1
-    shares = [flow(valve, p1, p1 - 3e5 - part * 0.001 * p1) / choked for part in (0.0, 0.25, 0.5, 1.0, 50.0)]
+    shares = [
+        flow(valve, p1, p1 - 3e5 - part * 0.001 * p1) / choked
+        for part in (0.0, 0.25, 0.5, 1.0, 50.0)
+    ]
     assert shares == pytest.approx([0.0, 0.25, 0.5, 1.0, 1.0])
 
 
 @given(indexed, st.floats(0.0, 2.0))
 def test_the_power_itself_has_a_finite_slope_even_where_another_branch_rules(valve, way):
-    """Derivatives of both branches are worked out before one is chosen: infinity times zero would be NaN in JAX."""
+    """Derivatives of both branches are worked out before one is chosen: infinity times zero would
+    be NaN in JAX.
+    """
     assert np.isfinite(autodiff.derivative(valve, "_fraction", way, wrt=0))
 
 
 def kinks(law: Orifice, p1: float) -> list[float]:
     """Downstream pressures [Pa] at which a branch of the law changes, forward and reverse."""
     inner = getattr(law, "orifice", law)
-    b, crack, laminar = inner.critical_ratio, getattr(inner, "cracking_pressure", 0.0), inner.laminar_ratio
+    b = inner.critical_ratio
+    crack = getattr(inner, "cracking_pressure", 0.0)
+    laminar = inner.laminar_ratio
     forward = [b * p1, p1 - crack, laminar * p1 - crack, p1]
     return [*forward, *(p1 / r for r in (laminar, b) if r > 0), p1 + crack, (p1 + crack) / laminar]
 
@@ -146,7 +176,9 @@ def kinks(law: Orifice, p1: float) -> list[float]:
 @every_orifice
 @pytest.mark.parametrize("p1", [5e4, 1.013e5, 4e5, 7.5e5, 1.2e6])
 def test_rates_are_continuous_on_a_grid_of_points_on_the_kinks(law, p1):
-    """A step of 1e-9 of the pressure changes the flow by less than 1e-6 of the choked one, whatever the branch."""
+    """A step of 1e-9 of the pressure changes the flow by less than 1e-6 of the choked one, whatever
+    the branch.
+    """
     inner = getattr(law, "orifice", law)
     scale = inner.conductance * REFERENCE_DENSITY * 1.2e6
     for p2 in kinks(law, p1):
@@ -158,7 +190,9 @@ def test_rates_are_continuous_on_a_grid_of_points_on_the_kinks(law, p1):
 
 @every_orifice
 def test_slopes_are_finite_everywhere_and_of_the_right_sign(law):
-    """Traced derivatives, on the kinks too: an infinite or undefined one would stop an implicit method."""
+    """Traced derivatives, on the kinks too: an infinite or undefined one would stop an implicit
+    method.
+    """
     for p1 in (5e4, 4e5, 1.2e6):
         for p2 in [*kinks(law, p1), *np.linspace(1e3, 1.5e6, 60)]:
             by_upstream, by_downstream = (
@@ -186,10 +220,16 @@ def test_arrays_floats_and_symbols_agree(law):
     ("make", "message"),
     [
         (lambda: SubsonicIndexValve(1e-8, 0.3, 1.5), "subsonic_index .* allowed range: 0.25 to 1"),
-        (lambda: SubsonicIndexValve(1e-8, 0.3, 0.5, -1.0), "cracking_pressure .* allowed range: 0 to 500000 Pa"),
+        (
+            lambda: SubsonicIndexValve(1e-8, 0.3, 0.5, -1.0),
+            "cracking_pressure .* allowed range: 0 to 500000 Pa",
+        ),
         (lambda: SubsonicIndexValve(1e-8, 1.0), "critical_ratio .* allowed range: 0 to 0.95"),
         (lambda: SubsonicIndexValve(float("nan"), 0.3), "conductance .* must be finite"),
-        (lambda: SubsonicIndexValve(1.1, 0.3), "conductance .* Values are in SI units; check the unit"),
+        (
+            lambda: SubsonicIndexValve(1.1, 0.3),
+            "conductance .* Values are in SI units; check the unit",
+        ),
     ],
 )
 def test_an_impossible_valve_is_refused(make, message):

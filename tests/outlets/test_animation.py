@@ -1,5 +1,5 @@
-"""Claims about animations: what is drawn is the geometry at the recorded contraction, frames follow the time, files
-have the wanted format, and what cannot be drawn is refused."""
+"""Claims about animations: what is drawn is the geometry at the recorded contraction, frames follow
+the time, files have the wanted format, and what cannot be drawn is refused."""
 
 from __future__ import annotations
 
@@ -22,13 +22,18 @@ FILL = am.Schedule({"fill": ((0.0, 0.3),)})
 
 @pytest.fixture(scope="module")
 def lift():
-    return am.simulate(LIFT, FILL, duration=0.1, initial_state=LIFT.state_at(pressure=1e5, position=0.01))
+    return am.simulate(
+        LIFT, FILL, duration=0.1, initial_state=LIFT.state_at(pressure=1e5, position=0.01)
+    )
 
 
 @pytest.fixture(scope="module")
 def joint():
     return am.simulate(
-        JOINT, am.Schedule({"left.fill": ((0.0, 0.5),)}), duration=0.2, initial_state=JOINT.state_at(pressure=2e5)
+        JOINT,
+        am.Schedule({"left.fill": ((0.0, 0.5),)}),
+        duration=0.2,
+        initial_state=JOINT.state_at(pressure=2e5),
     )
 
 
@@ -38,7 +43,9 @@ def test_the_outline_of_a_muscle_is_that_of_its_geometry_and_bulges_with_contrac
         outline = muscle_outline(braid, contraction)
         assert np.ptp(outline[:, 1]) == pytest.approx(0.3 * (1 - contraction))
         assert outline[:, 0].max() == pytest.approx(braid.radius_at(contraction))
-        np.testing.assert_allclose(outline[: len(outline) // 2], outline[: len(outline) // 2 - 1 : -1] * (-1.0, 1.0))
+        np.testing.assert_allclose(
+            outline[: len(outline) // 2], outline[: len(outline) // 2 - 1 : -1] * (-1.0, 1.0)
+        )
     straight = library.load("saga2007-circle").muscle.geometry
     outline = muscle_outline(straight, 0.1)
     np.testing.assert_allclose(outline[:121, 0], straight.outline(0.1, 121)[1])
@@ -61,8 +68,7 @@ def test_the_pointer_has_the_angle_and_the_muscles_their_lengths(joint):
 
 def test_the_end_of_a_planar_arm_is_drawn_where_its_tip_is():
     arm = library.load("arm-lilly-quesada").plant
-    run = am.simulate(arm, am.Schedule({}), duration=0.05,
-                      initial_state=arm.state_at(pressure=3e5))  # fmt: skip
+    run = am.simulate(arm, am.Schedule({}), duration=0.05, initial_state=arm.state_at(pressure=3e5))
     drawing = run.animate(arm)._scene.draw({name: float(run[name][-1]) for name in run})
     (links,) = drawing.lines
     state = {c.name: float(run[c.name][-1]) for c in arm.mechanism.coordinates}
@@ -84,15 +90,20 @@ def test_frames_follow_the_time_at_the_wanted_speed(joint):
 def test_a_load_is_drawn_and_written(lift, tmp_path):
     animation = lift.animate(LIFT, speed=2.0)
     assert animation.times.size == 2
-    gif, page = animation.save(tmp_path / "lift.gif"), animation.save(tmp_path / "lift.html")
+    gif = animation.save(tmp_path / "lift.gif")
+    page = animation.save(tmp_path / "lift.html")
     assert gif.read_bytes()[:6] == b"GIF89a"
     assert "<input" in page.read_text(encoding="utf-8")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["lift.gif", "lift.html"]
 
 
 def test_what_cannot_be_drawn_is_refused(lift, joint, tmp_path):
-    arm = dataclasses.replace(JOINT, mechanism=SerialArm((SpatialLink((0, 0, 1), rotor_inertia=0.02),), ROUTES))
-    with pytest.raises(ParameterError, match="SerialArm with 2 muscles cannot be drawn; possible are"):
+    arm = dataclasses.replace(
+        JOINT, mechanism=SerialArm((SpatialLink((0, 0, 1), rotor_inertia=0.02),), ROUTES)
+    )
+    with pytest.raises(
+        ParameterError, match="SerialArm with 2 muscles cannot be drawn; possible are"
+    ):
         lift.animate(arm)
     with pytest.raises(ParameterError, match="is no plant"):
         lift.animate("lift")
@@ -101,7 +112,11 @@ def test_what_cannot_be_drawn_is_refused(lift, joint, tmp_path):
     for count in (0, 1):
         with pytest.raises(ColumnError, match=f"two rows or more; there are {count}"):
             lift.rows(slice(count)).animate(LIFT)
-    for speed, message in ((0.0, "must be positive"), (float("nan"), "must be finite"), (1e-5, "at most 3000")):
+    for speed, message in (
+        (0.0, "must be positive"),
+        (float("nan"), "must be finite"),
+        (1e-5, "at most 3000"),
+    ):
         with pytest.raises(ParameterError, match=message):
             lift.animate(LIFT, speed=speed)
     animation = lift.animate(LIFT)

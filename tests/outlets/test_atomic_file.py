@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 from command_line import airmuscle
 
-from airmuscle.core import atomic_file, atomic_folder, check_writable, exclusive_folders, temporary_folder
+from airmuscle.core import (
+    atomic_file,
+    atomic_folder,
+    check_writable,
+    exclusive_folders,
+    temporary_folder,
+)
 from airmuscle.files.library import write_text
 
 
@@ -32,7 +38,9 @@ def test_a_file_is_unchanged_and_nothing_is_left_if_writing_fails(tmp_path: Path
 
 
 def test_several_writers_of_one_file_leave_one_complete_text(tmp_path: Path):
-    path, texts, errors = tmp_path / "muscle.toml", [letter * 100_000 for letter in "abcd"], []
+    path = tmp_path / "muscle.toml"
+    texts = [letter * 100_000 for letter in "abcd"]
+    errors = []
 
     def write(text: str) -> None:
         try:
@@ -87,18 +95,24 @@ def test_a_device_is_not_replaced_by_a_file():
 
 
 def test_the_second_of_two_commands_that_write_to_one_folder_is_refused(tmp_path):
-    """The lock ends with the block, and what was created for it is removed where nothing was written."""
+    """The lock ends with the block, and what was created for it is removed where nothing was
+    written.
+    """
     folder = tmp_path / "deep" / "out"
 
     def second(name: Path) -> str:
-        done = subprocess.run([sys.executable, "-c", SECOND, name], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [sys.executable, "-c", SECOND, name], capture_output=True, text=True, check=True
+        )
         return done.stdout
 
     with exclusive_folders():
         check_writable(folder)
         check_writable(folder)
-        assert second(folder) == (
-            f"{folder}: another command is writing to this folder. Wait until it ends, or specify another folder.\n"
+        assert (
+            second(folder)
+            == f"{folder}: another command is writing to this folder. Wait until it ends, or"
+            " specify another folder.\n"
         )
         assert second(tmp_path / "other") == ""
         check_writable(tmp_path, shared=True)
@@ -112,10 +126,13 @@ def test_the_second_of_two_commands_that_write_to_one_folder_is_refused(tmp_path
     assert [path.name for path in folder.iterdir()] == ["a.csv"]
 
 
-def test_what_a_killed_process_has_left_in_the_temporary_folder_is_removed_by_the_next_one(tmp_path, monkeypatch):
+def test_what_a_killed_process_has_left_in_the_temporary_folder_is_removed_by_the_next_one(
+    tmp_path, monkeypatch
+):
     code = (
-        "import os, signal; from airmuscle.core.atomic_output import temporary_folder\n"
-        "with temporary_folder() as folder:\n    (folder / 'a.c').touch(); os.kill(os.getpid(), signal.SIGTERM)"
+        "import os, signal; from airmuscle.core.atomic_output import temporary_folder\nwith"
+        " temporary_folder() as folder:\n    (folder / 'a.c').touch(); os.kill(os.getpid(),"
+        " signal.SIGTERM)"
     )
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     subprocess.run([sys.executable, "-c", code], check=False, env=environment)
@@ -123,5 +140,9 @@ def test_what_a_killed_process_has_left_in_the_temporary_folder_is_removed_by_th
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "airmuscle-of-somebody").mkdir()
     with temporary_folder() as mine, temporary_folder() as other:
-        assert {path.name for path in tmp_path.iterdir()} == {mine.name, other.name, "airmuscle-of-somebody"}
+        assert {path.name for path in tmp_path.iterdir()} == {
+            mine.name,
+            other.name,
+            "airmuscle-of-somebody",
+        }
     assert [path.name for path in tmp_path.iterdir()] == ["airmuscle-of-somebody"]

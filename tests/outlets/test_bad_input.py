@@ -1,4 +1,5 @@
-"""Bad input ends in one clear line: where, what, what is allowed, what to do; exit code 1, nothing half written.
+"""Bad input ends in one clear line: where, what, what is allowed, what to do; exit code 1, nothing
+half written.
 
 Each case goes through the command line as a user would, and its message is read.
 """
@@ -66,10 +67,28 @@ def bench(head: str = HEAD, table: list[list[float]] | None = None, **replaced: 
 
 
 CSV = {
-    "without units": (bench("pressure,length,force"), r"'pressure': no unit is stated. State that of the values in the column header, for example 'pressure \[kPa\]'"),
-    "decimal comma": (bench(row_1="1,5,300,5,201,5"), r"line 2: the line must have 3 cells .* it has 6. .* decimal comma, separate the columns by ';'"),
-    "text": (bench(row_7="n/a,290,100"), r"line 8: pressure 'n/a' is not a number. Correct the cell or delete"),
-    "NaN": (bench(row_7="nan,290,100"), r"line 8: pressure is nan; it must be finite. Correct the cell or delete .* use --missing"),
+    "without units": (
+        bench("pressure,length,force"),
+        (
+            r"'pressure': no unit is stated. State that of the values in the column header, for"
+            r" example 'pressure \[kPa\]'"
+        ),
+    ),
+    "decimal comma": (
+        bench(row_1="1,5,300,5,201,5"),
+        (
+            r"line 2: the line must have 3 cells .* it has 6. .* decimal comma, separate the"
+            r" columns by ';'"
+        ),
+    ),
+    "text": (
+        bench(row_7="n/a,290,100"),
+        r"line 8: pressure 'n/a' is not a number. Correct the cell or delete",
+    ),
+    "NaN": (
+        bench(row_7="nan,290,100"),
+        r"line 8: pressure is nan; it must be finite. Correct the cell or delete .* use --missing",
+    ),
     "infinity": (bench(row_7="1e400,290,100"), r"line 8: pressure is inf; it must be finite"),
     "empty cell": (bench(row_7=",290,100"), r"line 8: pressure has an empty cell"),
     "no rows": (HEAD, r"no rows of numbers below the headings \(pressure \[bar\], "),
@@ -77,27 +96,68 @@ CSV = {
     "ragged": (bench(row_35="1,2"), r"line 36: the line must have 3 cells \(.*\); it has 2"),
     "time backwards": (
         bench(f"time [s],{HEAD}", [[9 - i, *row] for i, row in enumerate(rows())]),
-        r"line 3: time 8 s is less than the time of the previous row \(9 s\). Time must increase: sort the rows",
+        (
+            r"line 3: time 8 s is less than the time of the previous row \(9 s\). Time must"
+            r" increase: sort the rows"
+        ),
     ),
-    "unknown column": (bench(HEAD.replace("press", "pres")), r"no column 'pressure'; .* Did you mean 'presure \[bar"),
-    "unknown unit": (bench(HEAD.replace("bar", "brr")), r"'pressure \[brr\]': 'brr' is not a known unit.*mean 'bar'\?"),
-    "wrong kind": (bench(HEAD.replace("bar", "mm")), r"'pressure \[mm\]': unit 'mm' cannot be converted to 'Pa'"),
-    "vacuum": (bench(row_3="-3,290,100"), r"line 4: a gauge pressure of -300 kPa is not above absolute vacuum"),
-    "metres": (bench(HEAD.replace("mm", "m")), r"line 2: with a resting length of 0.3 m, the contraction -1001 is outside the plausible range"),
+    "unknown column": (
+        bench(HEAD.replace("press", "pres")),
+        r"no column 'pressure'; .* Did you mean 'presure \[bar",
+    ),
+    "unknown unit": (
+        bench(HEAD.replace("bar", "brr")),
+        r"'pressure \[brr\]': 'brr' is not a known unit.*mean 'bar'\?",
+    ),
+    "wrong kind": (
+        bench(HEAD.replace("bar", "mm")),
+        r"'pressure \[mm\]': unit 'mm' cannot be converted to 'Pa'",
+    ),
+    "vacuum": (
+        bench(row_3="-3,290,100"),
+        r"line 4: a gauge pressure of -300 kPa is not above absolute vacuum",
+    ),
+    "metres": (
+        bench(HEAD.replace("mm", "m")),
+        (
+            r"line 2: with a resting length of 0.3 m, the contraction -1001 is outside the"
+            r" plausible range"
+        ),
+    ),
     "per cent": (
-        bench("pressure [bar],contraction,force [N]", [[p, (301 - x) / 3, f] for p, x, f in rows()]),
-        r"line 7: contraction 3.5 is outside the plausible range -0.5 to 1. For values in percent, rename .* 'contraction \[%\]'",
+        bench(
+            "pressure [bar],contraction,force [N]", [[p, (301 - x) / 3, f] for p, x, f in rows()]
+        ),
+        (
+            r"line 7: contraction 3.5 is outside the plausible range -0.5 to 1. For values in"
+            r" percent, rename .* 'contraction \[%\]'"
+        ),
     ),
-    "no force": (bench("pressure [bar],length [mm]", rows(0, 1)), r"no column 'force'; the columns are pressure, length"),
-    "twice": (bench(f"force [N],{HEAD}", rows(1, 0, 1, 2)), r"columns 'force \[N\]' and 'force \[N\]' \(numbers 1 and \d\) both contain the force"),
+    "no force": (
+        bench("pressure [bar],length [mm]", rows(0, 1)),
+        r"no column 'force'; the columns are pressure, length",
+    ),
+    "twice": (
+        bench(f"force [N],{HEAD}", rows(1, 0, 1, 2)),
+        r"columns 'force \[N\]' and 'force \[N\]' \(numbers 1 and \d\) both contain the force",
+    ),
     "few points": (bench(table=rows()[:3] + rows()[5:7]), r"6 free parameters, but only 5 rows"),
-    "one pressure": (bench(table=[[3, *r] for r in rows(1, 2)]), r"pressure is 300000 Pa in every row.*several levels"),
+    "one pressure": (
+        bench(table=[[3, *r] for r in rows(1, 2)]),
+        r"pressure is 300000 Pa in every row.*several levels",
+    ),
     "two pressures": (
         bench(table=[[1 if p < 3 else 4, *rest] for p, *rest in rows()]),
-        r"cannot separate a\(1\), a\(q\^2\) .*\(rank 5 of 6 parameters\).*2 of pressure, 7 of contraction.*Measure at more.*--degree 1",
+        (
+            r"cannot separate a\(1\), a\(q\^2\) .*\(rank 5 of 6 parameters\).*2 of pressure, 7 of"
+            r" contraction.*Measure at more.*--degree 1"
+        ),
     ),
-    "slack": (bench(table=[[p, length, 0] for p, length, _ in rows()]), r"all 35 rows are censored .*Give rows with"),
-}  # fmt: skip
+    "slack": (
+        bench(table=[[p, length, 0] for p, length, _ in rows()]),
+        r"all 35 rows are censored .*Give rows with",
+    ),
+}
 
 
 @pytest.mark.parametrize(("text", "message"), CSV.values(), ids=CSV.keys())
@@ -120,7 +180,14 @@ def test_a_bench_file_that_cannot_be_fitted(tmp_path: Path, text: str, message: 
 )
 def test_what_other_programs_write_is_read(tmp_path: Path, content: bytes):
     (tmp_path / "bench.csv").write_bytes(content)
-    arguments = ["fit", str(tmp_path / "bench.csv"), *SURFACE, "--out", str(tmp_path / "fit"), "--json"]
+    arguments = [
+        "fit",
+        str(tmp_path / "bench.csv"),
+        *SURFACE,
+        "--out",
+        str(tmp_path / "fit"),
+        "--json",
+    ]
     result = airmuscle(*arguments)
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["fit"]["rms_error"] < 1e-6
@@ -132,14 +199,22 @@ def test_what_other_programs_write_is_read(tmp_path: Path, content: bytes):
         (("--resting-length", "-300 mm"), "resting_length is -0.3 m; it must be positive"),
         (("--resting-length", "300 N"), "resting_length: unit 'N' cannot be converted to 'm'"),
         (("--resting-length", "300"), "resting_length: '300' has no unit"),
-        (("--unit", "presure=bar"), "a unit is given for 'presure', but .* Did you mean 'pressure'"),
-        (("--fix", "coefficient"), "no parameter 'coefficient' to be fixed; .* Did you mean 'coefficients'"),
+        (
+            ("--unit", "presure=bar"),
+            "a unit is given for 'presure', but .* Did you mean 'pressure'",
+        ),
+        (
+            ("--fix", "coefficient"),
+            "no parameter 'coefficient' to be fixed; .* Did you mean 'coefficients'",
+        ),
         (("--robust", "-1 N"), "is -1.0; it must be positive"),
     ],
 )
 def test_a_bad_option_of_fit(tmp_path: Path, option: tuple[str, str], message: str):
     (tmp_path / "bench.csv").write_text(bench(), encoding="utf-8")
-    said = refused(tmp_path, "fit", tmp_path / "bench.csv", *SURFACE, *option, "--out", tmp_path / "fit")
+    said = refused(
+        tmp_path, "fit", tmp_path / "bench.csv", *SURFACE, *option, "--out", tmp_path / "fit"
+    )
     assert re.search(message, said), said
 
 
@@ -147,8 +222,13 @@ def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path
     surface = ("--characteristic", "ContractileSurface", "--degree", "2")
     result = airmuscle("fit", "dmsp-20", *surface, "--out", tmp_path / "fit", "--json")
     assert json.loads(result.stdout)["fit"]["rows_used"] == len(load_data(MUSCLE))
-    said = refused(tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other")
-    assert said == f"{MUSCLE}: a data set of the library contains its units and constants; omit --unit."
+    said = refused(
+        tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other"
+    )
+    assert (
+        said
+        == f"{MUSCLE}: a data set of the library contains its units and constants; omit --unit."
+    )
     said = refused(tmp_path, "fit", "dmps-20-300", *surface, "--out", tmp_path / "other")
     assert re.fullmatch(rf"no data set 'dmps-20-300'; there are .* Did you mean '{MUSCLE}'\?", said)
 
@@ -159,20 +239,53 @@ def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--pressure=3 bar", "--contraction=90 %"), r"contraction: 90 % is outside the range of MartensBoblan2017, -4.9\d+ to 40 %"),
-        (("--pressure=3 bar", "--contraction=-50 %"), r"contraction: -50 % is outside the range of "),
-        (("--pressure=3 bar", "--contraction=12"), r"contraction: 1200 % is outside .* For a percentage, write '12 %'"),
-        (("--pressure=3 bar", "--contraction=12 mm"), "--contraction: unit 'mm' cannot be converted to a ratio"),
-        (("--pressure=3 bar", "--contraction=12 deg"), "--contraction: unit 'deg' cannot be converted to a ratio"),
-        (("--pressure=3,5 bar", "--force=1 N"), "'3,5 bar' contains a comma; write a decimal point, '3.5 bar'"),
-        (("--pressure=3 Bar", "--force=1 N"), r"--pressure: 'Bar' is not a known unit.* Did you mean 'bar'\?"),
+        (
+            ("--pressure=3 bar", "--contraction=90 %"),
+            r"contraction: 90 % is outside the range of MartensBoblan2017, -4.9\d+ to 40 %",
+        ),
+        (
+            ("--pressure=3 bar", "--contraction=-50 %"),
+            r"contraction: -50 % is outside the range of ",
+        ),
+        (
+            ("--pressure=3 bar", "--contraction=12"),
+            r"contraction: 1200 % is outside .* For a percentage, write '12 %'",
+        ),
+        (
+            ("--pressure=3 bar", "--contraction=12 mm"),
+            "--contraction: unit 'mm' cannot be converted to a ratio",
+        ),
+        (
+            ("--pressure=3 bar", "--contraction=12 deg"),
+            "--contraction: unit 'deg' cannot be converted to a ratio",
+        ),
+        (
+            ("--pressure=3,5 bar", "--force=1 N"),
+            "'3,5 bar' contains a comma; write a decimal point, '3.5 bar'",
+        ),
+        (
+            ("--pressure=3 Bar", "--force=1 N"),
+            r"--pressure: 'Bar' is not a known unit.* Did you mean 'bar'\?",
+        ),
         (("--pressure=1e400 bar", "--force=1 N"), "--pressure: '1e400 bar' is too large"),
-        (("--pressure=nan bar", "--force=1 N"), "--pressure: 'nan bar' is not a number with a unit; write it like"),
-        (("--pressure=0 bara", "--force=1 N"), "a gauge pressure of -101.325 kPa is not above absolute vacuum"),
-        (("--pressure=3 bar", "--force=-10 N"), "no contraction in the range .* is in equilibrium with -10 N at 300 kPa. Available force: 0 to"),
+        (
+            ("--pressure=nan bar", "--force=1 N"),
+            "--pressure: 'nan bar' is not a number with a unit; write it like",
+        ),
+        (
+            ("--pressure=0 bara", "--force=1 N"),
+            "a gauge pressure of -101.325 kPa is not above absolute vacuum",
+        ),
+        (
+            ("--pressure=3 bar", "--force=-10 N"),
+            (
+                "no contraction in the range .* is in equilibrium with -10 N at 300 kPa. Available"
+                " force: 0 to"
+            ),
+        ),
         (("--pressure=9**9**9**9", "--force=1 N"), "--pressure: .* is not a known unit"),
     ],
-)  # fmt: skip
+)
 def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...], message: str):
     said = refused(tmp_path, "evaluate", MUSCLE, *given, "--out", tmp_path / "chart")
     assert re.search(message, said), said
@@ -181,13 +294,19 @@ def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize("name", widened(list_laws(), lambda name: name not in SAME_LAW))
 def test_every_entry_answers_or_refuses_in_one_line(name: str):
-    """Loads, pressures and contractions far beyond any muscle: a number that JSON can hold, or one line."""
+    """Loads, pressures and contractions far beyond any muscle: a number that JSON can hold, or one
+    line.
+    """
     beyond = (
         ("--pressure=3 bar", "--force=1e6 N"),
         ("--pressure=0 bar", "--force=100 N"),
         ("--force=1e9 N", "--contraction=0.1"),
     )
-    for given in (*beyond, ("--pressure=3 bar", "--contraction=0.95"), ("--pressure=9 MPa", "--force=100 N")):
+    for given in (
+        *beyond,
+        ("--pressure=3 bar", "--contraction=0.95"),
+        ("--pressure=9 MPa", "--force=100 N"),
+    ):
         result = airmuscle("evaluate", name, *given, "--json")
         assert isinstance(result.exception, SystemExit | None), given
         others = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
@@ -195,28 +314,39 @@ def test_every_entry_answers_or_refuses_in_one_line(name: str):
         if result.exit_code == 0:
             solved = json.loads(result.stdout)["evaluation"]
             assert -0.5 <= solved["contraction"] < 1.0
-            assert all(isinstance(solved[quantity], float) for quantity in ("pressure", "contraction", "force"))
+            assert all(
+                isinstance(solved[quantity], float)
+                for quantity in ("pressure", "contraction", "force")
+            )
 
 
 @pytest.mark.parametrize("name", ["chou-hannaford", "tondu-lopez"])
 def test_without_pressure_a_closed_form_bears_no_load(name: str):
     law = load(name).characteristic
     for pressure in (0.0, np.array([0.0, 3e5])):
-        with pytest.raises(SolveError, match=r"in equilibrium with 100 N at 0 kPa\. Available force: 0 to 0 N"):
+        with pytest.raises(
+            SolveError, match=r"in equilibrium with 100 N at 0 kPa\. Available force: 0 to 0 N"
+        ):
             law.contraction(pressure, 100.0)
 
 
 def test_an_answer_that_no_muscle_can_be_is_refused(tmp_path: Path):
-    said = refused(tmp_path, "evaluate", "borzikova-direct-repaired", "--pressure=9 MPa", "--force=100 N")
+    said = refused(
+        tmp_path, "evaluate", "borzikova-direct-repaired", "--pressure=9 MPa", "--force=100 N"
+    )
     assert re.search(
-        r"the solution 9000 kPa, 328\.\d+ %, 100 N is not physical.*nearer to the validity range of the", said
+        r"the solution 9000 kPa, 328\.\d+ %, 100 N is not physical.*nearer to the validity range"
+        r" of the",
+        said,
     )
 
 
 # Units
 
 
-@pytest.mark.parametrize("unit", ["9**9**9**9", "m**99999999", "m^9^9^9", "10**99999999 m", "(9)**(9)**(9)"])
+@pytest.mark.parametrize(
+    "unit", ["9**9**9**9", "m**99999999", "m^9^9^9", "10**99999999 m", "(9)**(9)**(9)"]
+)
 def test_a_unit_that_would_never_be_worked_out_is_refused_at_once(unit: str):
     start = time.perf_counter()
     with pytest.raises(UnitError, match="is not a known unit"):
@@ -229,8 +359,16 @@ def test_powers_that_units_have_are_taken():
 
 
 def test_the_pressure_of_the_surroundings_takes_no_gauge_unit():
-    assert quantity("1 bara", ABSOLUTE) == quantity("100 kPa(a)", ABSOLUTE) == quantity("1 bar", ABSOLUTE) == 1e5
-    with pytest.raises(UnitError, match=r"here: unit 'barg' is gauge, but this pressure is absolute; write kPa\(a\)"):
+    assert (
+        quantity("1 bara", ABSOLUTE)
+        == quantity("100 kPa(a)", ABSOLUTE)
+        == quantity("1 bar", ABSOLUTE)
+        == 1e5
+    )
+    with pytest.raises(
+        UnitError,
+        match=r"here: unit 'barg' is gauge, but this pressure is absolute; write kPa\(a\)",
+    ):
         quantity("1 barg", ABSOLUTE, where="here")
 
 
@@ -260,9 +398,15 @@ class Tube:
     [
         ({"radius": "1"}, r"Tube.radius \(r, radius\): '1' has no unit; write it like"),
         ({"radius": np.nan}, r"is nan; it must be finite"),
-        ({"radius": 20.0}, r"is 20 m; allowed range: 0.001 to 0.1 m. Values are in SI units; check the unit"),
+        (
+            {"radius": 20.0},
+            r"is 20 m; allowed range: 0.001 to 0.1 m. Values are in SI units; check the unit",
+        ),
         ({"radius": np.array([0.01])}, r"is array\(\[0.01\]\); it must be one number"),
-        ({"radius": 0.01, "share": 30}, r"is 30; allowed range: 0 to 0.9. Is it in per cent\? As a ratio it is 0.3"),
+        (
+            {"radius": 0.01, "share": 30},
+            r"is 30; allowed range: 0 to 0.9. Is it in per cent\? As a ratio it is 0.3",
+        ),
         ({"radius": 0.01, "share": -1}, r"is -1; allowed range: 0 to 0.9.$"),
         ({"radius": 0.01, "share": True}, r"is True; it must be a number.$"),
     ],
@@ -275,14 +419,18 @@ def test_a_parameter_that_cannot_be(given: dict[str, object], message: str):
 @pytest.mark.parametrize("kind", [Schedule, SampledSignal])
 @pytest.mark.parametrize("given", [1, (1, 2), ((1, 2, 3),), (("5 s", 1),)])
 def test_a_command_that_is_no_pairs(kind: type, given: object):
-    with pytest.raises(ParameterError, match=r"of 'fill' is .*; write pairs of time \[s\] and value, \(\(5, 1\)"):
+    with pytest.raises(
+        ParameterError, match=r"of 'fill' is .*; write pairs of time \[s\] and value, \(\(5, 1\)"
+    ):
         kind({"fill": given})
 
 
 @pytest.mark.parametrize("kind", [Schedule, SampledSignal])
 @pytest.mark.parametrize("given", [None, ((5, 1), (15, 0))])
 def test_a_command_that_names_no_inputs(kind: type, given: object):
-    with pytest.raises(ParameterError, match=r"a (schedule|sampled signal) is .*; name the inputs: {'fill': "):
+    with pytest.raises(
+        ParameterError, match=r"a (schedule|sampled signal) is .*; name the inputs: {'fill': "
+    ):
         kind(given)
 
 
@@ -308,7 +456,10 @@ def test_a_run_that_cannot_be(plant: Plant):
     for opening in (7.0, -0.5):
         with pytest.raises(
             ParameterError,
-            match=rf"the input 'fill' is {opening:g} before 1 s; allowed range: 0 to 1 \(opening, 0 closed",
+            match=(
+                rf"the input 'fill' is {opening:g} before 1 s; allowed range: 0 to 1 \(opening, 0"
+                r" closed"
+            ),
         ):
             simulate(plant, Schedule({"fill": ((0, opening),)}), duration=1.0)
         with pytest.raises(ParameterError, match=rf"the input 'fill' is {opening:g}"):
@@ -317,7 +468,9 @@ def test_a_run_that_cannot_be(plant: Plant):
 
 @pytest.mark.parametrize("dt", [0.0, -1.0, np.nan, np.inf])
 def test_a_step_of_no_length(plant: Plant, dt: float):
-    with pytest.raises(ParameterError, match=r"advance: dt is .* s; it must be positive and finite"):
+    with pytest.raises(
+        ParameterError, match=r"advance: dt is .* s; it must be positive and finite"
+    ):
         advance(plant, find_equilibrium(plant, pressure=0.0), {}, dt)
 
 
@@ -352,21 +505,58 @@ BOX = "min_pressure = 0\nmax_pressure = 6e5\nmin_contraction = 0\nmax_contractio
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("validity_range = 3", r"\[validity_range\] is 3; it must be a table. Write its values in it: min_pressure, max_pressure, min_contraction, max_contraction\.$"),
-        (f"[validity_range]\n{BOX.replace('0.25', '25')}", r"\[validity_range\]: ValidityRange.max_contraction .* is 25; allowed range: -0.5 to 1"),
-        (f"[validity_range]\n{BOX.replace('min_pressure = 0', 'min_pressure = -3e5', 1)}", r"\[validity_range\]: .* is -300000 Pa"),
-        (f'[validity_range]\nmodel = "Braid"\n{BOX}', r"\[validity_range\]: Braid is not allowed here; a ValidityRange is required"),
-        ('[[check]]\nquantity = "volume"\ncontraction = nan\nequals = 1\ntolerance = 1\nsource = "s"', r"contraction is nan"),
-        ('[[check]]\nquantity = "volume"\ncontraction = 0\nequals = 1\ntolerance = -1\nsource = "s"', r"tolerance is -1"),
-        ('[[reference]]\nkey = "k"\nauthors = "a"\ntitle = "t"\nwhere = "w"\ndoi = 3', r"\[reference 1\]: doi is 3"),
+        (
+            "validity_range = 3",
+            (
+                r"\[validity_range\] is 3; it must be a table. Write its values in it:"
+                r" min_pressure, max_pressure, min_contraction, max_contraction\.$"
+            ),
+        ),
+        (
+            f"[validity_range]\n{BOX.replace('0.25', '25')}",
+            r"\[validity_range\]: ValidityRange.max_contraction .* is 25; allowed range: -0.5 to 1",
+        ),
+        (
+            f"[validity_range]\n{BOX.replace('min_pressure = 0', 'min_pressure = -3e5', 1)}",
+            r"\[validity_range\]: .* is -300000 Pa",
+        ),
+        (
+            f'[validity_range]\nmodel = "Braid"\n{BOX}',
+            r"\[validity_range\]: Braid is not allowed here; a ValidityRange is required",
+        ),
+        (
+            (
+                '[[check]]\nquantity = "volume"\ncontraction = nan\nequals = 1\ntolerance ='
+                ' 1\nsource = "s"'
+            ),
+            r"contraction is nan",
+        ),
+        (
+            (
+                '[[check]]\nquantity = "volume"\ncontraction = 0\nequals = 1\ntolerance ='
+                ' -1\nsource = "s"'
+            ),
+            r"tolerance is -1",
+        ),
+        (
+            '[[reference]]\nkey = "k"\nauthors = "a"\ntitle = "t"\nwhere = "w"\ndoi = 3',
+            r"\[reference 1\]: doi is 3",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_muscle_file_with_a_bad_table(tmp_path: Path, text: str, message: str):
-    law = '[characteristic]\nmodel = "ChouHannaford1996"\n[characteristic.geometry]\nmodel = "Braid"\n'
-    head = f'title = "t"\nprovenance = "chosen"\n{text if text.startswith("validity_range") else ""}\n'
+    law = (
+        '[characteristic]\nmodel = "ChouHannaford1996"\n[characteristic.geometry]\nmodel ='
+        ' "Braid"\n'
+    )
+    head = (
+        f'title = "t"\nprovenance = "chosen"\n{text if text.startswith("validity_range") else ""}\n'
+    )
     braid = "radius = 0.01\nbraid_angle = 0.4\nresting_length = 0.3\n"
     file = tmp_path / "muscle.toml"
-    file.write_text(head + law + braid + ("" if text.startswith("validity_range") else text), encoding="utf-8")
+    file.write_text(
+        head + law + braid + ("" if text.startswith("validity_range") else text), encoding="utf-8"
+    )
     said = refused(tmp_path, "show", file)
     assert re.search(rf"muscle\.toml.*{message}", said), said
 
@@ -377,7 +567,9 @@ def test_a_muscle_file_with_a_bad_table(tmp_path: Path, text: str, message: str)
 @pytest.mark.parametrize("name", ["taken", "taken/below", "a" * 300])
 def test_a_folder_that_cannot_be_made(tmp_path: Path, name: str):
     (tmp_path / "taken").write_text("a file", encoding="utf-8")
-    with pytest.raises(FileError, match=r"cannot be written to: .*Specify a folder with write permission"):
+    with pytest.raises(
+        FileError, match=r"cannot be written to: .*Specify a folder with write permission"
+    ):
         check_writable(tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
 
@@ -390,17 +582,25 @@ def write_a_run(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("blocked", "is_folder"), [("report.html", True), ("figures", False)])
-def test_a_name_that_is_taken_leaves_the_folder_as_it_was(tmp_path: Path, blocked: str, is_folder: bool):
+def test_a_name_that_is_taken_leaves_the_folder_as_it_was(
+    tmp_path: Path, blocked: str, is_folder: bool
+):
     target = tmp_path / "run"
     target.mkdir()
-    (target / blocked).mkdir() if is_folder else (target / blocked).write_text("a file", encoding="utf-8")
+    (
+        (target / blocked).mkdir()
+        if is_folder
+        else (target / blocked).write_text("a file", encoding="utf-8")
+    )
     kind = "folder" if is_folder else "file"
     with pytest.raises(FileError, match=rf"a {kind} of this name exists \(.*{blocked}\)"):
         write_a_run(target)
     assert [path.name for path in target.rglob("*")] == [blocked]
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+@pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="only Linux has a device that is always full"
+)
 @pytest.mark.parametrize("option", widened([((),), (("--json",),)], lambda option: not option))
 def test_a_full_disk_is_one_line(option: tuple[str, ...]):
     with Path("/dev/full").open("w") as full:
@@ -418,7 +618,8 @@ class Interrupted:
     """A kernel that the user stops during its third packet of steps."""
 
     def __init__(self, kernel: BoundKernel) -> None:
-        self.kernel, self.packets = kernel, 0
+        self.kernel = kernel
+        self.packets = 0
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.kernel, name)
@@ -430,7 +631,9 @@ class Interrupted:
         return self.kernel()
 
 
-def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_interrupted_simulation_keeps_what_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     (tmp_path / "run.toml").write_text(
         f'[plant]\nmuscle = "{MUSCLE}"\ncircuit = "ClosedChamber"\n'
         'mechanism = { model = "HangingMass", mass = "5 kg" }\n'
@@ -450,11 +653,14 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
 
 def test_what_a_killed_process_has_left_is_removed_by_the_next_one(tmp_path: Path):
     code = (
-        "import os, signal, sys; from airmuscle.core.atomic_output import atomic_folder\n"
-        "with atomic_folder(sys.argv[1]) as folder:\n    (folder / 'a.csv').touch(); os.kill(os.getpid(), signal.SIGKILL)"
+        "import os, signal, sys; from airmuscle.core.atomic_output import atomic_folder\nwith"
+        " atomic_folder(sys.argv[1]) as folder:\n    (folder / 'a.csv').touch();"
+        " os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)
     assert len(list(tmp_path.glob(".unfinished-*"))) == 1
     with atomic_folder(tmp_path) as mine, atomic_folder(tmp_path) as other:
-        assert sorted(tmp_path.iterdir()) == sorted([mine, other]), "the folder of a running process is kept"
+        assert sorted(tmp_path.iterdir()) == sorted([mine, other]), (
+            "the folder of a running process is kept"
+        )
     assert not list(tmp_path.iterdir())

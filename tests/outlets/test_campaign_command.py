@@ -1,5 +1,6 @@
-"""`airmuscle campaign FOLDER`: one command writes the muscle with its uncertainty, the report and a scenario of each
-record; files that cannot be read are named and left out, folders that contradict themselves are refused.
+"""`airmuscle campaign FOLDER`: one command writes the muscle with its uncertainty, the report and a
+scenario of each record; files that cannot be read are named and left out, folders that contradict
+themselves are refused.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ def result(tmp_path_factory):
 
 def test_two_processes_find_what_one_does(result, tmp_path):
     rig, _, alone = result
-    done = run(rig, "--validate", rig / "later.csv", "--out", tmp_path / "out", "--json", "--workers", "2")
+    done = run(
+        rig, "--validate", rig / "later.csv", "--out", tmp_path / "out", "--json", "--workers", "2"
+    )
     assert done.exit_code == 0, done.stderr
     assert json.loads(done.stdout)["campaign"] == alone
 
@@ -67,13 +70,23 @@ def test_the_muscle_file_has_the_standard_errors_and_correlations_of_its_paramet
 
 @pytest.mark.parametrize(
     ("record", "limit"),
-    [("m300_isobar_3bar", 15.0), ("m300_isometrisch_10", 15.0), ("m300_fuellen_8", 40.0), ("m300_freigabe", 40.0)],
+    [
+        ("m300_isobar_3bar", 15.0),
+        ("m300_isometrisch_10", 15.0),
+        ("m300_fuellen_8", 40.0),
+        ("m300_freigabe", 40.0),
+    ],
 )
 def test_each_scenario_reproduces_its_record(result, record, limit):
     """The rms error of the simulated force [N] on a muscle of up to 1600 N."""
     rig, out, _ = result
     path = out / "scenarios" / f"{record}.toml"
-    start = float(path.read_text(encoding="utf-8").splitlines()[0].partition("time 0 is at ")[2].partition(" s")[0])
+    start = float(
+        path.read_text(encoding="utf-8")
+        .splitlines()[0]
+        .partition("time 0 is at ")[2]
+        .partition(" s")[0]
+    )
     simulated = load_scenario(path).simulate()
     (measured,) = read(rig / f"{record}.csv")
     time = measured["time"] - start
@@ -126,7 +139,8 @@ def test_a_folder_without_a_readable_file_is_refused_with_each_reason(tmp_path):
 
 
 def test_contradictory_units_are_refused(tmp_path):
-    rng, muscle = np.random.default_rng(1), TrueMuscle(0.3)
+    rng = np.random.default_rng(1)
+    muscle = TrueMuscle(0.3)
     for bar in (1.0, 3.0, 5.0):
         write_german(tmp_path / f"{bar:g}.csv", muscle.isobaric(bar, rng), 0.3)
     text = (tmp_path / "5.csv").read_text(encoding="utf-8").replace("Kraft [N]", "Kraft [kN]")
@@ -162,7 +176,9 @@ def test_an_uncertainty_that_is_none_is_refused(errors, matrix, message):
 def test_a_muscle_file_with_a_broken_uncertainty_names_the_table(result, tmp_path):
     _, out, _ = result
     text = (out / "muscle.toml").read_text(encoding="utf-8")
-    (tmp_path / "muscle.toml").write_text(text.replace("standard_errors = [", "standard_errors = [1.0, "), "utf-8")
+    (tmp_path / "muscle.toml").write_text(
+        text.replace("standard_errors = [", "standard_errors = [1.0, "), "utf-8"
+    )
     with pytest.raises(ParameterError, match=r"\[uncertainty\].*one standard error"):
         load(tmp_path / "muscle.toml")
 
@@ -172,7 +188,15 @@ def test_the_campaign_of_three_lengths_takes_less_than_a_minute(tmp_path):
     """Computing time of the process, which does not depend on other programs of the machine."""
     rig = write_campaign(tmp_path / "rig", THREE_LENGTHS)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-m", "airmuscle", "campaign", str(rig), "--out", str(tmp_path / "out")]
+    command = [
+        sys.executable,
+        "-m",
+        "airmuscle",
+        "campaign",
+        str(rig),
+        "--out",
+        str(tmp_path / "out"),
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,6 @@
-"""An interrupted campaign continues after its last finished stage, also after the process was killed."""
+"""An interrupted campaign continues after its last finished stage, also after the process was
+killed.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,9 @@ STAGE = LeftOutStage("creep", "no record is a hold", "hold the length")
 
 
 def recording(force: float = 10.0) -> Recording:
-    return Recording({"pressure": np.full(5, 1e5), "force": np.full(5, force)}, "run", {"resting_length": 0.3})
+    return Recording(
+        {"pressure": np.full(5, 1e5), "force": np.full(5, force)}, "run", {"resting_length": 0.3}
+    )
 
 
 @pytest.fixture
@@ -66,11 +70,14 @@ def test_a_result_that_cannot_be_stored_is_not_kept():
 @pytest.mark.slow
 @pytest.mark.usefixtures("cache")
 def test_a_killed_campaign_does_not_fit_its_finished_stages_again(tmp_path, monkeypatch):
-    rig, out = write_campaign(tmp_path / "rig"), tmp_path / "out"
+    rig = write_campaign(tmp_path / "rig")
+    out = tmp_path / "out"
     for pattern in ("*isobar_[236]*", "*isometrisch*", "*fuellen*", "*freigabe*"):
         for path in rig.glob(pattern):
             path.unlink()
-    process = subprocess.Popen([sys.executable, "-m", "airmuscle", "campaign", str(rig), "--out", str(out)])
+    process = subprocess.Popen(
+        [sys.executable, "-m", "airmuscle", "campaign", str(rig), "--out", str(out)]
+    )
     until = time.monotonic() + 1200.0
     while time.monotonic() < until and process.poll() is None:
         stages = out / "stages.json"
@@ -84,10 +91,14 @@ def test_a_killed_campaign_does_not_fit_its_finished_stages_again(tmp_path, monk
     def fitted_again(*_):
         raise AssertionError("a finished stage is fitted again")
 
-    monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_friction_stage", fitted_again)
+    monkeypatch.setattr(
+        "airmuscle.bench.identify.campaign.campaign.fit_friction_stage", fitted_again
+    )
     monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_creep_stage", fitted_again)
     done = airmuscle("campaign", rig, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert "continued after: creep, hysteresis" in done.stderr
     assert (out / "muscle.toml").exists()
-    assert not list((tmp_path / "cache").glob("campaign-*")), "the stages of a complete campaign are removed"
+    assert not list((tmp_path / "cache").glob("campaign-*")), (
+        "the stages of a complete campaign are removed"
+    )

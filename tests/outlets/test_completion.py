@@ -1,4 +1,6 @@
-"""Completion: the shell completes commands, options and library names; names are found in any spelling."""
+"""Completion: the shell completes commands, options and library names; names are found in any
+spelling.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,9 @@ def test_commands_options_and_names_of_the_library_are_completed(monkeypatch: py
     assert "--pressure" in completed("airmuscle evaluate --pre", monkeypatch)
     assert completed("airmuscle show matr", monkeypatch) == ["matrix-821"]
     assert completed("airmuscle simulate arm", monkeypatch) == ["arm-lilly-quesada"]
-    assert {"dmsp-20-300", "joint-dmsp-20-matrix"} <= set(completed("airmuscle predict ", monkeypatch))
+    assert {"dmsp-20-300", "joint-dmsp-20-matrix"} <= set(
+        completed("airmuscle predict ", monkeypatch)
+    )
     assert "dmsp-20-300" in completed("airmuscle fit dmsp", monkeypatch)
 
 

@@ -1,6 +1,8 @@
-"""Every component of a plant can be written into a scenario file, and what is read from there is the same plant.
+"""Every component of a plant can be written into a scenario file, and what is read from there is
+the same plant.
 
-The file is written with SI numbers here; the words of an error and units as text are the matter of test_scenario.
+The file is written with SI numbers here; the words of an error and units as text are the matter of
+test_scenario.
 """
 
 from __future__ import annotations
@@ -14,7 +16,14 @@ from widths import widened
 
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.files.library import Location, build_plant, model_class, model_names, read_toml, write
+from airmuscle.files.library import (
+    Location,
+    build_plant,
+    model_class,
+    model_names,
+    read_toml,
+    write,
+)
 
 
 def text_of(plant):
@@ -33,14 +42,28 @@ def written(name, folder):
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_a_plant_in_a_file_is_the_plant(name, tmp_path):
     file = written(name, tmp_path)
-    assert build_plant(read_toml(file)["plant"], Location(str(file), "plant", tmp_path)) == EXAMPLES[name]
+    assert (
+        build_plant(read_toml(file)["plant"], Location(str(file), "plant", tmp_path))
+        == EXAMPLES[name]
+    )
 
 
 DIFFERENT = {
-    "stop, lagging wall", "Maxwell slip", "closed", "held for good", "tube with inertia", "overlap",
-    "manifold on tank and regulator", "prescribed", "load in another program", "arm", "muscles in series",
-}  # fmt: skip
-"""Plants that differ in their states, inputs and starts: one muscle or several, without inputs, without coordinates."""
+    "stop, lagging wall",
+    "Maxwell slip",
+    "closed",
+    "held for good",
+    "tube with inertia",
+    "overlap",
+    "manifold on tank and regulator",
+    "prescribed",
+    "load in another program",
+    "arm",
+    "muscles in series",
+}
+"""Plants that differ in their states, inputs and starts: one muscle or several, without inputs,
+without coordinates.
+"""
 
 
 @pytest.mark.parametrize("name", widened(EXAMPLES, lambda name: name in DIFFERENT))
@@ -79,7 +102,8 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
     file = tmp_path / "tube.toml"
     file.write_text(TUBE, encoding="utf-8")
     scenario = load_scenario(file)
-    tube, muscle = scenario.plant.circuit.tube, scenario.plant.muscle
+    tube = scenario.plant.circuit.tube
+    muscle = scenario.plant.muscle
     assert (tube.length, tube.diameter, tube.segment_count) == (1.5, 0.004, 5)
     assert muscle.series.stiffness == 2e5
     assert muscle.damper.shortening == 2900.0
@@ -92,14 +116,38 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
 @pytest.mark.parametrize(
     ("right", "wrong", "message"),
     [
-        ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; allowed range: 1 to 200"),
-        ('diameter = "4 mm"', 'diameter = "4 m"', r"diameter \(D, inner diameter of the tube\) is 4 m; allowed range: 0.0005 to 0.1 m"),
-        ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"Supply is not allowed here; a TubeModel is required"),
-        ('damper = "Serres2009Damper"', 'damper = "LinearSpring"', r"LinearSpring is not allowed here; a Damper is required"),
-        ('valve = [["10 ms", 1]', 'valve = [["10 ms", 2]', r"the input 'valve' is 2 .* allowed range: -1 to 1"),
-        ('supply = { model = "Tank"', 'supply = "SharedSupply" #', r"SharedSupply\(\) is allowed only as the supply of a branch in a Manifold"),
+        (
+            "segment_count = 5",
+            "segment_count = 0",
+            r"DistributedTube: segment_count is 0; allowed range: 1 to 200",
+        ),
+        (
+            'diameter = "4 mm"',
+            'diameter = "4 m"',
+            r"diameter \(D, inner diameter of the tube\) is 4 m; allowed range: 0.0005 to 0.1 m",
+        ),
+        (
+            'tube = { model = "DistributedTube"',
+            'tube = { model = "Supply", pressure = "1 bar" } #',
+            r"Supply is not allowed here; a TubeModel is required",
+        ),
+        (
+            'damper = "Serres2009Damper"',
+            'damper = "LinearSpring"',
+            r"LinearSpring is not allowed here; a Damper is required",
+        ),
+        (
+            'valve = [["10 ms", 1]',
+            'valve = [["10 ms", 2]',
+            r"the input 'valve' is 2 .* allowed range: -1 to 1",
+        ),
+        (
+            'supply = { model = "Tank"',
+            'supply = "SharedSupply" #',
+            r"SharedSupply\(\) is allowed only as the supply of a branch in a Manifold",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_a_component_is_said_with_its_place(right, wrong, message, tmp_path):
     file = tmp_path / "tube.toml"
     file.write_text(TUBE.replace(right, wrong), encoding="utf-8")
@@ -111,6 +159,9 @@ def test_the_page_of_components_names_each_with_a_line():
     page = (Path(__file__).parents[2] / "docs" / "components.md").read_text(encoding="utf-8")
     parts = ("pneumatics", "muscle")
     modules = {n: model_class(n, "").__module__.split(".") for n in model_names()}
-    owned = ["HuntCrossley", *(n for n, m in modules.items() if m[2] in parts and len(m) == 4 and n != "Muscle")]
+    owned = [
+        "HuntCrossley",
+        *(n for n, m in modules.items() if m[2] in parts and len(m) == 4 and n != "Muscle"),
+    ]
     assert len(owned) > 30
     assert [n for n in owned if f"`{n}`" not in page] == []

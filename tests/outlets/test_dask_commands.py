@@ -1,5 +1,5 @@
-"""Every command that distributes its work gives, on the workers of a Dask cluster, what one process gives; a problem,
-too, is solved there."""
+"""Every command that distributes its work gives, on the workers of a Dask cluster, what one process
+gives; a problem, too, is solved there."""
 
 from __future__ import annotations
 
@@ -21,15 +21,46 @@ from airmuscle.errors import InputError
 from airmuscle.files import load_scenario
 
 COMMANDS = {
-    "compare": ("fit", "map.csv", "--compare", "--characteristic", "Sarosi2012", "--characteristic", "Hunt2017"),
+    "compare": (
+        "fit",
+        "map.csv",
+        "--compare",
+        "--characteristic",
+        "Sarosi2012",
+        "--characteristic",
+        "Hunt2017",
+    ),
     "study": ("study", "study.toml"),
-    "bootstrap": ("fit", "map.csv", "--characteristic", "Sarosi2012", "--bootstrap", 20, "--leave-out", "pressure"),
+    "bootstrap": (
+        "fit",
+        "map.csv",
+        "--characteristic",
+        "Sarosi2012",
+        "--bootstrap",
+        20,
+        "--leave-out",
+        "pressure",
+    ),
     "tune": ("tune", "loop.toml", "--budget", 64, "--draws", 1),
-    "benchmark": ("benchmark", "--controller", "PID", "--task", "step", "--budget", 112, "--truths", 1, "--runs", 2),
+    "benchmark": (
+        "benchmark",
+        "--controller",
+        "PID",
+        "--task",
+        "step",
+        "--budget",
+        112,
+        "--truths",
+        1,
+        "--runs",
+        2,
+    ),
     "campaign": ("campaign", "map.csv", "loop.csv", "--resting-length", "300 mm"),
 }
 FEW = ("study",)
-"""The command that runs by default, whose workers start in a third of the time of those that compare laws."""
+"""The command that runs by default, whose workers start in a third of the time of those that
+compare laws.
+"""
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +68,9 @@ def cluster() -> Iterator[str]:
     """The address of a cluster of two worker processes."""
     distributed = pytest.importorskip("distributed")
     quiet = {"dashboard_address": None, "worker_dashboard_address": None}
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, **quiet) as local:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, **quiet
+    ) as local:
         yield local.scheduler_address
 
 
@@ -55,7 +88,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write(load_data("dmsp-20-300"), tmp_path / "map.csv")
     time = np.linspace(0.0, 40.0, 401)
     contraction = 0.1 - 0.1 * np.cos(0.1 * np.pi * time)
-    force = load("dmsp-20-300").characteristic.force(3e5, contraction) - 8.0 * np.sign(np.gradient(contraction))
+    force = load("dmsp-20-300").characteristic.force(3e5, contraction) - 8.0 * np.sign(
+        np.gradient(contraction)
+    )
     columns = {"time": time, "pressure": np.full(401, 3e5), "contraction": contraction}
     noise = np.random.default_rng(1).standard_normal(401)
     write(Recording({**columns, "force": force + noise}, "loop"), tmp_path / "loop.csv")
@@ -64,7 +99,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(
-    "name", [name if name in FEW else pytest.param(name, marks=pytest.mark.slow) for name in COMMANDS]
+    "name",
+    [name if name in FEW else pytest.param(name, marks=pytest.mark.slow) for name in COMMANDS],
 )
 def test_a_command_on_a_cluster_gives_what_one_process_gives(folder: Path, cluster: str, name: str):
     alone, there = (
@@ -92,7 +128,10 @@ def test_no_command_computes_without_the_cluster_that_it_was_given(folder: Path,
 def test_an_address_that_cannot_be_used_leaves_no_client(address: str):
     pytest.importorskip("distributed")
     before = threading.active_count()
-    with pytest.raises(InputError, match="no response from a Dask scheduler"), dask_cluster(address):
+    with (
+        pytest.raises(InputError, match="no response from a Dask scheduler"),
+        dask_cluster(address),
+    ):
         raise AssertionError("the block is not entered")
     assert threading.active_count() == before
 

@@ -1,4 +1,6 @@
-"""Display units: plots, tables and texts are in the units that the user chooses; values and files are not affected."""
+"""Display units: plots, tables and texts are in the units that the user chooses; values and files
+are not affected.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +42,18 @@ def config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("AIRMUSCLE_CONFIG_DIR", str(tmp_path))
     monkeypatch.setattr(module, "_process", [None])
     module._configured.cache_clear()
-    yield lambda text: (tmp_path / CONFIG_FILE).write_bytes(text if isinstance(text, bytes) else text.encode())
+    yield lambda text: (tmp_path / CONFIG_FILE).write_bytes(
+        text if isinstance(text, bytes) else text.encode()
+    )
     module._configured.cache_clear()
 
 
 def run() -> am.Recording:
     time = np.linspace(0.0, 1.0, 11)
-    return am.Recording({"time": time, "pressure": 1e5 * time, "angle": 0.1 * time, "contraction": 0.1 * time}, "run")
+    return am.Recording(
+        {"time": time, "pressure": 1e5 * time, "angle": 0.1 * time, "contraction": 0.1 * time},
+        "run",
+    )
 
 
 def labels(figure) -> list[str]:
@@ -68,7 +75,11 @@ def test_without_a_choice_the_units_are_the_usual_ones():
 
 
 def test_a_level_of_noisy_values_is_written_as_the_level_that_was_set():
-    assert [level_text("contraction", each, 0.24) for each in (-6e-6, 0.03001, 0.1195)] == ["0 %", "3 %", "11.95 %"]
+    assert [level_text("contraction", each, 0.24) for each in (-6e-6, 0.03001, 0.1195)] == [
+        "0 %",
+        "3 %",
+        "11.95 %",
+    ]
     assert level_text("pressure", 299_987.0, 6e5) == "300 kPa"
     assert level_text("length", 0.2, 0.0) == "200 mm"
 
@@ -76,7 +87,10 @@ def test_a_level_of_noisy_values_is_written_as_the_level_that_was_set():
 def test_a_call_replaces_the_previous_choice_and_no_units_are_the_usual_ones():
     display("bar", "mm")
     display("psi")
-    assert (quantity_text(3e5, "Pa", "kPa"), quantity_text(0.3, "m", "cm")) == ("43.51 psi", "30 cm")
+    assert (quantity_text(3e5, "Pa", "kPa"), quantity_text(0.3, "m", "cm")) == (
+        "43.51 psi",
+        "30 cm",
+    )
     display()
     assert quantity_text(3e5, "Pa", "kPa") == "300 kPa"
 
@@ -101,7 +115,8 @@ def test_a_block_holds_in_its_thread_only_and_a_call_in_all_threads():
 
 
 def test_a_block_that_begins_after_another_call_leaves_that_call_in_force():
-    block, _ = display("psi"), display("bar")
+    block = display("psi")
+    _ = display("bar")
     with block:
         assert quantity_text(3e5, "Pa", "kPa") == "43.51 psi"
     assert quantity_text(3e5, "Pa", "kPa") == "3 bar"
@@ -138,15 +153,25 @@ def test_wrong_and_contradictory_units_are_named_and_change_nothing(units: tuple
 
 def test_the_configuration_file_is_used_until_a_call_replaces_it(config):
     config('[display]\nunits = ["bar", "deg"]\n')
-    assert (quantity_text(3e5, "Pa", "kPa"), labels(run().plot("angle"))) == ("3 bar", ["angle\n[deg]"])
+    assert (quantity_text(3e5, "Pa", "kPa"), labels(run().plot("angle"))) == (
+        "3 bar",
+        ["angle\n[deg]"],
+    )
     display("psi")
-    assert (quantity_text(3e5, "Pa", "kPa"), labels(run().plot("angle"))) == ("43.51 psi", ["angle\n[rad]"])
+    assert (quantity_text(3e5, "Pa", "kPa"), labels(run().plot("angle"))) == (
+        "43.51 psi",
+        ["angle\n[rad]"],
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "error", "said"),
     [
-        ('[display]\nunits = ["bar", "psi"]', UnitError, r"config.toml: \[display\] units: 'bar' and 'psi'"),
+        (
+            '[display]\nunits = ["bar", "psi"]',
+            UnitError,
+            r"config.toml: \[display\] units: 'bar' and 'psi'",
+        ),
         ('[display]\nunits = "bar"', FileError, r'write \[display\] and under it units = \["bar"'),
         ("[display]\nunit = []", FileError, "unknown key 'unit'"),
         ("[colours]\na = 1", FileError, "unknown key 'colours'"),
@@ -155,7 +180,9 @@ def test_the_configuration_file_is_used_until_a_call_replaces_it(config):
         (b"\xff\xfe", FileError, "is not valid TOML"),
     ],
 )
-def test_an_invalid_configuration_file_is_named_with_what_to_write(config, text, error: type[Exception], said: str):
+def test_an_invalid_configuration_file_is_named_with_what_to_write(
+    config, text, error: type[Exception], said: str
+):
     config(text)
     with pytest.raises(error, match=said):
         quantity_text(3e5, "Pa", "kPa")
@@ -165,7 +192,13 @@ def test_headings_of_other_quantities_and_ratios_that_are_no_contraction_are_kep
     display("bar", "1", "mm")
     assert heading_scale("gauge pressure [kPa]") == (pytest.approx(0.01), "gauge pressure [bar]")
     assert heading_scale("contraction [%]") == (pytest.approx(0.01), "contraction [-]")
-    for kept in ("rows of the record [%]", "pressure [kPa(a)]", "force [N]", "title", "rate [Pa/s]"):
+    for kept in (
+        "rows of the record [%]",
+        "pressure [kPa(a)]",
+        "force [N]",
+        "title",
+        "rate [Pa/s]",
+    ):
         assert heading_scale(kept) == (1.0, kept)
 
 
@@ -225,7 +258,9 @@ def test_a_user_without_a_home_folder_has_no_configuration(config, monkeypatch: 
     assert module.chosen_scale("Pa", 1e-3, "kPa") == (1e-3, "kPa")
 
 
-def test_a_configuration_in_a_folder_of_another_user_is_not_read(config, monkeypatch: pytest.MonkeyPatch):
+def test_a_configuration_in_a_folder_of_another_user_is_not_read(
+    config, monkeypatch: pytest.MonkeyPatch
+):
     def denied(self: Path, *args: object, **options: object) -> str:
         raise PermissionError(13, "Permission denied")
 

@@ -1,5 +1,5 @@
-"""Whatever executor computes its parts, a result is that of this process alone: tuning, bootstrap, benchmark, joint
-friction and rollouts."""
+"""Whatever executor computes its parts, a result is that of this process alone: tuning, bootstrap,
+benchmark, joint friction and rollouts."""
 
 from __future__ import annotations
 
@@ -35,12 +35,16 @@ def executor():
         yield threads
 
 
-def test_a_bootstrap_does_not_depend_on_its_executor(executor: Executor, monkeypatch: pytest.MonkeyPatch):
+def test_a_bootstrap_does_not_depend_on_its_executor(
+    executor: Executor, monkeypatch: pytest.MonkeyPatch
+):
     """A first block, and two that start at what it has found."""
     monkeypatch.setattr("airmuscle.bench.identify.bootstrapping.REFITS_OF_A_TASK", 10)
     runs = load_data("dmsp-20-300")
     found = fit(load_law("dmsp-20-300").characteristic, runs)
-    alone, shared = (bootstrap(found, runs, refits=25, seed=2, workers=each) for each in (1, executor))
+    alone, shared = (
+        bootstrap(found, runs, refits=25, seed=2, workers=each) for each in (1, executor)
+    )
     assert executor.count == 2
     assert np.array_equal(alone.values, shared.values, equal_nan=True)
     assert alone.failed_refits < 3
@@ -52,7 +56,8 @@ def test_a_benchmark_does_not_depend_on_its_executor(executor: Executor, sets: i
     follower = Contender("follower", MINE.law, {}, tuned_as=MINE)
     options = {"sets_per_gain": sets, "commissioning_runs": 0}
     alone, shared = (
-        benchmark_controllers(JOINT, [follower, MINE], [SHORT], workers=each, **options) for each in (1, executor)
+        benchmark_controllers(JOINT, [follower, MINE], [SHORT], workers=each, **options)
+        for each in (1, executor)
     )
     assert executor.count == 2
     assert shared.results[0].contender is follower
@@ -61,7 +66,9 @@ def test_a_benchmark_does_not_depend_on_its_executor(executor: Executor, sets: i
         assert (one.tuning is None) == (sets == 0)
         if sets:
             assert one.tuning.gains == other.tuning.gains == alone.results[1].tuning.gains
-        assert [run.metrics for run in one.runs.values()] == [run.metrics for run in other.runs.values()]
+        assert [run.metrics for run in one.runs.values()] == [
+            run.metrics for run in other.runs.values()
+        ]
 
 
 def track(observations):
@@ -69,21 +76,29 @@ def track(observations):
     return np.clip(np.stack([-observations[:, 0], observations[:, 0]], axis=1), -1, 1)
 
 
-def test_rollouts_do_not_depend_on_their_executor_and_are_those_of_an_environment(executor: Executor):
+def test_rollouts_do_not_depend_on_their_executor_and_are_those_of_an_environment(
+    executor: Executor,
+):
     environments = pytest.importorskip("airmuscle.outlets.environments")
     gymnasium = pytest.importorskip("gymnasium")
     task, randomisation = environments.joint_task()
     options = {"seed": 5, "max_episode_steps": 20}
-    alone, shared = (roll_out(task, track, 260, randomisation, workers=each, **options) for each in (1, executor))
+    alone, shared = (
+        roll_out(task, track, 260, randomisation, workers=each, **options) for each in (1, executor)
+    )
     assert executor.count == 2
     assert np.array_equal(alone.returns, shared.returns)
     assert np.array_equal(alone.periods, shared.periods)
     single = gymnasium.make("airmuscle/Joint-v0", max_episode_steps=20)
     observation, _ = single.reset(seed=5 + 259)
-    total, periods, over = 0.0, 0, False
+    total = 0.0
+    periods = 0
+    over = False
     while not over:
         observation, reward, terminated, truncated, _ = single.step(track(observation[None])[0])
-        total, periods, over = total + reward, periods + 1, terminated or truncated
+        total = total + reward
+        periods = periods + 1
+        over = terminated or truncated
     assert alone.returns[259] == pytest.approx(total, rel=1e-5)
     assert (alone.periods[259], alone.terminated[259]) == (periods, terminated)
     with pytest.raises(ParameterError, match="episodes is 0"):

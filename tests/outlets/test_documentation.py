@@ -1,4 +1,5 @@
-"""Documentation: every page, model, command and function has its place, links lead somewhere, formulas are valid.
+"""Documentation: every page, model, command and function has its place, links lead somewhere,
+formulas are valid.
 
 The generators of the site run here; Sphinx itself only in the slow test, if it is installed.
 """
@@ -53,38 +54,55 @@ def test_the_four_parts_are_in_the_index():
     assert titles >= {"Tutorials", "How-to guides", "Reference", "Explanation"}
 
 
-@pytest.mark.parametrize("page", [*documents(), ROOT / "README.md", DOCS / "README.md"], ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "page", [*documents(), ROOT / "README.md", DOCS / "README.md"], ids=lambda path: path.name
+)
 def test_relative_links_lead_to_a_file_and_a_heading(page: Path):
     assert broken_links(page) == []
 
 
 def test_a_link_without_a_target_is_found(tmp_path: Path):
     page = tmp_path / "page.md"
-    page.write_text("# Title\n\n[a](#title) [b](#none) [c](none.md) ![d](none.png)\n\n```\n[e](code.md)\n```\n")
+    page.write_text(
+        "# Title\n\n[a](#title) [b](#none) [c](none.md) ![d](none.png)\n\n```\n[e](code.md)\n```\n"
+    )
     assert broken_links(page) == ["page.md: #none", "page.md: none.md", "page.md: none.png"]
 
 
 def test_the_table_of_contents_of_the_site_has_all_pages():
     text = index(parts())
     trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", text, re.DOTALL)).splitlines()
-    assert {path.stem for path in documents()} | {name.removesuffix(".md") for name in COPIED} <= set(trees)
+    assert {path.stem for path in documents()} | {
+        name.removesuffix(".md") for name in COPIED
+    } <= set(trees)
     assert {"models/index", "commands/index", "functions/index"} <= set(trees)
 
 
 @pytest.mark.parametrize("name", COPIED)
 def test_a_page_from_outside_docs_has_its_images_and_skips_no_level_of_headings(name: str):
     text = site_text((ROOT / name).read_text("utf-8"), depth=name.count("/"))
-    levels = [len(marks) for marks in re.findall(r"^(#+) ", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M)]
+    levels = [
+        len(marks)
+        for marks in re.findall(
+            r"^(#+) ", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M
+        )
+    ]
     assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
     images = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text)
-    assert [image for image in images if not (DOCS / image.removeprefix("../" * name.count("/"))).exists()] == []
+    assert [
+        image
+        for image in images
+        if not (DOCS / image.removeprefix("../" * name.count("/"))).exists()
+    ] == []
 
 
 # Reference
 
 
 def test_every_model_has_a_page_with_its_parameters_and_references(models: dict[str, str]):
-    pages = {path.rpartition("/")[2]: text for path, text in models.items() if not path.endswith("index")}
+    pages = {
+        path.rpartition("/")[2]: text for path, text in models.items() if not path.endswith("index")
+    }
     assert set(pages) == set(model_names())
     for name, text in pages.items():
         cls = model_class(name, "test")
@@ -95,18 +113,32 @@ def test_every_model_has_a_page_with_its_parameters_and_references(models: dict[
 
 
 def test_every_formula_of_the_models_is_valid_mathematics(models: dict[str, str]):
-    texts = {latex for page in models.values() for pair in FORMULA.findall(page) for latex in pair if latex}
+    texts = {
+        latex
+        for page in models.values()
+        for pair in FORMULA.findall(page)
+        for latex in pair
+        if latex
+    }
     assert len(texts) > 300
     for latex in texts:
         assert ElementTree.fromstring(to_display_mathml(latex)).tag.endswith("math"), latex
-        assert "\\" not in "".join(ElementTree.fromstring(to_display_mathml(latex)).itertext()), latex
+        assert "\\" not in "".join(ElementTree.fromstring(to_display_mathml(latex)).itertext()), (
+            latex
+        )
 
 
 def test_laws_of_papers_show_a_formula(models: dict[str, str]):
     tables = {"Tabulated", "TabulatedGeometry"}
-    papers = [cls for cls in (model_class(n, "test") for n in model_names()) if getattr(cls, "references", ())]
+    papers = [
+        cls
+        for cls in (model_class(n, "test") for n in model_names())
+        if getattr(cls, "references", ())
+    ]
     laws = {
-        cls.__name__ for cls in papers if "characteristic" in cls.__module__ or "friction" in cls.__module__
+        cls.__name__
+        for cls in papers
+        if "characteristic" in cls.__module__ or "friction" in cls.__module__
     } - tables
     pages = {path.rpartition("/")[2]: text for path, text in models.items()}
     without = {name for name in laws if "{math}" not in pages[name]}
@@ -120,9 +152,14 @@ def test_every_command_and_option_is_on_a_page():
     for row in COMMANDS:
         text = pages[f"commands/{row.name}"]
         options = [
-            name for p in group.get_command(context, row.name).params for name in p.opts if name.startswith("--")
+            name
+            for p in group.get_command(context, row.name).params
+            for name in p.opts
+            if name.startswith("--")
         ]
-        assert [name for name in options if name != "--help" and f"`{name}`" not in text] == [], row.name
+        assert [name for name in options if name != "--help" and f"`{name}`" not in text] == [], (
+            row.name
+        )
 
 
 def test_every_public_function_of_the_top_level_is_on_a_page():
@@ -133,7 +170,9 @@ def test_every_public_function_of_the_top_level_is_on_a_page():
 
 def test_every_package_of_the_interface_has_names_on_its_page():
     pages = dict(function_pages.pages())
-    assert [face for face in function_pages.FACES if "\n## " not in pages[f"functions/{face}"]] == []
+    assert [
+        face for face in function_pages.FACES if "\n## " not in pages[f"functions/{face}"]
+    ] == []
 
 
 # Formulas
@@ -175,7 +214,10 @@ def test_prose_keeps_its_words_and_formulas_are_found_in_it():
 
 def test_names_of_the_code_in_prose_are_no_formulas():
     assert markdown("with min_angle and initial_state") == "with min\\_angle and initial\\_state"
-    assert markdown("with eps_max and F_KE") == "with {math}`\\varepsilon _{\\text{max}}` and {math}`F_{\\text{KE}}`"
+    assert (
+        markdown("with eps_max and F_KE")
+        == "with {math}`\\varepsilon _{\\text{max}}` and {math}`F_{\\text{KE}}`"
+    )
 
 
 def test_a_docstring_has_its_formula_displayed():
@@ -185,20 +227,29 @@ def test_a_docstring_has_its_formula_displayed():
 
 
 def test_arguments_of_a_function_become_a_list():
-    text = to_markdown("Simulate it.\n\nplant      a System [1]\nduration   time, of\n           a run [s]\n")
+    text = to_markdown(
+        "Simulate it.\n\nplant      a System [1]\nduration   time, of\n           a run [s]\n"
+    )
     assert text.endswith("* `plant`: a System \\[1\\]\n* `duration`: time, of a run \\[s\\]\n")
 
 
 def test_indented_formulas_of_a_page_are_rendered_and_commands_are_not():
-    page = "Text\n\n    m x'' = F - m g,   F = k x\n\nText\n\n    airmuscle evaluate dmsp-20-300 --force = 3\n\nText\n"
+    page = (
+        "Text\n\n    m x'' = F - m g,   F = k x\n\nText\n\n    airmuscle evaluate dmsp-20-300"
+        " --force = 3\n\nText\n"
+    )
     text = site_text(page)
     assert text.count("```{math}") == 1
     assert "    airmuscle evaluate" in text
 
 
 def test_links_of_the_site_stay_within_it():
-    page = "[a](../benchmarks/RESULTS.md) [b](control.md#pid) [c](../AGENTS.md) [d](https://doi.org/1)"
-    assert site_text(page) == "[a](benchmarks/RESULTS.md) [b](control.md#pid) c [d](https://doi.org/1)"
+    page = (
+        "[a](../benchmarks/RESULTS.md) [b](control.md#pid) [c](../AGENTS.md) [d](https://doi.org/1)"
+    )
+    assert (
+        site_text(page) == "[a](benchmarks/RESULTS.md) [b](control.md#pid) c [d](https://doi.org/1)"
+    )
     assert all((ROOT / name).exists() for name in COPIED)
 
 
@@ -229,30 +280,41 @@ def test_the_site_is_built_without_warnings_and_needs_no_network(tmp_path: Path)
     assert len(pages) > len(documents())
     loaded = re.compile(r"<(?:script|img|iframe|link)\b[^>]*\b(?:src|href)=\"(?:https?:)?//")
     assert [page.name for page in pages if loaded.search(page.read_text(encoding="utf-8"))] == []
-    law = (tmp_path / "html" / "models" / "characteristic" / "TonduLopez2000.html").read_text(encoding="utf-8")
+    law = (tmp_path / "html" / "models" / "characteristic" / "TonduLopez2000.html").read_text(
+        encoding="utf-8"
+    )
     assert "<math" in law
 
 
 def test_symbols_in_running_text_are_typeset():
-    text = "The angle theta_g and eps of r_1, `theta_g`, [a](theta_g.md), 30 psi, x_y.z, tests/rho_1.py and rho."
+    text = (
+        "The angle theta_g and eps of r_1, `theta_g`, [a](theta_g.md), 30 psi, x_y.z,"
+        " tests/rho_1.py and rho."
+    )
     assert site_text(text) == (
-        r"The angle {math}`\theta _{g}` and {math}`\varepsilon` of {math}`r_{1}`, `theta_g`, a, 30 psi, x_y.z, "
+        r"The angle {math}`\theta _{g}` and {math}`\varepsilon` of {math}`r_{1}`, `theta_g`, a, 30"
+        r" psi, x_y.z, "
         r"tests/rho_1.py and {math}`\rho`."
     )
 
 
 def test_captions_landmarks_and_regions_that_scroll_are_accessible():
-    page = '<p class="caption" role="heading">A</p><aside class="sidebar-drawer"><pre><span></span>x</pre></aside>'
-    assert accessible(page) == (
-        '<p class="caption" role="heading" aria-level="2">A</p><aside class="sidebar-drawer" aria-label="Pages">'
-        '<pre tabindex="0"><span></span>x</pre></aside>'
+    page = (
+        '<p class="caption" role="heading">A</p><aside'
+        ' class="sidebar-drawer"><pre><span></span>x</pre></aside>'
+    )
+    assert (
+        accessible(page)
+        == '<p class="caption" role="heading" aria-level="2">A</p><aside class="sidebar-drawer"'
+        ' aria-label="Pages"><pre tabindex="0"><span></span>x</pre></aside>'
     )
 
 
 def test_the_index_of_the_search_has_each_section_with_its_text():
     article = (
-        '<section id="a"><h1>Reading<a class="headerlink" href="#a">#</a></h1><p>Decimal &amp; <b>comma</b></p>'
-        '<section id="b"><h2>Units<a class="headerlink" href="#b">#</a></h2><p>kPa</p></section></section>'
+        '<section id="a"><h1>Reading<a class="headerlink" href="#a">#</a></h1><p>Decimal &amp;'
+        ' <b>comma</b></p><section id="b"><h2>Units<a class="headerlink"'
+        ' href="#b">#</a></h2><p>kPa</p></section></section>'
     )
     assert page_rows("reading.html", article) == [
         ["Reading", "Reading", "reading.html", "Decimal & comma"],
@@ -261,7 +323,12 @@ def test_the_index_of_the_search_has_each_section_with_its_text():
 
 
 SEARCHED = (
-    ["Reading", "Reading", "reading.html", "Files of German loggers with a decimal comma. A displacement has a zero."],
+    [
+        "Reading",
+        "Reading",
+        "reading.html",
+        "Files of German loggers with a decimal comma. A displacement has a zero.",
+    ],
     ["Units", "Units", "units.html", "The decimal point of reports."],
     ["Joints", "Joints", "joints.html", "Two muscles on a pulley are displaced."],
 )
@@ -269,14 +336,23 @@ SEARCHED = (
 
 @pytest.mark.parametrize(
     ("query", "first"),
-    [("German decimal comma", "reading.html"), ("displacements", "reading.html"), ("pulleys", "joints.html"),
-     ("point of a report", "units.html"), ("hydraulics", None)],
-)  # fmt: skip
-def test_the_search_takes_all_forms_of_any_of_the_words(query: str, first: str | None, tmp_path: Path):
+    [
+        ("German decimal comma", "reading.html"),
+        ("displacements", "reading.html"),
+        ("pulleys", "joints.html"),
+        ("point of a report", "units.html"),
+        ("hydraulics", None),
+    ],
+)
+def test_the_search_takes_all_forms_of_any_of_the_words(
+    query: str, first: str | None, tmp_path: Path
+):
     script = DOCS / "book" / "static" / "search.js"
     call = f"require({json.dumps(str(script))}).search({json.dumps(query)}, {json.dumps(SEARCHED)})"
     done = subprocess.run(
-        [printed.require("node"), "-p", f"({call}[0] || {{}}).address"], capture_output=True, text=True
+        [printed.require("node"), "-p", f"({call}[0] || {{}}).address"],
+        capture_output=True,
+        text=True,
     )
     assert done.stdout.strip() == str(first or "undefined"), done.stderr
 
@@ -285,6 +361,8 @@ def test_the_search_takes_all_forms_of_any_of_the_words(query: str, first: str |
 def test_lines_of_code_fit_the_column_of_the_site(page: Path):
     """Output of the program, in blocks without a language, scrolls."""
     blocks = re.findall(
-        r"^```(?:python|sh|toml|c)\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+        r"^```(?:python|sh|toml|c)\n(.*?)^```",
+        page.read_text(encoding="utf-8"),
+        re.MULTILINE | re.DOTALL,
     )
     assert [line for block in blocks for line in block.splitlines() if len(line) > 95] == []

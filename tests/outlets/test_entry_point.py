@@ -31,5 +31,7 @@ def test_linear_algebra_uses_one_thread_unless_the_user_says_otherwise(
 
 
 def test_the_command_and_its_workers_limit_the_same_libraries():
-    """The names stand twice, because the command line sets them before it imports anything that loads NumPy."""
+    """The names stand twice, because the command line sets them before it imports anything that
+    loads NumPy.
+    """
     assert entry_point._BLAS_THREADS == arrays.BLAS_THREADS

@@ -1,5 +1,7 @@
-"""Claims about learning environments: Gymnasium's checker finds nothing, a vector environment is its plants one by
-one, seeds repeat episodes, what is impossible is refused, and quantities have the documented units."""
+"""Claims about learning environments: Gymnasium's checker finds nothing, a vector environment is
+its plants one by one, seeds repeat episodes, what is impossible is refused, and quantities have the
+documented units.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +45,10 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 from gymnasium.vector import AutoresetMode  # noqa: E402
 
 TASK = JointTracking(JOINT)
-VARIED = (ValueRange(("target_frequency",), 0.2, 1.0), FactorRange(("plant.mechanism.inertia",), 0.8, 1.2))
+VARIED = (
+    ValueRange(("target_frequency",), 0.2, 1.0),
+    FactorRange(("plant.mechanism.inertia",), 0.8, 1.2),
+)
 
 
 def single(task=TASK, **options):
@@ -52,7 +57,11 @@ def single(task=TASK, **options):
 
 def vector(count, task=TASK, **options):
     return gymnasium.make_vec(
-        "airmuscle/Joint-v0", num_envs=count, vectorization_mode="vector_entry_point", task=task, **options
+        "airmuscle/Joint-v0",
+        num_envs=count,
+        vectorization_mode="vector_entry_point",
+        task=task,
+        **options,
     )
 
 
@@ -66,7 +75,11 @@ def test_gymnasium_finds_no_fault(name):
 def pair_of_vectors(name, mode, **options):
     """The same plants in lanes, and one by one in a vector of Gymnasium."""
     lanes = gymnasium.make_vec(
-        f"airmuscle/{name}-v0", vectorization_mode="vector_entry_point", cores=2, autoreset_mode=mode, **options
+        f"airmuscle/{name}-v0",
+        vectorization_mode="vector_entry_point",
+        cores=2,
+        autoreset_mode=mode,
+        **options,
     )
     kept = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": mode}}
     return lanes, gymnasium.make_vec(f"airmuscle/{name}-v0", **kept, **options)
@@ -84,16 +97,22 @@ def assert_same_terms(found, expected, count):
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_vector_is_its_plants_one_by_one_also_where_episodes_begin_anew(name, mode):
-    """Actions that soon end episodes of the joint, and a truncation after 15 periods; 19 plants fill no block."""
-    count, periods = 19, 40
+    """Actions that soon end episodes of the joint, and a truncation after 15 periods; 19 plants
+    fill no block.
+    """
+    count = 19
+    periods = 40
     together, apart = pair_of_vectors(name, mode, num_envs=count, max_episode_steps=15)
     assert together.metadata["autoreset_mode"] == apart.metadata["autoreset_mode"]
-    first, second = together.reset(seed=5)[0], apart.reset(seed=5)[0]
+    first = together.reset(seed=5)[0]
+    second = apart.reset(seed=5)[0]
     np.testing.assert_array_equal(first, second)
-    rng, ended = np.random.default_rng(0), 0
+    rng = np.random.default_rng(0)
+    ended = 0
     for _ in range(periods):
         actions = rng.uniform(-1.2, 1.2, together.action_space.shape).astype(np.float32)
-        found, expected = together.step(actions), apart.step(actions)
+        found = together.step(actions)
+        expected = apart.step(actions)
         for value, exact in zip(found[:2], expected[:2], strict=True):
             np.testing.assert_allclose(value, exact, rtol=1e-6, atol=1e-9)
         np.testing.assert_array_equal(found[2], expected[2])
@@ -109,7 +128,9 @@ def test_a_vector_is_its_plants_one_by_one_also_where_episodes_begin_anew(name, 
 
 
 def test_an_episode_of_a_vector_ends_where_the_task_ends_it():
-    """Plant 0 is driven to its limit of angle; the step after its end begins anew, without reward."""
+    """Plant 0 is driven to its limit of angle; the step after its end begins anew, without
+    reward.
+    """
     env = vector(3, dataclasses.replace(TASK, largest_angle=0.2))
     env.reset(seed=1)
     actions = np.zeros((3, 2), np.float32)
@@ -140,7 +161,9 @@ def test_a_picture_shows_the_present_state(name):
     assert first.shape == second.shape
     assert (first != second).any()
     assert (env.render() == second).all()
-    with pytest.raises(ParameterError, match="render_mode is 'ansi'; allowed are 'human', 'rgb_array' and None"):
+    with pytest.raises(
+        ParameterError, match="render_mode is 'ansi'; allowed are 'human', 'rgb_array' and None"
+    ):
         PlantEnv(TASK, render_mode="ansi")
 
 
@@ -162,7 +185,9 @@ def test_a_window_shows_each_state_until_it_is_closed():
 def test_on_off_valves_are_open_or_closed():
     env, plain = gymnasium.make("airmuscle/JointOnOff-v0"), gymnasium.make("airmuscle/Joint-v0")
     check_env(env, skip_render_check=True)
-    vector = gymnasium.make_vec("airmuscle/JointOnOff-v0", num_envs=2, vectorization_mode="vector_entry_point")
+    vector = gymnasium.make_vec(
+        "airmuscle/JointOnOff-v0", num_envs=2, vectorization_mode="vector_entry_point"
+    )
     assert (env.action_space.nvec == 3).all()
     assert vector.action_space.shape == (2, 2)
     for each in (env, plain):
@@ -180,15 +205,22 @@ def test_on_off_valves_are_open_or_closed():
 
 
 def test_a_mask_chooses_the_plants_that_begin_anew_as_in_the_vectors_of_gymnasium():
-    """After one step all episodes are over: those of the mask go on, the others begin anew in the next step."""
-    together, apart = pair_of_vectors("Lift", AutoresetMode.NEXT_STEP, num_envs=5, max_episode_steps=1)
-    mask, action = np.array([True, False, True, False, False]), np.full((5, 1), 0.4, np.float32)
+    """After one step all episodes are over: those of the mask go on, the others begin anew in the
+    next step.
+    """
+    together, apart = pair_of_vectors(
+        "Lift", AutoresetMode.NEXT_STEP, num_envs=5, max_episode_steps=1
+    )
+    mask = np.array([True, False, True, False, False])
+    action = np.full((5, 1), 0.4, np.float32)
     for env in (together, apart):
         env.reset(seed=3)
         env.step(action)
     first, second = (env.reset(options={"reset_mask": mask.copy()})[0] for env in (together, apart))
     np.testing.assert_allclose(first, second, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(together.step(action)[0], apart.step(action)[0], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(
+        together.step(action)[0], apart.step(action)[0], rtol=1e-6, atol=1e-9
+    )
     for wrong, options in ((mask[:2], {}), (mask.astype(int), {}), (mask, {"seed": 1})):
         with pytest.raises(ParameterError, match="give 5 booleans, no seed"):
             together.reset(options={"reset_mask": wrong}, **options)
@@ -218,7 +250,9 @@ def test_a_copy_of_an_environment_goes_on_by_itself(make, copied):
         np.testing.assert_array_equal(first, second)
 
 
-@pytest.mark.parametrize(("line", "module"), [("import airmuscle.environments", ""), ("", "airmuscle.environments:")])
+@pytest.mark.parametrize(
+    ("line", "module"), [("import airmuscle.environments", ""), ("", "airmuscle.environments:")]
+)
 def test_the_import_registers_the_environments(line, module):
     """By hand, or by Gymnasium, which imports the module of `module:identifier` first."""
     code = f'import gymnasium\n{line}\nprint(gymnasium.make("{module}airmuscle/Lift-v0").spec.id)'
@@ -236,15 +270,19 @@ def test_observations_pass_through_sensors():
     seen = MeasuredObservations(
         single().unwrapped, noise=(0.01, 0, 0, 0, 0, 0), resolution=(0, 0.05, 0, 0, 0, 0), delay=2
     )
-    exact, read = [plain.reset(seed=5)[0]], [seen.reset(seed=5)[0]]
+    exact = [plain.reset(seed=5)[0]]
+    read = [seen.reset(seed=5)[0]]
     for k in range(60):
         action = np.array([np.sin(0.1 * k), -np.sin(0.1 * k)])
         exact.append(plain.step(action)[0])
         read.append(seen.step(action)[0])
-    exact, late = np.array(exact)[:-2], np.array(read)[2:]
+    exact = np.array(exact)[:-2]
+    late = np.array(read)[2:]
     np.testing.assert_array_equal(np.array(read)[:3], np.array(read)[[0, 0, 0]])
     np.testing.assert_array_equal(late[:, 2:], exact[:, 2:])
-    np.testing.assert_allclose(late[:, 1], 0.05 * np.round(exact[:, 1].astype(float) / 0.05), atol=1e-6)
+    np.testing.assert_allclose(
+        late[:, 1], 0.05 * np.round(exact[:, 1].astype(float) / 0.05), atol=1e-6
+    )
     assert np.std(late[:, 0] - exact[:, 0]) == pytest.approx(0.01, rel=0.35)
     with pytest.raises(ParameterError, match="MeasuredObservations: noise is -1"):
         MeasuredObservations(plain, noise=-1)
@@ -258,7 +296,9 @@ def test_seeds_repeat_episodes_and_different_seeds_differ():
             rows.append(env.step(np.array([0.1 * k, -0.2], np.float32))[0])
         return np.array(rows), env.reset()[0]
 
-    (first, next_first), (second, next_second), (other, _) = episode(3), episode(3), episode(4)
+    first, next_first = episode(3)
+    second, next_second = episode(3)
+    other, _ = episode(4)
     assert np.array_equal(first, second)
     assert np.array_equal(next_first, next_second)
     assert not np.array_equal(first[0], next_first)
@@ -294,15 +334,19 @@ def test_observations_have_the_documented_units():
     env.reset(seed=0)
     for _ in range(10):
         found, reward, *_ = env.step(np.array([0.5, -0.25], np.float32))
-    stepper, task = env.unwrapped._stepper, env.unwrapped.task
+    stepper = env.unwrapped._stepper
+    task = env.unwrapped.task
     state = dict(zip(stepper.state_names, stepper.state.tolist(), strict=True))
     inputs = {"left.fill": 0.5, "left.discharge": 0.0, "right.fill": 0.0, "right.discharge": 0.25}
     outputs = JOINT.outputs(state, inputs)
     expected = {
-        "angle": state["angle"], "angular_speed": state["angular_speed"],
-        "left.pressure": outputs["left.pressure"] / 1e5, "right.pressure": outputs["right.pressure"] / 1e5,
-        "target": 0.3 * np.sin(2 * np.pi * 0.5 * 0.1), "next_target": 0.3 * np.sin(2 * np.pi * 0.5 * 0.11),
-    }  # fmt: skip
+        "angle": state["angle"],
+        "angular_speed": state["angular_speed"],
+        "left.pressure": outputs["left.pressure"] / 1e5,
+        "right.pressure": outputs["right.pressure"] / 1e5,
+        "target": 0.3 * np.sin(2 * np.pi * 0.5 * 0.1),
+        "next_target": 0.3 * np.sin(2 * np.pi * 0.5 * 0.11),
+    }
     assert [o.name for o in task.observations] == list(expected)
     np.testing.assert_allclose(found, list(expected.values()), rtol=1e-5)
     error = state["angle"] - expected["target"]
@@ -342,7 +386,8 @@ def test_an_impossible_state_ends_the_episode_with_zeros():
     """A step far too long for the plant: its state is soon no number, alone and in a vector."""
     coarse = dataclasses.replace(TASK, period=0.5, largest_angle=3.2)
     options = {"integrator": RungeKutta4(0.5)}
-    alone, together = single(coarse, **options), vector(2, coarse, **options)
+    alone = single(coarse, **options)
+    together = vector(2, coarse, **options)
     alone.reset(seed=0)
     together.reset(seed=0)
     for _ in range(100):
@@ -373,13 +418,18 @@ def test_randomisation_reaches_the_plants():
 def test_the_covariance_of_a_fit_is_that_of_the_draws():
     told = ParameterUncertainty(("characteristic.a", "b"), (2.0, 0.5), ((1.0, -0.8), (-0.8, 1.0)))
     normal = FitUncertainty(told, muscles=(0, 1))
-    draws = normal.values(np.array([10.0, 20.0, 1.0, 2.0]), np.random.default_rng(0).random((20000, 2)))
+    draws = normal.values(
+        np.array([10.0, 20.0, 1.0, 2.0]), np.random.default_rng(0).random((20000, 2))
+    )
     np.testing.assert_allclose(draws.mean(axis=0), [10.0, 20.0, 1.0, 2.0], rtol=0.02)
     np.testing.assert_allclose(np.cov(draws[:, ::2].T), told.covariance, rtol=0.05)
     np.testing.assert_allclose(draws[:, 1::2] - draws[:, ::2], [[10.0, 1.0]] * 20000, rtol=1e-12)
     assert normal.paths == (
-        "plant.muscle[0].contractile.a", "plant.muscle[1].contractile.a", "plant.muscle[0].b", "plant.muscle[1].b"
-    )  # fmt: skip
+        "plant.muscle[0].contractile.a",
+        "plant.muscle[1].contractile.a",
+        "plant.muscle[0].b",
+        "plant.muscle[1].b",
+    )
 
 
 IDENTIFIED = """
@@ -407,15 +457,21 @@ def test_draws_of_an_identified_plant_have_its_covariance_and_stay_within_the_bo
     assert list(drawn) == names
     columns = np.array([drawn[group[0]] for group in told.parameters])
     errors = np.sqrt(np.diag(told.covariance))
-    assert abs((np.cov(columns) - told.covariance) / np.outer(errors, errors)).max() < 0.08  # 3.5 standard deviations
+    assert (
+        abs((np.cov(columns) - told.covariance) / np.outer(errors, errors)).max() < 0.08
+    )  # 3.5 standard deviations
     np.testing.assert_array_equal(drawn[names[1]], drawn[names[2]])
     wide = dataclasses.replace(told, covariance=1e6 * told.covariance)
     low = FitUncertainty(wide).variations(identified.plant, 200)["mechanism.inertia"].min()
     assert low == 1e-6  # its declared bound
     run = am.simulate_batch(
-        identified.plant, {name: column[:8] for name, column in drawn.items()}, am.Schedule({"left.fill": ((0.0, 1.0),)}),
-        duration=0.4, integrator=RungeKutta4(1e-3), keep=["angle"],
-    )  # fmt: skip
+        identified.plant,
+        {name: column[:8] for name, column in drawn.items()},
+        am.Schedule({"left.fill": ((0.0, 1.0),)}),
+        duration=0.4,
+        integrator=RungeKutta4(1e-3),
+        keep=["angle"],
+    )
     assert 0.0 < np.ptp(run["angle"][:, -1]) < 0.1
 
 
@@ -427,17 +483,22 @@ def test_an_identified_plant_varies_in_its_environment(identified):
         -1, env.unwrapped._plants.parameters.shape[1]
     )
     assert np.count_nonzero(np.ptp(parameters[:64], axis=0)) == 4
-    without = dataclasses.replace(identified.uncertainty, parameters=(), covariance=np.zeros((0, 0)))
+    without = dataclasses.replace(
+        identified.uncertainty, parameters=(), covariance=np.zeros((0, 0))
+    )
     with pytest.raises(ParameterError, match="the fit states no covariance of its parameters"):
         FitUncertainty(without)
 
 
 def test_parameters_of_very_different_size_keep_their_standard_errors_and_correlations():
-    """A force [N], a conductance [m3/(s Pa)] and a stiffness [N/m] of one fit differ by 14 powers of ten."""
+    """A force [N], a conductance [m3/(s Pa)] and a stiffness [N/m] of one fit differ by 14 powers
+    of ten.
+    """
     told = ParameterUncertainty(
-        ("offset", "conductance", "stiffness", "volume"), (1.0, 1e-11, 1e3, 1e-7),
+        ("offset", "conductance", "stiffness", "volume"),
+        (1.0, 1e-11, 1e3, 1e-7),
         ((1.0, 0.5, 0.3, 0.0), (0.5, 1.0, 0.4, 0.2), (0.3, 0.4, 1.0, 0.0), (0.0, 0.2, 0.0, 1.0)),
-    )  # fmt: skip
+    )
     draws = FitUncertainty(told).values(np.zeros(4), np.random.default_rng(0).random((20000, 4)))
     np.testing.assert_allclose(draws.std(axis=0), told.standard_errors, rtol=0.03)
     np.testing.assert_allclose(np.corrcoef(draws.T), told.correlations, atol=0.03)
@@ -454,8 +515,14 @@ def test_the_uncertainty_of_a_muscle_file_varies_its_law():
 @pytest.mark.parametrize(
     ("randomisation", "message"),
     [
-        ((ValueRange(("plant.mechanism.inertai",), 0.1, 0.2),), "no parameter 'plant.mechanism.inertai'. Did you mean"),
-        ((ValueRange(("plant.mechanism.inertia",), -1.0, 0.2),), "would be -1; allowed range: 1e-06 to 1e"),
+        (
+            (ValueRange(("plant.mechanism.inertai",), 0.1, 0.2),),
+            "no parameter 'plant.mechanism.inertai'. Did you mean",
+        ),
+        (
+            (ValueRange(("plant.mechanism.inertia",), -1.0, 0.2),),
+            "would be -1; allowed range: 1e-06 to 1e",
+        ),
         ((VARIED[1], VARIED[1]), "'plant.mechanism.inertia' is varied twice"),
         (VARIED[0], "give a tuple, such as"),
     ],
@@ -513,7 +580,9 @@ def test_the_package_is_imported_without_gymnasium_which_the_error_names():
         "except Exception as error: print(type(error).__name__, error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.startswith("InputError learning environments need the package gymnasium. Install it: pip")
+    assert done.stdout.startswith(
+        "InputError learning environments need the package gymnasium. Install it: pip"
+    )
 
 
 def test_the_example_of_the_page_is_an_environment():
@@ -521,7 +590,9 @@ def test_the_example_of_the_page_is_an_environment():
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     names: dict[str, object] = {}
     exec(code, names)
-    env = gymnasium.make("airmuscle/Joint-v0", task=names["task"], randomisation=names["randomisation"])
+    env = gymnasium.make(
+        "airmuscle/Joint-v0", task=names["task"], randomisation=names["randomisation"]
+    )
     observation, _ = env.reset(seed=0)
     assert env.observation_space.contains(observation)
     assert env.step(env.action_space.sample())[1] > -0.01

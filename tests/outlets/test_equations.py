@@ -1,7 +1,8 @@
-"""A fit report shows the equation of its law, and the text for LaTeX, MATLAB, Excel and C gives the values of the law.
+"""A fit report shows the equation of its law, and the text for LaTeX, MATLAB, Excel and C gives the
+values of the law.
 
-Each text is evaluated by its own rules, C by a compiler if there is one. Within the validity range it differs from the
-law by rounding only; the physical form of a polynomial, too.
+Each text is evaluated by its own rules, C by a compiler if there is one. Within the validity range
+it differs from the law by rounding only; the physical form of a polynomial, too.
 """
 
 from __future__ import annotations
@@ -38,8 +39,18 @@ Values = Mapping[str, npt.NDArray[np.float64]]
 RANGES = {"pressure": (5e4, 5e5), "contraction": (0.01, 0.12), "force": (10.0, 400.0)}
 TOLERANCE = 1e-12
 NAMES = {"p": "pressure", "eps": "contraction", "F": "force"}
-ENTRIES = ("tondu-lopez", "chou-hannaford", "dmsp-20-300", "hunt2017-festo-10", "reynolds2003", "serres2009",
-           "saga2007", "sarosi-dmsp-10", "borzikova-exponential", "borzikova-direct-repaired")  # fmt: skip
+ENTRIES = (
+    "tondu-lopez",
+    "chou-hannaford",
+    "dmsp-20-300",
+    "hunt2017-festo-10",
+    "reynolds2003",
+    "serres2009",
+    "saga2007",
+    "sarosi-dmsp-10",
+    "borzikova-exponential",
+    "borzikova-direct-repaired",
+)
 
 
 def a_surface(degree: int, seed: int = 1) -> ContractileSurface:
@@ -76,8 +87,13 @@ def points(law: Characteristic) -> dict[str, npt.NDArray[np.float64]]:
     """Points in the validity range, the ends included."""
     random = np.random.default_rng(3)
     _, arguments = quantity_of(law)
-    grid = {name: np.concatenate([RANGES[name], random.uniform(*RANGES[name], 60)]) for name in arguments}
-    return {"p" if n == "pressure" else "eps" if n == "contraction" else "F": v for n, v in grid.items()}
+    grid = {
+        name: np.concatenate([RANGES[name], random.uniform(*RANGES[name], 60)])
+        for name in arguments
+    }
+    return {
+        "p" if n == "pressure" else "eps" if n == "contraction" else "F": v for n, v in grid.items()
+    }
 
 
 def equations(law: Characteristic) -> tuple[LawEquation, ...]:
@@ -85,55 +101,106 @@ def equations(law: Characteristic) -> tuple[LawEquation, ...]:
     return law_equation(law, quantity, arguments, RANGES)
 
 
-def check_values(law: Characteristic, equation: LawEquation, evaluated: npt.NDArray[np.float64]) -> None:
+def check_values(
+    law: Characteristic, equation: LawEquation, evaluated: npt.NDArray[np.float64]
+) -> None:
     quantity, arguments = quantity_of(law)
     at = points(law)
-    expected = np.asarray(getattr(law, quantity)(*(at[n] for name in arguments for n in NAMES if NAMES[n] == name)))
-    np.testing.assert_allclose(evaluated, expected, rtol=TOLERANCE, atol=TOLERANCE * np.abs(expected).max())
+    expected = np.asarray(
+        getattr(law, quantity)(*(at[n] for name in arguments for n in NAMES if NAMES[n] == name))
+    )
+    np.testing.assert_allclose(
+        evaluated, expected, rtol=TOLERANCE, atol=TOLERANCE * np.abs(expected).max()
+    )
 
 
 def arguments_of(law: Characteristic, equation: LawEquation) -> dict[str, npt.NDArray[np.float64]]:
     at = points(law)
-    return {each.name: at["p"] / 1e5 if each.name == "P" else at[each.name] for each in equation.arguments}
+    return {
+        each.name: at["p"] / 1e5 if each.name == "P" else at[each.name]
+        for each in equation.arguments
+    }
 
 
-def evaluate_c(text: str, equation: LawEquation, at: Values, folder: Path) -> npt.NDArray[np.float64]:
-    source, library = folder / "law.c", folder / f"{len(list(folder.iterdir()))}.so"  # a name is loaded once
+def evaluate_c(
+    text: str, equation: LawEquation, at: Values, folder: Path
+) -> npt.NDArray[np.float64]:
+    # a name is loaded once
+    source = folder / "law.c"
+    library = folder / f"{len(list(folder.iterdir()))}.so"
     source.write_text(text, encoding="utf-8")
-    subprocess.run(["gcc", "-O0", "-Wall", "-Werror", "-shared", "-fPIC", "-o", library, source, "-lm"], check=True)
+    subprocess.run(
+        ["gcc", "-O0", "-Wall", "-Werror", "-shared", "-fPIC", "-o", library, source, "-lm"],
+        check=True,
+    )
     name = re.search(r"double (\w+)\(", text)
     assert name
     function = getattr(ctypes.CDLL(str(library)), name[1])
-    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * len(equation.arguments)
-    return np.array([function(*row) for row in np.column_stack([at[each.name] for each in equation.arguments])])
+    function.restype, function.argtypes = (
+        ctypes.c_double,
+        [ctypes.c_double] * len(equation.arguments),
+    )
+    return np.array(
+        [function(*row) for row in np.column_stack([at[each.name] for each in equation.arguments])]
+    )
 
 
 FUNCTIONS: dict[str, Any] = {
-    **{name: getattr(np, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "abs")},
-    "max": np.maximum, "min": np.minimum, "atan": np.arctan, "asinh": np.arcsinh, "pi": math.pi, "__builtins__": {},
-}  # fmt: skip
+    **{
+        name: getattr(np, name)
+        for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh", "abs")
+    },
+    "max": np.maximum,
+    "min": np.minimum,
+    "atan": np.arctan,
+    "asinh": np.arcsinh,
+    "pi": math.pi,
+    "__builtins__": {},
+}
 
 
 def evaluate_matlab(text: str, equation: LawEquation, at: Values) -> npt.NDArray[np.float64]:
-    """A MATLAB function by the rules of MATLAB: elementwise signs between arrays, matrix signs with a scalar only."""
+    """A MATLAB function by the rules of MATLAB: elementwise signs between arrays, matrix signs with
+    a scalar only.
+    """
     variables: dict[str, Any] = dict(at)
     for line in text.splitlines()[1:-1]:
         statement = line.partition("%")[0].strip().rstrip(";")
         if statement:
             name, _, expression = statement.partition(" = ")
-            for matlab, python in ((".^", "**"), ("^", "**"), (".*", "*"), ("./", "/"), ("~=", "!=")):
+            for matlab, python in (
+                (".^", "**"),
+                ("^", "**"),
+                (".*", "*"),
+                ("./", "/"),
+                ("~=", "!="),
+            ):
                 expression = expression.replace(matlab, python)
             variables[name] = eval(expression, dict(FUNCTIONS), variables)
     return np.asarray(variables[equation.result.name])
 
 
-EXCEL = {"POWER": np.power, "MAX": np.maximum, "MIN": np.minimum, "LN": np.log, "PI": lambda: math.pi, "IF": np.where,
-         **{name: getattr(np, name.lower()) for name in ("SQRT", "EXP", "SIN", "COS", "TAN", "SINH", "COSH", "ABS")},
-         "ATAN": np.arctan, "ASINH": np.arcsinh, "__builtins__": {}}  # fmt: skip
+EXCEL = {
+    "POWER": np.power,
+    "MAX": np.maximum,
+    "MIN": np.minimum,
+    "LN": np.log,
+    "PI": lambda: math.pi,
+    "IF": np.where,
+    **{
+        name: getattr(np, name.lower())
+        for name in ("SQRT", "EXP", "SIN", "COS", "TAN", "SINH", "COSH", "ABS")
+    },
+    "ATAN": np.arctan,
+    "ASINH": np.arcsinh,
+    "__builtins__": {},
+}
 
 
 def evaluate_excel(text: str, at: Values) -> npt.NDArray[np.float64]:
-    """Two rows of a worksheet; the power sign, which binds weaker than a sign in Excel, must not occur."""
+    """Two rows of a worksheet; the power sign, which binds weaker than a sign in Excel, must not
+    occur.
+    """
     headers, cells = (row.split("\t") for row in text.splitlines())
     assert len(headers) == len(cells)
     variables: dict[str, Any] = {}
@@ -150,10 +217,18 @@ def evaluate_excel(text: str, at: Values) -> npt.NDArray[np.float64]:
 
 
 def evaluate_latex(text: str, equation: LawEquation, at: Values) -> npt.NDArray[np.float64]:
-    """The lines of an align environment: values and definitions are collected, then evaluated as they are needed."""
-    body = text.partition(r"\begin{align*}")[2].partition(r"\end{align*}")[0].replace("\\\\\n&\\quad {}", " ")
+    """The lines of an align environment: values and definitions are collected, then evaluated as
+    they are needed.
+    """
+    body = (
+        text.partition(r"\begin{align*}")[2]
+        .partition(r"\end{align*}")[0]
+        .replace("\\\\\n&\\quad {}", " ")
+    )
     lines = dict(line.split(" &= ", 1) for line in re.split(r"\\\\\n", body.strip()))
-    variables: dict[str, Any] = {{"eps": r"\varepsilon"}.get(name, name): value for name, value in at.items()}
+    variables: dict[str, Any] = {
+        {"eps": r"\varepsilon"}.get(name, name): value for name, value in at.items()
+    }
     names = {{"eps": r"\varepsilon"}.get(each.result.name, each.result.name) for each in [equation]}
 
     def value_of(name: str) -> Any:
@@ -174,7 +249,8 @@ class LatexReader:
     """Value of an expression in LaTeX, by recursive descent."""
 
     def __init__(self, text: str, value_of: Any) -> None:
-        self.tokens, self.value_of = TOKEN.findall(text), value_of
+        self.tokens = TOKEN.findall(text)
+        self.value_of = value_of
         assert re.sub(r"\s", "", "".join(self.tokens)) == re.sub(r"\s", "", text), text
 
     def peek(self) -> str:
@@ -241,7 +317,8 @@ def test_the_text_for_each_language_gives_the_values_of_the_law(name: str, tmp_p
     shown = equations(law)
     assert shown
     for equation in shown:
-        texts, at = source_codes(equation, "Valid."), arguments_of(law, equation)
+        texts = source_codes(equation, "Valid.")
+        at = arguments_of(law, equation)
         check_values(law, equation, evaluate_matlab(texts["MATLAB"], equation, at))
         check_values(law, equation, evaluate_excel(texts["Excel"], at))
         check_values(law, equation, evaluate_latex(texts["LaTeX"], equation, at))
@@ -249,8 +326,12 @@ def test_the_text_for_each_language_gives_the_values_of_the_law(name: str, tmp_p
             check_values(law, equation, evaluate_c(texts["C"], equation, at, tmp_path))
 
 
-@pytest.mark.parametrize("name", [name for name in LAWS if "surface of degree" in name and name[-1] != "1"])
-def test_a_polynomial_surface_reads_as_a_sum_of_monomials_in_scaled_and_in_physical_form(name: str) -> None:
+@pytest.mark.parametrize(
+    "name", [name for name in LAWS if "surface of degree" in name and name[-1] != "1"]
+)
+def test_a_polynomial_surface_reads_as_a_sum_of_monomials_in_scaled_and_in_physical_form(
+    name: str,
+) -> None:
     law = LAWS[name]
     assert isinstance(law, ContractileSurface)
     scaled, physical = equations(law)

@@ -1,7 +1,8 @@
 """Event indicators: where none changes its sign, the slopes of the rates are continuous.
 
-Along straight lines through the state space the intervals with the greatest change of the Jacobian are halved. A change
-that remains although the interval becomes a thousand times shorter is a jump: an indicator must have another sign beyond.
+Along straight lines through the state space the intervals with the greatest change of the Jacobian
+are halved. A change that remains although the interval becomes a thousand times shorter is a jump:
+an indicator must have another sign beyond.
 """
 
 from __future__ import annotations
@@ -18,24 +19,30 @@ from airmuscle.engine.compile.function import event_indicators
 
 SOME = ("dmsp-20-300", "Serres", "series spring with a stop", "Prandtl-Ishlinskii", "overlap")
 """Plants with jumps on these lines."""
-ALL = [pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES]
+ALL = [
+    pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES
+]
 
 
 class Line:
-    """A straight line between two states under constant inputs, with slopes and signs of indicators at its points."""
+    """A straight line between two states under constant inputs, with slopes and signs of indicators
+    at its points.
+    """
 
     def __init__(self, name, seed):
         plant = plants.EXAMPLES[name]
         self.ready = compile_system(plant)
         self.indicators = event_indicators(self.ready.program.traced)
         states, inputs = printed.points_of(plant, 2, seed)
-        self.way, self.input = 3 * (states[1] - states[0]), inputs[0]
+        self.way = 3 * (states[1] - states[0])
+        self.input = inputs[0]
         self.start = states[0] - self.way / 3
         self.scale = np.abs(np.array([self.slopes(s) for s in np.linspace(0, 1, 40)])).max(axis=0)
         self.scale[self.scale < printed.ROUNDING] = 1.0
 
     def slopes(self, s):
-        f, j = np.empty(self.ready.sizes.states), np.zeros(max(self.ready.sizes.jacobian, 1))
+        f = np.empty(self.ready.sizes.states)
+        j = np.zeros(max(self.ready.sizes.jacobian, 1))
         x = self.start + s * self.way
         self.ready.call("jac", x, np.append(self.input, 0.0), self.ready.precomputed, f, j)
         return j
@@ -80,9 +87,9 @@ def test_a_comparison_of_parameters_alone_has_no_indicator():
     ready = compile_system(plants.EXAMPLES["dmsp-20-300"])
     indicators = event_indicators(ready.program.traced)
     state, inputs = printed.points_of(plants.EXAMPLES["dmsp-20-300"], 8)
-    values = np.array([
-        indicators.values(x, u, ready.parameters) for x, u in zip(state, inputs, strict=True)
-    ])  # fmt: skip
+    values = np.array(
+        [indicators.values(x, u, ready.parameters) for x, u in zip(state, inputs, strict=True)]
+    )
     assert values.shape[1] == indicators.count > 0
     assert (np.ptp(values, axis=0) > 0).all()
 
@@ -92,10 +99,15 @@ def test_scales_make_an_indicator_of_order_one():
     plant = plants.EXAMPLES["pulley with stops"]
     ready = compile_system(plant)
     state = plant.state_at(pressure=1e5)
-    x, u = np.array([state[s.name] for s in plant.states]), np.zeros(len(plant.inputs))
+    x = np.array([state[s.name] for s in plant.states])
+    u = np.zeros(len(plant.inputs))
     indicators = event_indicators(ready.program.traced)
     scales = indicators.scales(x, u, ready.parameters, ready.nominal)
     values = indicators.values(x, u, ready.parameters)
-    position, nominal = next((state[s.name], s.nominal) for s in plant.states if s.name == "position")
+    position, nominal = next(
+        (state[s.name], s.nominal) for s in plant.states if s.name == "position"
+    )
     clearance = (position - plant.mechanism.lower_stop) / nominal
-    assert any(abs(abs(z / s) - abs(clearance)) < 1e-12 for z, s in zip(values, scales, strict=True))
+    assert any(
+        abs(abs(z / s) - abs(clearance)) < 1e-12 for z, s in zip(values, scales, strict=True)
+    )

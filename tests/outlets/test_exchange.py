@@ -1,4 +1,6 @@
-"""Exchange of recordings with other tools: pandas, xarray, Parquet, HDF5 and plain CSV keep every number and unit."""
+"""Exchange of recordings with other tools: pandas, xarray, Parquet, HDF5 and plain CSV keep every
+number and unit.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,15 @@ from airmuscle.recording import Recording
 pd = pytest.importorskip("pandas", reason="needs the package pandas")
 RUN = Recording(
     {
-        "time": np.linspace(0.0, 0.2, 5), "pressure": np.array([0.0, 1e5, 2e5 / 3, 3e5, 4e5]),
-        "contraction": np.linspace(0, 0.2, 5), "left.force": np.arange(5.0) / 7, "fill": np.array([0.0, 1, 1, 0, 0]),
+        "time": np.linspace(0.0, 0.2, 5),
+        "pressure": np.array([0.0, 1e5, 2e5 / 3, 3e5, 4e5]),
+        "contraction": np.linspace(0, 0.2, 5),
+        "left.force": np.arange(5.0) / 7,
+        "fill": np.array([0.0, 1, 1, 0, 0]),
     },
-    "run", {"resting_length": 0.3, "specimen": "A"},
-)  # fmt: skip
+    "run",
+    {"resting_length": 0.3, "specimen": "A"},
+)
 
 
 def check_equal(found, expected=RUN):
@@ -60,7 +66,9 @@ def test_what_is_no_frame_of_measurements_is_refused(frame, error, message):
 
 def test_without_pandas_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(AirmuscleError, match=r"needs the package pandas. Install it: pip install airmuscle\[lab\]"):
+    with pytest.raises(
+        AirmuscleError, match=r"needs the package pandas. Install it: pip install airmuscle\[lab\]"
+    ):
         RUN.to_pandas()
 
 
@@ -75,15 +83,25 @@ def test_xarray_has_units_and_constants():
 
 
 def test_pandas_reads_plain_csv_as_it_is(tmp_path):
-    frame = pd.read_csv(write(RUN, tmp_path / "run.csv", comments=False), float_precision="round_trip")
-    assert list(frame) == ["time [s]", "pressure [Pa]", "contraction [1]", "left.force [N]", "fill [1]"]
+    frame = pd.read_csv(
+        write(RUN, tmp_path / "run.csv", comments=False), float_precision="round_trip"
+    )
+    assert list(frame) == [
+        "time [s]",
+        "pressure [Pa]",
+        "contraction [1]",
+        "left.force [N]",
+        "fill [1]",
+    ]
     assert (frame["left.force [N]"].to_numpy() == RUN["left.force"]).all()
     check_equal(read_csv(tmp_path / "run.csv"))
 
 
 @pytest.mark.parametrize("extension", [".csv", ".parquet", ".h5", ".hdf5"])
 def test_a_written_file_is_read_back_bit_by_bit(extension, tmp_path):
-    pytest.importorskip({".parquet": "pyarrow", ".csv": "csv"}.get(extension, "h5py"), reason="needs the extra lab")
+    pytest.importorskip(
+        {".parquet": "pyarrow", ".csv": "csv"}.get(extension, "h5py"), reason="needs the extra lab"
+    )
     (found,) = read(write(RUN, tmp_path / f"run{extension}"))
     assert list(found) == list(RUN)
     for name in RUN:
@@ -93,18 +111,28 @@ def test_a_written_file_is_read_back_bit_by_bit(extension, tmp_path):
 
 @pytest.mark.parametrize("extension", [".csv", ".parquet", ".h5"])
 @pytest.mark.parametrize("specimen", ["007", "12", "nan", "A 3", 'he said "A"', '"A"', "1e5"])
-def test_a_specimen_remains_a_text_also_where_it_looks_like_a_number(extension: str, specimen: str, tmp_path):
-    pytest.importorskip({".parquet": "pyarrow", ".csv": "csv"}.get(extension, "h5py"), reason="needs the extra lab")
+def test_a_specimen_remains_a_text_also_where_it_looks_like_a_number(
+    extension: str, specimen: str, tmp_path
+):
+    pytest.importorskip(
+        {".parquet": "pyarrow", ".csv": "csv"}.get(extension, "h5py"), reason="needs the extra lab"
+    )
     (found,) = read(write(RUN.with_constants(specimen=specimen), tmp_path / f"run{extension}"))
     assert found.constants["specimen"] == specimen
 
 
-STAMPS = pd.to_datetime(["2024-05-17 12:00:00.000000", "2024-05-17 12:00:00.000250", "2024-05-17 12:00:01.000000"])
+STAMPS = pd.to_datetime(
+    ["2024-05-17 12:00:00.000000", "2024-05-17 12:00:00.000250", "2024-05-17 12:00:01.000000"]
+)
 
 
 @pytest.mark.parametrize("heading", ["time", "time [ms]"])
-@pytest.mark.parametrize("stamps", [STAMPS, STAMPS.tz_localize("Europe/Berlin"), STAMPS - STAMPS[0]])
-def test_dates_and_durations_are_seconds_from_the_first_whatever_the_heading_states(heading, stamps, tmp_path):
+@pytest.mark.parametrize(
+    "stamps", [STAMPS, STAMPS.tz_localize("Europe/Berlin"), STAMPS - STAMPS[0]]
+)
+def test_dates_and_durations_are_seconds_from_the_first_whatever_the_heading_states(
+    heading, stamps, tmp_path
+):
     frame = pd.DataFrame({heading: stamps, "pressure [bar]": [1.0, 2.0, 3.0]})
     assert from_pandas(frame)["time"].tolist() == [0.0, 0.00025, 1.0]
     assert from_pandas(frame.set_index(heading))["time"].tolist() == [0.0, 0.00025, 1.0]
@@ -115,7 +143,9 @@ def test_dates_and_durations_are_seconds_from_the_first_whatever_the_heading_sta
 
 def test_each_named_level_of_an_index_is_a_column():
     index = pd.MultiIndex.from_product([[0.0, 0.1], ["a"]], names=["time [s]", "name"])
-    assert from_pandas(pd.DataFrame({"pressure [bar]": [1.0, 2.0]}, index=index))["time"].tolist() == [0.0, 0.1]
+    assert from_pandas(pd.DataFrame({"pressure [bar]": [1.0, 2.0]}, index=index))[
+        "time"
+    ].tolist() == [0.0, 0.1]
 
 
 def test_a_worksheet_of_clock_times_and_numbers_as_texts_is_a_table(tmp_path):
@@ -123,11 +153,16 @@ def test_a_worksheet_of_clock_times_and_numbers_as_texts_is_a_table(tmp_path):
     cells = {"time": ["12:00:00", "12:00:00.5", "12:00:01"], "pressure [bar]": ["1,5", "2,5", "3"]}
     pd.DataFrame(cells).to_excel(tmp_path / "run.xlsx", index=False)
     (found,) = read(tmp_path / "run.xlsx")
-    assert (found["time"].tolist(), found["pressure"].tolist()) == ([0.0, 0.5, 1.0], [1.5e5, 2.5e5, 3e5])
+    assert (found["time"].tolist(), found["pressure"].tolist()) == (
+        [0.0, 0.5, 1.0],
+        [1.5e5, 2.5e5, 3e5],
+    )
 
 
 def test_an_unknown_extension_and_an_unwritable_folder_are_named(tmp_path):
-    with pytest.raises(FileError, match=r"cannot be written as '\.xyz'; allowed: \.csv, \.parquet, \.h5, \.hdf5"):
+    with pytest.raises(
+        FileError, match=r"cannot be written as '\.xyz'; allowed: \.csv, \.parquet, \.h5, \.hdf5"
+    ):
         write(RUN, tmp_path / "run.xyz")
     for extension in (".csv", ".parquet", ".h5"):
         with pytest.raises(FileError, match="cannot be written"):
@@ -149,7 +184,9 @@ def test_the_command_converts_one_file_and_several(tmp_path):
     assert (tmp_path / "plain.csv").read_text().startswith("time [s],")
     assert airmuscle("convert", tmp_path / "run0.csv", tmp_path / "a.h5", "--plain").exit_code == 2
     assert airmuscle("convert", tmp_path / "run0.csv", tmp_path / "a.xyz").exit_code == 1
-    (tmp_path / "rounded.csv").write_text("time [s],length [mm]\n" + "".join(f"{i // 2},{290 - i}\n" for i in range(9)))
+    (tmp_path / "rounded.csv").write_text(
+        "time [s],length [mm]\n" + "".join(f"{i // 2},{290 - i}\n" for i in range(9))
+    )
     done = airmuscle("convert", tmp_path / "rounded.csv", tmp_path / "bare.csv")
     assert "For stamps that the logger rounded, use --time uniform." in done.stderr
     options = ("--time", "uniform", "--resting-length", "300 mm")
@@ -185,12 +222,18 @@ def test_convert_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch
     assert done.exit_code == 0, done.output
     assert len(read_csv(tmp_path / "all.csv")) == 6500
     done = airmuscle("convert", path, tmp_path / "few.csv", "--max-rows", 1000)
-    assert "note: The file has 6500 rows; one in 7 is kept as measured, 929 in total" in " ".join(done.output.split())
+    assert "note: The file has 6500 rows; one in 7 is kept as measured, 929 in total" in " ".join(
+        done.output.split()
+    )
     assert len(read_csv(tmp_path / "few.csv")) == 929
 
 
 def test_the_other_commands_say_that_rows_are_left_out(tmp_path, monkeypatch):
     reduce_from(20, monkeypatch)
     path = tmp_path / "long.csv"
-    path.write_text("time [s],pressure [kPa]\n" + "\n".join(f"{k / 1000},{k % 70}" for k in range(100)))
-    assert "The file has 100 rows; one in 5 is kept" in " ".join(airmuscle("inspect", path).output.split())
+    path.write_text(
+        "time [s],pressure [kPa]\n" + "\n".join(f"{k / 1000},{k % 70}" for k in range(100))
+    )
+    assert "The file has 100 rows; one in 5 is kept" in " ".join(
+        airmuscle("inspect", path).output.split()
+    )

@@ -1,6 +1,8 @@
-"""Exported programs: a scenario in C99, JavaScript and Octave makes the steps of the library and ends where it ends.
+"""Exported programs: a scenario in C99, JavaScript and Octave makes the steps of the library and
+ends where it ends.
 
-What cannot be exported is refused by name; names of users become identifiers; files are complete, and the same each time.
+What cannot be exported is refused by name; names of users become identifiers; files are complete,
+and the same each time.
 """
 
 from __future__ import annotations
@@ -21,10 +23,26 @@ from command_line import airmuscle
 from widths import widened
 
 from airmuscle.core import StateVariable, System, autodiff, model, ops, parameter
-from airmuscle.engine import DormandPrince8, Problem, Rodas4, RungeKutta4, SampledSignal, Schedule, solve
+from airmuscle.engine import (
+    DormandPrince8,
+    Problem,
+    Rodas4,
+    RungeKutta4,
+    SampledSignal,
+    Schedule,
+    solve,
+)
 from airmuscle.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.files import list_laws, load_law
-from airmuscle.outlets import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
+from airmuscle.outlets import (
+    C99,
+    JavaScript,
+    Octave,
+    make_identifiers,
+    write_fmu,
+    write_law,
+    write_program,
+)
 from airmuscle.outlets.export import build_and_run
 from airmuscle.outlets.export.identifiers import LONGEST, RESERVED
 from airmuscle.physics import HangingMass, Tabulated
@@ -41,7 +59,9 @@ def problem_of(name, integrator=None, duration=1.0):
 
 
 def run_c(folder, *options):
-    """Standard error and CSV rows of the exported C program, which is compiled with all warnings as errors."""
+    """Standard error and CSV rows of the exported C program, which is compiled with all warnings as
+    errors.
+    """
     return printed.finished([printed.built(folder, *options)], folder)
 
 
@@ -50,8 +70,9 @@ def run_javascript(folder):
 
 
 def check_run(text, csv, problem):
-    """Steps as the library's; the last row to 1e-10 of the greatest value of each column, every row to 1e-8: rounding
-    moves the error estimate, and with it the steps, which is less than 1 % of the tolerance."""
+    """Steps as the library's; the last row to 1e-10 of the greatest value of each column, every row
+    to 1e-8: rounding moves the error estimate, and with it the steps, which is less than 1 % of the
+    tolerance."""
     solution = solve(problem)
     taken, rejected = map(int, re.search(r"(\d+) steps, (\d+) rejected", text).groups())
     assert (taken, rejected) == (solution.statistics.steps, solution.statistics.rejected_steps)
@@ -79,7 +100,9 @@ CASES = {
 
 
 def every_integrator_once(target, case):
-    """Each in C; in JavaScript, whose run has the same text, that of variable steps and one of fixed steps."""
+    """Each in C; in JavaScript, whose run has the same text, that of variable steps and one of
+    fixed steps.
+    """
     return (target == C99() and case != "one muscle") or case in (
         "two muscles on a spool",
         "fixed steps that the segments are no multiple of",
@@ -88,7 +111,10 @@ def every_integrator_once(target, case):
 
 @pytest.mark.parametrize(
     ("target", "case"),
-    widened([(target, case) for target in (C99(), JavaScript()) for case in CASES], every_integrator_once),
+    widened(
+        [(target, case) for target in (C99(), JavaScript()) for case in CASES],
+        every_integrator_once,
+    ),
     ids=str,
 )
 def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
@@ -97,7 +123,9 @@ def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
     check_run(*RUN[target](tmp_path), problem)
 
 
-@pytest.mark.parametrize("case", ["one muscle", pytest.param("fixed steps", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "case", ["one muscle", pytest.param("fixed steps", marks=pytest.mark.slow)]
+)
 def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
     problem = problem_of(*CASES[case], duration=0.2)
     write_program(problem, tmp_path, Octave(), name="plant")
@@ -105,8 +133,16 @@ def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
 
 
 def test_the_octave_command_writes_its_file_and_displays_nothing(tmp_path):
-    write_program(problem_of("heat", RungeKutta4(1e-2), duration=0.05), tmp_path, Octave(), name="plant")
-    command = [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", "run_plant('run.csv')"]
+    write_program(
+        problem_of("heat", RungeKutta4(1e-2), duration=0.05), tmp_path, Octave(), name="plant"
+    )
+    command = [
+        printed.require("octave-cli"),
+        "--no-init-file",
+        "--quiet",
+        "--eval",
+        "run_plant('run.csv')",
+    ]
     assert printed.finished(command, tmp_path)[1] == ""
     assert (tmp_path / "run.csv").read_text().startswith("time [s],")
 
@@ -122,12 +158,16 @@ def end_of(problem, factor=1.0):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", plants.EXAMPLES)
 def test_every_plant_ends_in_c_where_it_ends_in_the_library(name, tmp_path):
-    """To 1e-10 of each state, or to the effect of roundings: ten times that of one ulp of the initial state.
+    """To 1e-10 of each state, or to the effect of roundings: ten times that of one ulp of the
+    initial state.
 
     A contact amplifies rounding, because it decides whether a step is accepted.
     """
     plant = plants.EXAMPLES[name]
-    scale = {i.name: 0.01 if "shortening" in i.name else 8e5 if i.unit == "Pa" else 1.0 for i in plant.input_variables}
+    scale = {
+        i.name: 0.01 if "shortening" in i.name else 8e5 if i.unit == "Pa" else 1.0
+        for i in plant.input_variables
+    }
     signal = SampledSignal({i: tuple((t, v * scale[i]) for t, v in RAMPS) for i in plant.inputs})
     places = {"position": 0.005} if any(s.name == "position" for s in plant.states) else {}
     problem = Problem(plant, signal, 0.5, plant.state_at(pressure=1e5, **places))
@@ -136,15 +176,21 @@ def test_every_plant_ends_in_c_where_it_ends_in_the_library(name, tmp_path):
     assert "time 0.5 s" in text
     found = np.array(csv.splitlines()[-1].split(","), dtype=float)[1:]
     expected = end_of(problem)
-    rounding = np.max([np.abs(end_of(problem, 1.0 + k * 2.0**-52) - expected) for k in (-2, -1, 1, 2)], axis=0)
-    allowed = np.maximum(1e-10 * (np.abs(expected) + np.array([s.nominal for s in plant.states])), 10 * rounding)
+    rounding = np.max(
+        [np.abs(end_of(problem, 1.0 + k * 2.0**-52) - expected) for k in (-2, -1, 1, 2)], axis=0
+    )
+    allowed = np.maximum(
+        1e-10 * (np.abs(expected) + np.array([s.nominal for s in plant.states])), 10 * rounding
+    )
     assert (np.abs(found - expected) <= allowed).all()
 
 
 def test_jumps_and_a_later_start_are_met(tmp_path):
     plant = plants.EXAMPLES["dmsp-20-300"]
     jumps = Schedule({"fill": ((2.1, 1.0), (2.35, 0.0)), "discharge": ((2.6, 1.0),)})
-    problem = Problem(plant, jumps, 1.0, plant.state_at(pressure=1e5), start_time=2.0, output_times=0.03)
+    problem = Problem(
+        plant, jumps, 1.0, plant.state_at(pressure=1e5), start_time=2.0, output_times=0.03
+    )
     write_program(problem, tmp_path, C99(), name="plant")
     check_run(*run_c(tmp_path), problem)
 
@@ -173,13 +219,26 @@ def test_the_program_has_no_undefined_behaviour(tmp_path):
 
 
 def test_the_sources_are_c_plus_plus_too(tmp_path):
-    """The program that g++ builds writes the same numbers as that of gcc, without fused operations."""
+    """The program that g++ builds writes the same numbers as that of gcc, without fused
+    operations.
+    """
     write_program(problem_of("dmsp-20-300", duration=0.2), tmp_path, C99(), name="plant")
     (tmp_path / "use.cpp").write_text(
         '#include "plant.h"\nint used() { return PLANT_STATE_AIR_MASS + PLANT_INPUT_FILL; }\n'
     )
     options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off"]
-    command = [printed.require("g++"), *options, "-x", "c++", "plant.c", "main.c", "use.cpp", "-o", "program", "-lm"]
+    command = [
+        printed.require("g++"),
+        *options,
+        "-x",
+        "c++",
+        "plant.c",
+        "main.c",
+        "use.cpp",
+        "-o",
+        "program",
+        "-lm",
+    ]
     printed.finished(command, tmp_path)
     assert printed.finished(["./program"], tmp_path) == run_c(tmp_path, "-ffp-contract=off")
 
@@ -196,13 +255,21 @@ def test_cmake_builds_the_program(language, tmp_path):
 
 WRONG_ARGUMENTS = {
     "{parameter: {}}": "simulate: there is no 'parameter'; there are parameters, ",
-    "{parameters: {'mechanism.inner.mass': 20}}": "parameters: there is no 'mechanism.inner.mass'; there are ",
+    "{parameters: {'mechanism.inner.mass': 20}}": (
+        "parameters: there is no 'mechanism.inner.mass'; there are "
+    ),
     "{parameters: [1, 2]}": "parameters: 2 values are given; give ",
     "{parameters: 3}": "parameters: give an array, or values by name.",
-    "{parameters: {'mechanism.mass': NaN}}": "parameters: mechanism.mass is NaN; it must be a finite number.",
+    "{parameters: {'mechanism.mass': NaN}}": (
+        "parameters: mechanism.mass is NaN; it must be a finite number."
+    ),
     "{initial: [1]}": "initial: 1 values are given; give 3: air_mass, position, speed.",
-    "{segments: {ends: [1], values: [[0]], slopes: [[0, 0]]}}": "segments, values: 1 values are given; give 2: fill, disc",
-    "{segments: {ends: [1, 2], values: [[0, 0]], slopes: [[0, 0]]}}": "segments: ends, values and slopes must have one el",
+    "{segments: {ends: [1], values: [[0]], slopes: [[0, 0]]}}": (
+        "segments, values: 1 values are given; give 2: fill, disc"
+    ),
+    "{segments: {ends: [1, 2], values: [[0, 0]], slopes: [[0, 0]]}}": (
+        "segments: ends, values and slopes must have one el"
+    ),
 }
 
 
@@ -218,7 +285,9 @@ process.stdout.write(JSON.stringify(said));"""
 
 
 def test_typescript_knows_the_names_of_the_module(tmp_path):
-    """Checked by the compiler where it is installed; the package is one that npm and bundlers resolve."""
+    """Checked by the compiler where it is installed; the package is one that npm and bundlers
+    resolve.
+    """
     write_program(problem_of("dmsp-20-300", duration=0.1), tmp_path, JavaScript(), name="plant")
     package = json.loads((tmp_path / "package.json").read_text())
     assert all((tmp_path / path).exists() for path in package["exports"]["."].values())
@@ -231,8 +300,12 @@ def test_typescript_knows_the_names_of_the_module(tmp_path):
     )
     options = ["--noEmit", "--strict", "--target", "es2022", "--module", "nodenext"]
     printed.finished([printed.require("tsc"), *options, "use.mts"], tmp_path)
-    (tmp_path / "use.mts").write_text('import {simulate} from "./plant.mjs";\nsimulate({parameters: {mass: 12}});\n')
-    done = subprocess.run(["tsc", *options, "use.mts"], cwd=tmp_path, capture_output=True, text=True)
+    (tmp_path / "use.mts").write_text(
+        'import {simulate} from "./plant.mjs";\nsimulate({parameters: {mass: 12}});\n'
+    )
+    done = subprocess.run(
+        ["tsc", *options, "use.mts"], cwd=tmp_path, capture_output=True, text=True
+    )
     assert done.returncode != 0
     assert "'mass' does not exist" in done.stdout
 
@@ -247,16 +320,28 @@ def test_constants_take_the_place_of_parameters_that_are_not_tunable(target, tmp
     [name] = [n for n in source.values() if (tmp_path / "one" / n).exists()]
     whole, less = ((tmp_path / f / name).read_text() for f in ("all", "one"))
     assert len(less) < len(whole)
-    assert [text.count("'mechanism.mass'") + text.count('"mechanism.mass"') for text in (whole, less)] == [1, 1]
-    assert [text.count("'mechanism.gravity'") + text.count('"mechanism.gravity"') for text in (whole, less)] == [1, 0]
+    assert [
+        text.count("'mechanism.mass'") + text.count('"mechanism.mass"') for text in (whole, less)
+    ] == [1, 1]
+    assert [
+        text.count("'mechanism.gravity'") + text.count('"mechanism.gravity"')
+        for text in (whole, less)
+    ] == [1, 0]
 
 
 def test_a_tunable_parameter_changes_the_run(tmp_path):
-    """JavaScript: a heavier mass as an argument of `simulate`, against the heavier plant of the library."""
+    """JavaScript: a heavier mass as an argument of `simulate`, against the heavier plant of the
+    library.
+    """
     problem = problem_of("dmsp-20-300", duration=0.2)
-    heavier = dataclasses.replace(problem, system=dataclasses.replace(problem.system, mechanism=HangingMass(12.0)))
+    heavier = dataclasses.replace(
+        problem, system=dataclasses.replace(problem.system, mechanism=HangingMass(12.0))
+    )
     write_program(problem, tmp_path, JavaScript(), name="plant", tunable=["mechanism.mass"])
-    script = 'import {simulate} from "./plant.mjs";\nconsole.log(JSON.stringify(simulate({parameters: [12.0]}).columns.position));'
+    script = (
+        'import {simulate} from "./plant.mjs";\nconsole.log(JSON.stringify(simulate({parameters:'
+        " [12.0]}).columns.position));"
+    )
     found = np.array(printed.run_node(script, {}, tmp_path))
     expected = solve(heavier).recording["position"]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
@@ -276,17 +361,17 @@ def closed_form_laws():
 def law_points(law, count=40):
     """Points of the two arguments of the closed form of a law."""
     rng = np.random.default_rng(3)
-    pressure, contraction, force = (
-        rng.uniform(1e4, 5e5, count),
-        rng.uniform(0.005, 0.2, count),
-        rng.uniform(1, 500, count),
-    )
+    pressure = rng.uniform(1e4, 5e5, count)
+    contraction = rng.uniform(0.005, 0.2, count)
+    force = rng.uniform(1, 500, count)
     for method, (a, b) in {
         "force": (pressure, contraction),
         "contraction": (pressure, force),
         "pressure": (contraction, force),
     }.items():
-        base = {"force": "ForceLaw", "contraction": "ContractionLaw", "pressure": "PressureLaw"}[method]
+        base = {"force": "ForceLaw", "contraction": "ContractionLaw", "pressure": "PressureLaw"}[
+            method
+        ]
         if base in {cls.__name__ for cls in type(law).__mro__}:
             return method, a, b
     raise AssertionError(type(law))
@@ -333,7 +418,8 @@ def test_every_closed_form_law_has_its_value_and_slopes_in_c(tmp_path):
     library = printed.shared_library("\n".join([*sources, ""]), tmp_path, "laws", "-O0")
     for i, (name, law) in enumerate(closed_form_laws().items()):
         _, a, b = law_points(law)
-        c, defaults = np.zeros(500), (ctypes.c_double * 500).in_dll(library, f"law{i}_defaults")
+        c = np.zeros(500)
+        defaults = (ctypes.c_double * 500).in_dll(library, f"law{i}_defaults")
         getattr(library, f"law{i}_prepare")(defaults, ctypes.c_void_p(c.ctypes.data))
         rows = np.empty((a.size, 3))
         for row, x, y in zip(rows, a.tolist(), b.tolist(), strict=True):
@@ -358,7 +444,9 @@ def test_a_law_in_octave_takes_arrays(tmp_path):
     assert np.isnan(missing).all()
     contraction = np.array([0.05, 0.1, 0.15])
     slopes = law.slopes(3e5, contraction)
-    expected = np.column_stack([law.force(3e5, contraction), slopes.by_pressure, -slopes.by_contraction])
+    expected = np.column_stack(
+        [law.force(3e5, contraction), slopes.by_pressure, -slopes.by_contraction]
+    )
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
@@ -370,7 +458,10 @@ def test_a_law_without_closed_form_is_refused_by_name(target, tmp_path):
         exact = load_law("saga2007-exact").characteristic
     for law in (table, exact):
         kind = type(law).__name__
-        with pytest.raises(ParameterError, match=rf"{kind} has no closed form .* as_force_law\(law, validity_range\)"):
+        with pytest.raises(
+            ParameterError,
+            match=rf"{kind} has no closed form .* as_force_law\(law, validity_range\)",
+        ):
             write_law(law, tmp_path / "law", target)
     assert not (tmp_path / "law").exists()
 
@@ -409,7 +500,18 @@ def test_one_text_is_no_sequence_of_names_and_many_equal_names_are_numbered():
 
 
 def test_identifiers_are_distinct_in_any_case_and_of_limited_length():
-    names = ["a.b", "a_b", "A b", "x" * 300, "x" * 299 + "y", "X" * 300, *(["same"] * 30), "same_2", "µ", "μ"]
+    names = [
+        "a.b",
+        "a_b",
+        "A b",
+        "x" * 300,
+        "x" * 299 + "y",
+        "X" * 300,
+        *(["same"] * 30),
+        "same_2",
+        "µ",
+        "μ",
+    ]
     words = make_identifiers(names)
     assert len({word.casefold() for word in words}) == len(names)
     assert all(re.fullmatch(r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*_?", word) for word in words)
@@ -421,11 +523,16 @@ def test_identifiers_are_distinct_in_any_case_and_of_limited_length():
 
 @pytest.mark.slow
 def test_names_of_users_cannot_leave_their_text(tmp_path):
-    """Quotes, comment ends, keywords, trigraphs and other alphabets in the name of a muscle, in every language."""
+    """Quotes, comment ends, keywords, trigraphs and other alphabets in the name of a muscle, in
+    every language.
+    """
     names = ('*/ "\\', "while'??/", "筋肉 % \u2028")
     base = plants.EXAMPLES["joint with stops"]
     for left in names:
-        muscles = tuple(dataclasses.replace(m, name=n) for m, n in zip(base.muscles, (left, "right"), strict=True))
+        muscles = tuple(
+            dataclasses.replace(m, name=n)
+            for m, n in zip(base.muscles, (left, "right"), strict=True)
+        )
         plant = dataclasses.replace(base, muscle=muscles)
         problem = Problem(plant, Schedule({}), 0.02, plant.state_at(pressure=1e5))
         for target in (C99(), JavaScript()):
@@ -445,7 +552,10 @@ class Named(System):
     inputs = ("double",)
 
     def rates(self, state, inputs):
-        return {"x": self.v2 * state["v1"] - self.c * state["x"], "v1": inputs["double"] - self.c * state["v1"]}
+        return {
+            "x": self.v2 * state["v1"] - self.c * state["x"],
+            "v1": inputs["double"] - self.c * state["v1"],
+        }
 
     def outputs(self, state, inputs):
         return {"f": ops.exp(-self.c * state["x"]), "x_rate": state["v1"]}
@@ -463,20 +573,45 @@ def test_names_of_quantities_do_not_collide_with_those_of_the_program(target, tm
     [
         (
             C99(),
-            ("const double speed = x[2];  /* [m/s] speed of the load */", "/* [Pa] gauge pressure in the muscle */"),
+            (
+                "const double speed = x[2];  /* [m/s] speed of the load */",
+                "/* [Pa] gauge pressure in the muscle */",
+            ),
         ),
-        (JavaScript(), ("const speed = x[2];  // [m/s] speed of the load", "// [Pa] gauge pressure in the muscle")),
-        (Octave(), ("  speed = x(3);  % [m/s] speed of the load", "% [Pa] gauge pressure in the muscle")),
+        (
+            JavaScript(),
+            (
+                "const speed = x[2];  // [m/s] speed of the load",
+                "// [Pa] gauge pressure in the muscle",
+            ),
+        ),
+        (
+            Octave(),
+            ("  speed = x(3);  % [m/s] speed of the load", "% [Pa] gauge pressure in the muscle"),
+        ),
     ],
     ids=str,
 )
 def test_printed_functions_name_the_quantities_of_the_model(target, lines, tmp_path):
-    """States, inputs, parameters, rates and outputs, each with its unit and its meaning, wherever they are computed."""
+    """States, inputs, parameters, rates and outputs, each with its unit and its meaning, wherever
+    they are computed.
+    """
     write_program(problem_of("dmsp-20-300"), tmp_path, target, name="plant")
-    (text,) = (path.read_text() for path in tmp_path.iterdir() if path.name in ("plant.c", "plant.mjs", "plant.m"))
+    (text,) = (
+        path.read_text()
+        for path in tmp_path.iterdir()
+        if path.name in ("plant.c", "plant.mjs", "plant.m")
+    )
     before, rates = re.split(r"(?:void|function) .*rhs\(", text)
     rates = re.split(r"(?:void|function) .*jac\(", rates)[0]
-    for line in (*lines, "mechanism_gravity = c", "force = ", "contraction = ", "air_mass_rate = ", "[kg/s]"):
+    for line in (
+        *lines,
+        "mechanism_gravity = c",
+        "force = ",
+        "contraction = ",
+        "air_mass_rate = ",
+        "[kg/s]",
+    ):
         assert line in rates, line
     assert "mechanism_mass = p" in before
 
@@ -502,16 +637,21 @@ def test_files_are_the_same_every_time_and_change_with_the_model(target, tmp_pat
         paths = write_program(problem, tmp_path / folder, target, name="plant")
         return [path.read_bytes() for path in paths if path.name not in BUILD_FILES]
 
-    first, second = contents("a", problem_of("dmsp-20-300")), contents("b", problem_of("dmsp-20-300"))
+    first = contents("a", problem_of("dmsp-20-300"))
+    second = contents("b", problem_of("dmsp-20-300"))
     assert first == second
     base = problem_of("dmsp-20-300")
-    heavier = dataclasses.replace(base, system=dataclasses.replace(base.system, mechanism=HangingMass(10.000001)))
+    heavier = dataclasses.replace(
+        base, system=dataclasses.replace(base.system, mechanism=HangingMass(10.000001))
+    )
     assert all(a != b for a, b in zip(first, contents("c", heavier), strict=True))
 
 
 def test_a_target_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("here")
-    with pytest.raises(FileError, match=r"file: cannot be written to: .* Specify a folder with write permission"):
+    with pytest.raises(
+        FileError, match=r"file: cannot be written to: .* Specify a folder with write permission"
+    ):
         write_program(problem_of("dmsp-20-300"), tmp_path / "file", C99())
 
 
@@ -519,10 +659,15 @@ def test_a_target_that_cannot_be_written_is_named(tmp_path):
     ("last", "write"),
     [
         ("main.c", lambda problem, folder: write_program(problem, folder, C99())),
-        ("plant.fmu", lambda problem, folder: write_fmu(problem, folder / "plant.fmu", binary=False)),
+        (
+            "plant.fmu",
+            lambda problem, folder: write_fmu(problem, folder / "plant.fmu", binary=False),
+        ),
     ],
 )
-def test_a_full_target_is_named_and_nothing_half_written_is_left(last, write, tmp_path, monkeypatch):
+def test_a_full_target_is_named_and_nothing_half_written_is_left(
+    last, write, tmp_path, monkeypatch
+):
     written = Path.write_bytes
 
     def full(path, data):
@@ -532,7 +677,10 @@ def test_a_full_target_is_named_and_nothing_half_written_is_left(last, write, tm
 
     monkeypatch.setattr(Path, "write_bytes", full)
     problem = problem_of("dmsp-20-300")
-    with pytest.raises(FileError, match=r"new: cannot be written to: No space left on device\. Free space there, or"):
+    with pytest.raises(
+        FileError,
+        match=r"new: cannot be written to: No space left on device\. Free space there, or",
+    ):
         write(problem, tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
@@ -543,9 +691,15 @@ def test_a_full_target_is_named_and_nothing_half_written_is_left(last, write, tm
 @pytest.mark.parametrize(
     ("tunable", "message"),
     [
-        ("mechanism.mas", r"Plant has no parameter 'mechanism\.mas'.*Did you mean 'mechanism\.mass'\?"),
+        (
+            "mechanism.mas",
+            r"Plant has no parameter 'mechanism\.mas'.*Did you mean 'mechanism\.mass'\?",
+        ),
         ("circuit.segment_count", "has no parameter"),
-        ("mechanism", "'mechanism' is fixed when a program is printed, because it determines the equations"),
+        (
+            "mechanism",
+            "'mechanism' is fixed when a program is printed, because it determines the equations",
+        ),
         ("muscle.name", "'muscle.name' is fixed when a program is printed"),
     ],
 )
@@ -556,7 +710,9 @@ def test_a_parameter_that_cannot_be_tunable_is_refused(tunable, message, tmp_pat
 
 @pytest.mark.parametrize("name", ["while", "2x", "a b", "a__b", "x" * 300, "../up", "π"])
 def test_a_name_that_is_no_identifier_is_refused_with_one_that_is(name, tmp_path):
-    with pytest.raises(ParameterError, match=r"cannot be the name of an exported program.* Use '\w+'\.") as caught:
+    with pytest.raises(
+        ParameterError, match=r"cannot be the name of an exported program.* Use '\w+'\."
+    ) as caught:
         write_program(problem_of("dmsp-20-300"), tmp_path, C99(), name=name)
     remedy = re.search(r"Use '(\w+)'", str(caught.value)).group(1)
     assert write_program(problem_of("dmsp-20-300"), tmp_path, C99(), name=remedy)
@@ -607,17 +763,32 @@ def test_the_command_refuses_a_wrong_use(arguments, message, tmp_path):
 
 def test_the_command_builds_and_runs_the_program(tmp_path):
     printed.require("gcc")
-    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path, "--build")
+    done = airmuscle(
+        "export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path, "--build"
+    )
     assert done.exit_code == 0, done.output
-    assert re.search(r"program: 2501 rows; 404 steps, \d+ rejected, time 25 s; code \d+ bytes", done.output)
+    assert re.search(
+        r"program: 2501 rows; 404 steps, \d+ rejected, time 25 s; code \d+ bytes", done.output
+    )
     assert {path.suffix for path in tmp_path.iterdir()} == {".c", ".h", ".txt"}
 
 
 def test_without_a_compiler_it_says_what_can_be_done(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path / "out", "--build")
+    done = airmuscle(
+        "export",
+        EXAMPLES / "fill_discharge.toml",
+        "--to",
+        "c",
+        "--out",
+        tmp_path / "out",
+        "--build",
+    )
     assert done.exit_code == 1
-    message = r"no C compiler \(gcc, clang, cc\) was found\. The sources are in .*out; install gcc or clang, or compile"
+    message = (
+        r"no C compiler \(gcc, clang, cc\) was found\. The sources are in .*out; install gcc or"
+        r" clang, or compile"
+    )
     assert re.search(message, done.stderr), done.stderr
     assert (tmp_path / "out" / "main.c").exists()
 

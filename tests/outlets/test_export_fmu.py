@@ -1,11 +1,13 @@
-"""FMUs: two checkers accept them, and FMPy, a simulator of others, runs them to the results of the library.
+"""FMUs: two checkers accept them, and FMPy, a simulator of others, runs them to the results of the
+library.
 
-The error of a column is the greatest difference divided by the greatest value of the column; rows at a jump of an input
-are left out, because programs differ in the side of the jump that they store.
+The error of a column is the greatest difference divided by the greatest value of the column; rows
+at a jump of an input are left out, because programs differ in the side of the jump that they store.
 
-In Co-Simulation the error is at most 1e-7, or that of the library at the same tolerance, which contacts amplify. In Model
-Exchange it is at most 1e-6, or the change of the result of CVode, the integrator of the importer, from ten times its
-tolerance to its tolerance: the absolute tolerance of a position times the stiffness of a contact is an error of its force.
+In Co-Simulation the error is at most 1e-7, or that of the library at the same tolerance, which
+contacts amplify. In Model Exchange it is at most 1e-6, or the change of the result of CVode, the
+integrator of the importer, from ten times its tolerance to its tolerance: the absolute tolerance of
+a position times the stiffness of a contact is an error of its force.
 """
 
 from __future__ import annotations
@@ -39,13 +41,19 @@ JUMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.4, 0.4))
 SOME = ("dmsp-20-300", "overlap")
 PORTS = "load in another program"
 """A plant whose shortening is an input: it cannot jump as the inputs do here."""
-ALL = [pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES if name != PORTS]
+ALL = [
+    pytest.param(name, marks=() if name in SOME else pytest.mark.slow)
+    for name in plants.EXAMPLES
+    if name != PORTS
+]
 
 
 def problem_of(name="dmsp-20-300", integrator=Rodas4(1e-9), schedule=JUMPS):
     plant = plants.EXAMPLES[name]
     inputs = Schedule(dict.fromkeys(plant.inputs, schedule) if schedule else {})
-    places = {"angle": 0.1} if name == "joint with stops" else {}  # at rest it is symmetric: all columns are rounding
+    places = (
+        {"angle": 0.1} if name == "joint with stops" else {}
+    )  # at rest it is symmetric: all columns are rounding
     state = plant.state_at(pressure=1e5, **places)
     return Problem(plant, inputs, 0.5, state, integrator=integrator, output_times=0.01)
 
@@ -53,7 +61,8 @@ def problem_of(name="dmsp-20-300", integrator=Rodas4(1e-9), schedule=JUMPS):
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory):
     """The path of the FMU of a plant, built once."""
-    folder, built = tmp_path_factory.mktemp("fmu"), {}
+    folder = tmp_path_factory.mktemp("fmu")
+    built = {}
 
     def path(name, fmi):
         printed.require("gcc")
@@ -73,7 +82,9 @@ def signal_of(inputs):
     for (_, before), (time, value) in itertools.pairwise(JUMPS):
         rows += [(time, before), (time, value)]
     rows.append((9.0, JUMPS[-1][1]))
-    return np.array([(t, *(v,) * len(inputs)) for t, v in rows], dtype=[(n, float) for n in ("time", *inputs)])
+    return np.array(
+        [(t, *(v,) * len(inputs)) for t, v in rows], dtype=[(n, float) for n in ("time", *inputs)]
+    )
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -85,9 +96,13 @@ def test_fmpy_finds_no_error_and_reproduces_the_run(name, fmi, fmus):
     assert validation.validate_fmu(str(path)) == []
     expected = solve(problem).recording
     inputs = problem.system.inputs
-    if expected["time"][-1] < 0.5:  # the run of the library ends early, which the FMU reports as well
+    if (
+        expected["time"][-1] < 0.5
+    ):  # the run of the library ends early, which the FMU reports as well
         with pytest.raises(Exception, match=r"fmi[23]DoStep failed"):
-            fmpy.simulate_fmu(str(path), fmi_type="CoSimulation", stop_time=0.5, input=signal_of(inputs))
+            fmpy.simulate_fmu(
+                str(path), fmi_type="CoSimulation", stop_time=0.5, input=signal_of(inputs)
+            )
         return
     columns = [c for c in expected if c not in ("time", *inputs)]
     clear = ~np.isin(np.round(expected["time"], 6), [t for t, _ in JUMPS])
@@ -95,23 +110,32 @@ def test_fmpy_finds_no_error_and_reproduces_the_run(name, fmi, fmus):
 
     def run_of(kind, tolerance):
         run = fmpy.simulate_fmu(
-            str(path), fmi_type=kind, stop_time=0.5, output_interval=0.01, relative_tolerance=tolerance, output=columns,
-            input=signal_of(inputs) if inputs else None, record_events=True,
-        )  # fmt: skip
+            str(path),
+            fmi_type=kind,
+            stop_time=0.5,
+            output_interval=0.01,
+            relative_tolerance=tolerance,
+            output=columns,
+            input=signal_of(inputs) if inputs else None,
+            record_events=True,
+        )
         rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in expected["time"]]
         return {column: run[column][rows] for column in columns}
 
     def difference(a, b, column):
         return np.abs(a[column] - b[column])[clear].max() / (np.abs(expected[column]).max() or 1.0)
 
-    by_slave, by_cvode = run_of("CoSimulation", 1e-9), run_of("ModelExchange", 1e-9)
+    by_slave = run_of("CoSimulation", 1e-9)
+    by_cvode = run_of("ModelExchange", 1e-9)
     coarser = None
     for column in columns:
         bar = max(1e-7, difference(own, expected, column))
         assert difference(by_slave, expected, column) <= bar, column
         if difference(by_cvode, expected, column) > 1e-6:
             coarser = coarser or run_of("ModelExchange", 1e-8)
-            assert difference(by_cvode, expected, column) <= difference(coarser, by_cvode, column), column
+            assert difference(by_cvode, expected, column) <= difference(
+                coarser, by_cvode, column
+            ), column
 
 
 def test_the_integrator_of_the_importer_stops_where_a_contact_begins_and_ends(fmus):
@@ -119,19 +143,31 @@ def test_the_integrator_of_the_importer_stops_where_a_contact_begins_and_ends(fm
     fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
     name = "pulley with stops"
     run = fmpy.simulate_fmu(
-        str(fmus(name, 3)), fmi_type="ModelExchange", stop_time=0.3, output_interval=0.01, relative_tolerance=1e-7,
-        output=["position", "speed"], input=signal_of(plants.EXAMPLES[name].inputs), record_events=True,
-    )  # fmt: skip
+        str(fmus(name, 3)),
+        fmi_type="ModelExchange",
+        stop_time=0.3,
+        output_interval=0.01,
+        relative_tolerance=1e-7,
+        output=["position", "speed"],
+        input=signal_of(plants.EXAMPLES[name].inputs),
+        record_events=True,
+    )
     at_events = run[np.abs(100 * run["time"] - np.round(100 * run["time"])) > 1e-6]
-    at_stop = at_events[np.abs(at_events["position"] - plants.EXAMPLES[name].mechanism.upper_stop) <= 1e-9]
+    at_stop = at_events[
+        np.abs(at_events["position"] - plants.EXAMPLES[name].mechanism.upper_stop) <= 1e-9
+    ]
     assert (at_stop["speed"] < 0).any()
     assert (at_stop["speed"] > 0).any()
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_second_checker_finds_no_error(fmi, fmus):
-    pytest.importorskip("fmu_manipulation_toolbox", reason="needs the package fmu-manipulation-toolbox")
-    script = "import sys; from fmu_manipulation_toolbox.cli.fmutool import fmutool; sys.exit(fmutool())"
+    pytest.importorskip(
+        "fmu_manipulation_toolbox", reason="needs the package fmu-manipulation-toolbox"
+    )
+    script = (
+        "import sys; from fmu_manipulation_toolbox.cli.fmutool import fmutool; sys.exit(fmutool())"
+    )
     command = [sys.executable, "-c", script, "-input", str(fmus("overlap", fmi)), "-check"]
     done = subprocess.run(command, capture_output=True, text=True)
     text = done.stdout + done.stderr
@@ -154,9 +190,11 @@ class Instance:
         self.number = {v.name: v.valueReference for v in self.about.modelVariables}
         self.log = []
         self.fmu = FMU3Slave(
-            guid=self.about.guid, unzipDirectory=str(folder), instanceName="test",
+            guid=self.about.guid,
+            unzipDirectory=str(folder),
+            instanceName="test",
             modelIdentifier=self.about.coSimulation.modelIdentifier,
-        )  # fmt: skip
+        )
         log = lambda e, status, category, text: self.log.append((status, text.decode()))  # noqa: E731
         self.fmu.instantiate(loggingOn=logging, logMessage=log)
         self.set(**(start or {}))
@@ -166,7 +204,9 @@ class Instance:
         return np.array(self.fmu.getFloat64([self.number[n] for n in names]))
 
     def set(self, **values):
-        self.fmu.setFloat64([self.number[n.replace("__", ".")] for n in values], list(values.values()))
+        self.fmu.setFloat64(
+            [self.number[n.replace("__", ".")] for n in values], list(values.values())
+        )
 
     def step(self, t, h, count=1):
         for k in range(count):
@@ -186,14 +226,16 @@ def test_derivatives_are_those_of_the_rates(instance):
     instance.set(fill=0.3)
     n = instance.number
     rates = [n[v.name] for v in instance.about.modelVariables if v.derivative is not None]
-    outputs, knowns = [n["pressure"], n["force"]], [n["air_mass"], n["position"], n["fill"]]
+    outputs = [n["pressure"], n["force"]]
+    knowns = [n["air_mass"], n["position"], n["fill"]]
     unknowns = [*rates, *outputs]
-    table = np.array([
-        instance.fmu.getDirectionalDerivative(unknowns, knowns, list(row)) for row in np.eye(3)
-    ]).T  # fmt: skip
+    table = np.array(
+        [instance.fmu.getDirectionalDerivative(unknowns, knowns, list(row)) for row in np.eye(3)]
+    ).T
     for k, known in enumerate(knowns):
         (value,) = instance.fmu.getFloat64([known])
-        step, sides = 1e-6 * max(abs(value), 1e-3), []
+        step = 1e-6 * max(abs(value), 1e-3)
+        sides = []
         for sign in (1, -1):
             instance.fmu.setFloat64([known], [value + sign * step])
             sides.append(np.array(instance.fmu.getFloat64(unknowns)))
@@ -222,7 +264,10 @@ def test_a_stored_state_is_continued_bit_by_bit(instance):
 
 
 def test_a_parameter_can_be_tuned_between_steps(instance):
-    assert instance.get("parameters.mechanism.mass")[0] == plants.EXAMPLES["dmsp-20-300"].mechanism.mass
+    assert (
+        instance.get("parameters.mechanism.mass")[0]
+        == plants.EXAMPLES["dmsp-20-300"].mechanism.mass
+    )
     before = instance.get("der(speed)")[0]
     instance.set(parameters__mechanism__mass=2 * instance.get("parameters.mechanism.mass")[0])
     assert instance.get("der(speed)")[0] != before
@@ -234,17 +279,29 @@ def test_a_pressure_at_the_start_gives_the_air_mass(fmi, fmus):
     """The other states are kept; the run is that of the library from this state."""
     fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
     problem = problem_of()
-    plant, state = problem.system, dict(problem.initial_state)
-    state["air_mass"] *= (3e5 + plant.ambient.pressure) / (1e5 + plant.ambient.pressure)  # an ideal gas
+    plant = problem.system
+    state = dict(problem.initial_state)
+    state["air_mass"] *= (3e5 + plant.ambient.pressure) / (
+        1e5 + plant.ambient.pressure
+    )  # an ideal gas
     expected = solve(replace(problem, initial_state=state)).recording
     options = {"start_values": {"start.pressure": 3e5}, "stop_time": 0.5, "output_interval": 0.01}
-    run = fmpy.simulate_fmu(str(fmus("dmsp-20-300", fmi)), output=["pressure", "position"], fmi_type="CoSimulation",
-                            input=signal_of(problem.system.inputs), relative_tolerance=1e-9, **options)  # fmt: skip
+    run = fmpy.simulate_fmu(
+        str(fmus("dmsp-20-300", fmi)),
+        output=["pressure", "position"],
+        fmi_type="CoSimulation",
+        input=signal_of(problem.system.inputs),
+        relative_tolerance=1e-9,
+        **options,
+    )
     assert run["pressure"][0] == pytest.approx(3e5, abs=1e-3)
     rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in expected["time"]]
     for column in ("pressure", "position"):
         clear = ~np.isin(np.round(expected["time"], 6), [t for t, _ in JUMPS])
-        assert np.abs(run[column][rows] - expected[column])[clear].max() <= 1e-7 * np.abs(expected[column]).max()
+        assert (
+            np.abs(run[column][rows] - expected[column])[clear].max()
+            <= 1e-7 * np.abs(expected[column]).max()
+        )
 
 
 def test_a_pressure_at_the_start_is_refused_after_it(instance):
@@ -257,10 +314,14 @@ def test_a_pressure_at_the_start_is_refused_after_it(instance):
 def test_terminals_are_valid_and_those_of_a_plant_and_its_controller_match(fmus, tmp_path):
     etree = pytest.importorskip("lxml.etree", reason="needs the package lxml")
     fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
-    schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd"))
+    schema = etree.XMLSchema(
+        file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd")
+    )
     loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
     problem = replace(problem_of(), input=loop)
-    controller = write_controller_fmu(problem, tmp_path / "controller.fmu", name="controller", binary=False).path
+    controller = write_controller_fmu(
+        problem, tmp_path / "controller.fmu", name="controller", binary=False
+    ).path
     members = []
     for path in (fmus("dmsp-20-300", 3), controller):
         with zipfile.ZipFile(path) as file:
@@ -281,29 +342,44 @@ def test_terminals_are_valid_and_those_of_a_plant_and_its_controller_match(fmus,
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_reference_results_are_met_with_the_inputs_beside_them(fmi, fmus, tmp_path):
     fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
-    path, extra = fmus("overlap", fmi), "extra/org.fmi-standard.fmi-ls-ref"
+    path = fmus("overlap", fmi)
+    extra = "extra/org.fmi-standard.fmi-ls-ref"
     with zipfile.ZipFile(path) as file:
         file.extractall(tmp_path)
     manifest = ElementTree.parse(tmp_path / extra / "fmi-ls-manifest.xml").getroot()
-    assert manifest.get("{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
+    assert (
+        manifest.get("{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-name")
+        == "org.fmi-standard.fmi-ls-ref"
+    )
     sources = {e.get("role"): e.get("source") for e in manifest}
     assert sources == {"experiment": "run.exp", "testcase": "inputs.csv", "result": "results.csv"}
     (experiment,) = ElementTree.parse(tmp_path / extra / "run.exp").getroot()
     span, *tables = experiment
     assert [e.tag for e in experiment] == ["TransientSimulation", "Stimuli", "References"]
-    inputs, results = (np.genfromtxt(tmp_path / extra / e.get("source"), delimiter=",", names=True, deletechars="")
-                       for e in tables)  # fmt: skip
+    inputs, results = (
+        np.genfromtxt(tmp_path / extra / e.get("source"), delimiter=",", names=True, deletechars="")
+        for e in tables
+    )
     columns = [name for name in results.dtype.names if name != "time"]
     assert float(experiment.get("tolerance")) == 1e-9
     run = fmpy.simulate_fmu(
-        str(path), fmi_type="CoSimulation", start_time=float(span.get("startTime")),
-        stop_time=float(span.get("stopTime")), relative_tolerance=float(experiment.get("tolerance")),
-        output_interval=0.01, input=inputs, output=columns, record_events=True,
-    )  # fmt: skip
+        str(path),
+        fmi_type="CoSimulation",
+        start_time=float(span.get("startTime")),
+        stop_time=float(span.get("stopTime")),
+        relative_tolerance=float(experiment.get("tolerance")),
+        output_interval=0.01,
+        input=inputs,
+        output=columns,
+        record_events=True,
+    )
     rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in results["time"]]
     clear = ~np.isin(np.round(results["time"], 6), [t for t, _ in JUMPS])
     for column in columns:
-        assert np.abs(run[column][rows] - results[column])[clear].max() <= 1e-7 * np.abs(results[column]).max(), column
+        assert (
+            np.abs(run[column][rows] - results[column])[clear].max()
+            <= 1e-7 * np.abs(results[column]).max()
+        ), column
 
 
 def test_the_log_states_once_what_left_its_validity_range(tmp_path):
@@ -311,7 +387,9 @@ def test_the_log_states_once_what_left_its_validity_range(tmp_path):
     plant = plants.EXAMPLES["dmsp-20-300"]
     limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, -0.1, 0.3))
     problem = replace(problem_of(), system=replace(plant, muscle=limited))
-    instance = Instance(write_fmu(problem, tmp_path / "a.fmu", name="plant").path, tmp_path / "unzipped")
+    instance = Instance(
+        write_fmu(problem, tmp_path / "a.fmu", name="plant").path, tmp_path / "unzipped"
+    )
     instance.fmu.exitInitializationMode()
     instance.set(fill=1.0)
     instance.step(0.0, 0.01, 200)
@@ -329,7 +407,12 @@ def test_an_input_outside_its_range_is_reported(instance):
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("fill", float("nan")), ("pressure", 1.0), ("relative_tolerance", -1.0), ("relative_tolerance", 1.0)],
+    [
+        ("fill", float("nan")),
+        ("pressure", 1.0),
+        ("relative_tolerance", -1.0),
+        ("relative_tolerance", 1.0),
+    ],
 )
 def test_what_cannot_be_set_is_refused(instance, name, value):
     with pytest.raises(Exception, match="fmi3SetFloat64"):
@@ -359,7 +442,9 @@ def test_the_tolerance_of_the_scenario_is_that_of_a_run(fmi, fmus):
 def test_a_parameter_beyond_its_bounds_is_refused(instance, value):
     with pytest.raises(Exception, match="fmi3SetFloat64"):
         instance.set(parameters__mechanism__mass=value)
-    assert re.search(r"mechanism\.mass is .*; allowed are 0\.0001 to 100000 kg", instance.log[-1][1])
+    assert re.search(
+        r"mechanism\.mass is .*; allowed are 0\.0001 to 100000 kg", instance.log[-1][1]
+    )
 
 
 def test_after_a_step_that_failed_the_instance_stands_where_it_stood(instance):
@@ -377,7 +462,11 @@ def test_after_a_step_that_failed_the_instance_stands_where_it_stood(instance):
 def test_only_parameters_that_act_on_the_run_are_tunable(tmp_path):
     plant = plants.EXAMPLES["dmsp-20-300"]
     limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, -0.1, 0.3))
-    write_fmu(replace(problem_of(), system=replace(plant, muscle=limited)), tmp_path / "a.fmu", binary=False)
+    write_fmu(
+        replace(problem_of(), system=replace(plant, muscle=limited)),
+        tmp_path / "a.fmu",
+        binary=False,
+    )
     with zipfile.ZipFile(tmp_path / "a.fmu") as archive:
         text = archive.read("modelDescription.xml").decode()
     names = re.findall(r'name="parameters\.([^"]+)"', text)
@@ -421,7 +510,9 @@ def test_a_wrong_token_is_refused(fmus, tmp_path):
     fmi3 = pytest.importorskip("fmpy.fmi3", reason="needs the package fmpy")
     with zipfile.ZipFile(fmus("dmsp-20-300", 3)) as archive:
         archive.extractall(tmp_path)
-    fmu = fmi3.FMU3Slave(guid="{0}", unzipDirectory=str(tmp_path), instanceName="test", modelIdentifier="plant")
+    fmu = fmi3.FMU3Slave(
+        guid="{0}", unzipDirectory=str(tmp_path), instanceName="test", modelIdentifier="plant"
+    )
     with pytest.raises(Exception, match="instantiate"):
         fmu.instantiate()
 
@@ -430,23 +521,39 @@ def test_the_sources_cause_no_warning_and_export_only_fmi_functions(fmus, tmp_pa
     for fmi in (2, 3):
         with zipfile.ZipFile(fmus("overlap", fmi)) as archive:
             archive.extractall(tmp_path / str(fmi))
-        command = ["gcc", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-fsyntax-only"]
+        command = [
+            "gcc",
+            "-std=c99",
+            "-pedantic",
+            "-Wall",
+            "-Wextra",
+            "-Wshadow",
+            "-Werror",
+            "-fsyntax-only",
+        ]
         sources = sorted((tmp_path / str(fmi) / "sources").glob("*.c"))
         done = subprocess.run([*command, *map(str, sources)], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr[:2000]
         library = next((tmp_path / str(fmi) / "binaries").rglob("plant*"))
         names = subprocess.run(
-            [printed.require("nm"), "-D", "--defined-only", str(library)], capture_output=True, text=True
+            [printed.require("nm"), "-D", "--defined-only", str(library)],
+            capture_output=True,
+            text=True,
         ).stdout.split()[2::3]
         assert names
         assert all(name.startswith(f"fmi{fmi}") for name in names)
-        needed = subprocess.run([printed.require("readelf"), "-d", str(library)], capture_output=True, text=True).stdout
+        needed = subprocess.run(
+            [printed.require("readelf"), "-d", str(library)], capture_output=True, text=True
+        ).stdout
         assert set(re.findall(r"NEEDED.*\[(\w+)", needed)) <= {"libc", "libm"}
 
 
 @pytest.mark.slow
 def test_the_same_problem_gives_the_same_bytes(tmp_path):
-    files = [write_fmu(problem_of(), tmp_path / f"{k}.fmu", name="plant").path.read_bytes() for k in range(2)]
+    files = [
+        write_fmu(problem_of(), tmp_path / f"{k}.fmu", name="plant").path.read_bytes()
+        for k in range(2)
+    ]
     assert files[0] == files[1]
 
 
@@ -458,9 +565,13 @@ def test_fixed_steps_are_exported(tmp_path):
     path = write_fmu(problem, tmp_path / "a.fmu", name="plant").path
     expected = solve(problem).recording
     run = fmpy.simulate_fmu(
-        str(path), fmi_type="CoSimulation", stop_time=0.5, output_interval=0.01, output=["pressure"],
+        str(path),
+        fmi_type="CoSimulation",
+        stop_time=0.5,
+        output_interval=0.01,
+        output=["pressure"],
         input=signal_of(problem.system.inputs),
-    )  # fmt: skip
+    )
     assert run["pressure"][-1] == pytest.approx(expected["pressure"][-1], rel=1e-12)
 
 
@@ -471,7 +582,10 @@ def test_without_a_compiler_the_fmu_contains_sources_and_says_so(tmp_path, monke
     monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
     written = write_fmu(problem_of(), tmp_path / "a.fmu", name="plant")
     assert written.platforms == ()
-    assert "no C compiler (gcc, clang, cc) was found; install the package gcc or clang" in written.remark
+    assert (
+        "no C compiler (gcc, clang, cc) was found; install the package gcc or clang"
+        in written.remark
+    )
     with zipfile.ZipFile(written.path) as archive:
         names = archive.namelist()
     assert names[0] == "modelDescription.xml"
@@ -495,7 +609,10 @@ def test_an_unwritable_target_is_named(tmp_path):
 
 @pytest.mark.parametrize(
     ("path", "fmi", "message"),
-    [("a.zip", 3, r"'a\.zip' must end in \.fmu"), ("a.fmu", 1, "FMI 1 is not supported; allowed: 2 or 3")],
+    [
+        ("a.zip", 3, r"'a\.zip' must end in \.fmu"),
+        ("a.fmu", 1, "FMI 1 is not supported; allowed: 2 or 3"),
+    ],
 )
 def test_another_file_or_version_is_refused(path, fmi, message, tmp_path):
     with pytest.raises(ParameterError, match=message):
@@ -505,12 +622,16 @@ def test_another_file_or_version_is_refused(path, fmi, message, tmp_path):
 def test_a_controller_is_refused_by_name(tmp_path):
     plant = plants.EXAMPLES["dmsp-20-300"]
     loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
-    with pytest.raises(ParameterError, match="the controller PID cannot be exported to this target"):
+    with pytest.raises(
+        ParameterError, match="the controller PID cannot be exported to this target"
+    ):
         write_fmu(Problem(plant, loop, 0.1, plant.state_at(pressure=1e5)), tmp_path / "a.fmu")
 
 
 def test_parameters_that_are_not_tunable_are_constants(tmp_path):
-    path = write_fmu(problem_of(), tmp_path / "a.fmu", tunable=["mechanism.mass"], binary=False).path
+    path = write_fmu(
+        problem_of(), tmp_path / "a.fmu", tunable=["mechanism.mass"], binary=False
+    ).path
     with zipfile.ZipFile(path) as archive:
         text = archive.read("modelDescription.xml").decode()
     assert re.findall(r'name="(parameters\.[^"]*)"', text) == ["parameters.mechanism.mass"]
@@ -536,7 +657,15 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 def test_the_command_writes_an_fmu(tmp_path):
     (tmp_path / "left arm.toml").write_text(EXAMPLE.read_text())
     done = airmuscle(
-        "export", tmp_path / "left arm.toml", "--to", "fmu", "--fmi", "2", "--sources-only", "--out", tmp_path
+        "export",
+        tmp_path / "left arm.toml",
+        "--to",
+        "fmu",
+        "--fmi",
+        "2",
+        "--sources-only",
+        "--out",
+        tmp_path,
     )
     assert done.exit_code == 0, done.output
     assert (tmp_path / "left_arm.fmu").exists()
@@ -544,9 +673,13 @@ def test_the_command_writes_an_fmu(tmp_path):
 
 
 def test_a_start_without_equilibrium_is_named_and_nothing_is_written(tmp_path):
-    text = EXAMPLE.read_text().replace('"10 kg"', '"500 kg"').replace("dmsp-20-300", "chou-hannaford")
+    text = (
+        EXAMPLE.read_text().replace('"10 kg"', '"500 kg"').replace("dmsp-20-300", "chou-hannaford")
+    )
     (tmp_path / "heavy.toml").write_text(text)
-    done = airmuscle("export", tmp_path / "heavy.toml", "--to", "fmu", "--out", tmp_path / "new" / "heavy.fmu")
+    done = airmuscle(
+        "export", tmp_path / "heavy.toml", "--to", "fmu", "--out", tmp_path / "new" / "heavy.fmu"
+    )
     assert done.exit_code != 0
     assert "HangingMass has no stable equilibrium" in done.output
     assert [path.name for path in tmp_path.iterdir()] == ["heavy.toml"]
@@ -573,6 +706,10 @@ def test_the_base_units_of_an_fmu_are_those_of_the_international_system():
     names = {"[length]": "m", "[mass]": "kg", "[time]": "s", "[temperature]": "K"}
     for unit, powers in BASE.items():
         dimensions = registry.parse_units(unit).dimensionality
-        expected = {"rad": 1} if unit == "rad" else {names[key]: int(power) for key, power in dimensions.items()}
+        expected = (
+            {"rad": 1}
+            if unit == "rad"
+            else {names[key]: int(power) for key, power in dimensions.items()}
+        )
         assert powers == expected, unit
         assert registry.Quantity(1.0, unit).to_base_units().magnitude == 1.0

@@ -1,5 +1,5 @@
-"""Plant, controller and drivers as one program: in C, JavaScript and Octave the sampled loop makes the rows and steps of the library,
-every column to 1e-9 of its greatest value."""
+"""Plant, controller and drivers as one program: in C, JavaScript and Octave the sampled loop makes
+the rows and steps of the library, every column to 1e-9 of its greatest value."""
 
 from __future__ import annotations
 
@@ -37,34 +37,65 @@ PULSES = (PWM(40.0, 1.1e-3), SolenoidDriver(1.3e-3, 1.7e-3, 2.1e-3, 0.0))
 CHAINS = {"fill": PULSES, "discharge": PULSES}
 START = LIFT.state_at(pressure=1e5)
 OUTER = PID("position", "pressure", gain=4e6, integral_time=0.4, derivative_time=0.01)
-SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))
+SENSED = (
+    ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3),
+    ColumnSensor("pressure", noise=500.0, delay=1),
+)
 FILL = PID("pressure", "fill", gain=1e-5)
 LEAK = SampledSignal({"discharge": ((0.0, 0.0), (0.033, 0.2), (0.04, 0.0), (0.3, 0.1))})
 CASES = {
-    "held commands, and an end between two samples": Problem(LIFT, ControlLoop(PRESSURE, 0.02, RAMP), 0.31, START),
-    "pulses through solenoids": Problem(LIFT, ControlLoop(PRESSURE, 0.03, STEP, drivers=CHAINS), 0.3, START),
+    "held commands, and an end between two samples": Problem(
+        LIFT, ControlLoop(PRESSURE, 0.02, RAMP), 0.31, START
+    ),
+    "pulses through solenoids": Problem(
+        LIFT, ControlLoop(PRESSURE, 0.03, STEP, drivers=CHAINS), 0.3, START
+    ),
     "fixed steps, and an input that is not commanded": Problem(
-        LIFT, ControlLoop(FILL, 0.02, STEP, LEAK, {"discharge": SolenoidDriver(1e-3)}), 0.2, START,
-        start_time=1.0, output_times=0.0031, integrator=RungeKutta4(1e-3),
+        LIFT,
+        ControlLoop(FILL, 0.02, STEP, LEAK, {"discharge": SolenoidDriver(1e-3)}),
+        0.2,
+        START,
+        start_time=1.0,
+        output_times=0.0031,
+        integrator=RungeKutta4(1e-3),
     ),
     "two muscles": Problem(
         JOINT,
-        ControlLoop(PRESSURES, 0.01, SampledSignal({
-            name: ((0.0, 1e5), (0.2, end)) for name, end in zip(PRESSURES.setpoints, (2e5, 1.4e5), strict=True)
-        })),
-        0.2, JOINT.state_at(pressure=1e5),
+        ControlLoop(
+            PRESSURES,
+            0.01,
+            SampledSignal(
+                {
+                    name: ((0.0, 1e5), (0.2, end))
+                    for name, end in zip(PRESSURES.setpoints, (2e5, 1.4e5), strict=True)
+                }
+            ),
+        ),
+        0.2,
+        JOINT.state_at(pressure=1e5),
     ),
     "a relay with solenoids": Problem(
-        LIFT, ControlLoop(OnOffController("pressure", SPLIT, 1e4), 0.005, STEP, drivers={"fill": SolenoidDriver(2e-3)}),
-        0.3, START,
+        LIFT,
+        ControlLoop(
+            OnOffController("pressure", SPLIT, 1e4),
+            0.005,
+            STEP,
+            drivers={"fill": SolenoidDriver(2e-3)},
+        ),
+        0.3,
+        START,
     ),
     "sensors with noise": Problem(
         LIFT,
-        ControlLoop(WithSensors(Cascade(OUTER, PRESSURE, (0.0,), (5e5,)), SENSED, 7.0), 0.005,
-                    Schedule({"position": ((0.0, 0.004), (0.1, 0.01))})),
-        0.2, START,
+        ControlLoop(
+            WithSensors(Cascade(OUTER, PRESSURE, (0.0,), (5e5,)), SENSED, 7.0),
+            0.005,
+            Schedule({"position": ((0.0, 0.004), (0.1, 0.01))}),
+        ),
+        0.2,
+        START,
     ),
-}  # fmt: skip
+}
 SOME = list(CASES)[:3]
 
 
@@ -84,13 +115,16 @@ def table(csv):
 
 
 def check_loop(text, csv, problem):
-    solution, found = solve(problem).raise_if_incomplete(), table(csv)
+    solution = solve(problem).raise_if_incomplete()
+    found = table(csv)
     taken, rejected = map(int, re.search(r"(\d+) steps, (\d+) rejected", text).groups())
     assert (taken, rejected) == (solution.statistics.steps, solution.statistics.rejected_steps)
     assert set(found) == set(solution.recording)
     for name, values in found.items():
         expected = solution.recording[name]
-        np.testing.assert_allclose(values, expected, rtol=0, atol=1e-9 * np.abs(expected).max(), err_msg=name)
+        np.testing.assert_allclose(
+            values, expected, rtol=0, atol=1e-9 * np.abs(expected).max(), err_msg=name
+        )
 
 
 RUN = {C99(): run_c, JavaScript(): run_javascript, Octave(): printed.run_octave}
@@ -98,11 +132,16 @@ IN_OCTAVE = SOME[2]
 """The case that Octave, which takes seconds, runs each time."""
 PAIRS = [
     pytest.param(
-        name, target, id=f"{name}-{type(target).__name__}",
-        marks=() if name in SOME and (target != Octave() or name == IN_OCTAVE) else pytest.mark.slow,
+        name,
+        target,
+        id=f"{name}-{type(target).__name__}",
+        marks=(
+            () if name in SOME and (target != Octave() or name == IN_OCTAVE) else pytest.mark.slow
+        ),
     )
-    for name in CASES for target in RUN
-]  # fmt: skip
+    for name in CASES
+    for target in RUN
+]
 
 
 @pytest.mark.parametrize(("name", "target"), PAIRS)
@@ -122,7 +161,15 @@ def test_clang_builds_the_loop_as_gcc_does(tmp_path):
 def test_the_sources_of_a_loop_are_c_plus_plus_too(tmp_path):
     write_program(CASES["pulses through solenoids"], tmp_path, C99(), name="loop")
     options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only"]
-    command = [printed.require("g++"), *options, "-x", "c++", "main.c", "loop.c", "loop_controller.c"]
+    command = [
+        printed.require("g++"),
+        *options,
+        "-x",
+        "c++",
+        "main.c",
+        "loop.c",
+        "loop_controller.c",
+    ]
     printed.finished(command, tmp_path)
 
 
@@ -130,13 +177,18 @@ def test_the_sources_of_a_loop_are_c_plus_plus_too(tmp_path):
 def test_the_program_has_no_undefined_behaviour(tmp_path):
     problem = CASES["pulses through solenoids"]
     write_program(problem, tmp_path, C99(), name="loop")
-    check_loop(*run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"), problem)
+    check_loop(
+        *run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
+        problem,
+    )
 
 
 @pytest.mark.parametrize("target", [C99(), JavaScript()], ids=lambda target: type(target).__name__)
 def test_constants_take_the_place_of_parameters_that_are_not_tunable(target, tmp_path):
     problem = CASES[SOME[0]]
-    paths = write_program(problem, tmp_path, target, name="loop", tunable=["mechanism.mass", "controller.gain"])
+    paths = write_program(
+        problem, tmp_path, target, name="loop", tunable=["mechanism.mass", "controller.gain"]
+    )
     check_loop(*RUN[target](tmp_path), problem)
     text = "".join(path.read_text() for path in paths)
     if target == C99():
@@ -149,7 +201,9 @@ def test_constants_take_the_place_of_parameters_that_are_not_tunable(target, tmp
 
 def test_a_gain_can_be_changed_in_the_program(tmp_path):
     problem = CASES[SOME[0]]
-    changed = dataclasses.replace(problem.input, controller=dataclasses.replace(PRESSURE, gain=2 * PRESSURE.gain))
+    changed = dataclasses.replace(
+        problem.input, controller=dataclasses.replace(PRESSURE, gain=2 * PRESSURE.gain)
+    )
     write_program(problem, tmp_path, JavaScript(), name="loop")
     index = "loop.parameters.indexOf('gain')"
     script = f"""import * as M from "./loop.mjs";
@@ -166,8 +220,12 @@ console.log(JSON.stringify(columns["pressure"]));
 @pytest.mark.slow
 def test_a_gain_can_be_changed_in_octave_where_the_others_are_constants(tmp_path):
     problem = CASES[SOME[0]]
-    changed = dataclasses.replace(problem.input, controller=dataclasses.replace(PRESSURE, gain=2 * PRESSURE.gain))
-    write_program(problem, tmp_path, Octave(), name="loop", tunable=["mechanism.mass", "controller.gain"])
+    changed = dataclasses.replace(
+        problem.input, controller=dataclasses.replace(PRESSURE, gain=2 * PRESSURE.gain)
+    )
+    write_program(
+        problem, tmp_path, Octave(), name="loop", tunable=["mechanism.mass", "controller.gain"]
+    )
     script = """model = loop(); disp(model.parameters{:}); disp(model.loop.parameters{:});
 r = model.simulate(struct('controller_parameters', 2 * model.loop.parameter_defaults));
 printf('%.17g\\n', r.data(:, strcmp(r.names, 'pressure')));"""
@@ -179,7 +237,9 @@ printf('%.17g\\n', r.data(:, strcmp(r.names, 'pressure')));"""
 
 
 def test_chosen_columns_are_written(tmp_path):
-    write_program(CASES[SOME[0]], tmp_path, JavaScript(), name="loop", columns=["pressure", "command.fill"])
+    write_program(
+        CASES[SOME[0]], tmp_path, JavaScript(), name="loop", columns=["pressure", "command.fill"]
+    )
     assert list(table(run_javascript(tmp_path)[1])) == ["time", "pressure", "command.fill"]
 
 
@@ -202,15 +262,40 @@ def of_loop(controller=PRESSURE, **changes):
 @pytest.mark.parametrize(
     ("problem", "target", "options", "message"),
     [
-        (of_loop(Called(PRESSURE)), C99(), {}, "Called is a controller in Python and cannot be exported here; of predictive"),
-        (of_loop(drivers={"fill": Slow()}), C99(), {}, "the driver Slow of 'fill' has no printed form; there are PWM, Sol"),
-        (of_loop(drivers={"fill": Slow()}), Octave(), {}, "the driver Slow of 'fill' has no printed form"),
+        (
+            of_loop(Called(PRESSURE)),
+            C99(),
+            {},
+            "Called is a controller in Python and cannot be exported here; of predictive",
+        ),
+        (
+            of_loop(drivers={"fill": Slow()}),
+            C99(),
+            {},
+            "the driver Slow of 'fill' has no printed form; there are PWM, Sol",
+        ),
+        (
+            of_loop(drivers={"fill": Slow()}),
+            Octave(),
+            {},
+            "the driver Slow of 'fill' has no printed form",
+        ),
         (of_loop(), C99(), {"tunable": ["gain"]}, r"Plant has no parameter 'gain'"),
-        (of_loop(), C99(), {"tunable": ["controller.measured"]}, "'measured' is fixed when a program is printed"),
-        (of_loop(), C99(), {"columns": ["command.fil"]}, r"no column 'command\.fil'.*Did you mean 'command\.fill'"),
+        (
+            of_loop(),
+            C99(),
+            {"tunable": ["controller.measured"]},
+            "'measured' is fixed when a program is printed",
+        ),
+        (
+            of_loop(),
+            C99(),
+            {"columns": ["command.fil"]},
+            r"no column 'command\.fil'.*Did you mean 'command\.fill'",
+        ),
         (of_loop(), C99(), {"name": "while"}, "cannot be the name of an exported program"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_printed_is_refused_by_name(problem, target, options, message, tmp_path):
     with pytest.raises(ParameterError, match=message):
         write_program(problem, tmp_path / "out", target, **options)
@@ -220,8 +305,13 @@ def test_what_cannot_be_printed_is_refused_by_name(problem, target, options, mes
 def test_a_run_that_continues_another_is_refused(tmp_path):
     first = solve(of_loop())
     later = Problem(
-        LIFT, of_loop().input, 0.2, first.final_state, start_time=first.final_time, control_state=first.control_state
-    )  # fmt: skip
+        LIFT,
+        of_loop().input,
+        0.2,
+        first.final_state,
+        start_time=first.final_time,
+        control_state=first.control_state,
+    )
     with pytest.raises(ParameterError, match="a run that continues another cannot be exported"):
         write_program(later, tmp_path, C99())
 

@@ -1,7 +1,8 @@
 """MuJoCo plugin: a muscle that MuJoCo integrates moves a load as in the library.
 
-Under Euler, implicit and implicitfast of MuJoCo the muscle is integrated within the step, with the load that it feels. With RK4
-of the same step both programs evaluate the same formulas; against an accurate solution the error is that of RK4.
+Under Euler, implicit and implicitfast of MuJoCo the muscle is integrated within the step, with the
+load that it feels. With RK4 of the same step both programs evaluate the same formulas; against an
+accurate solution the error is that of RK4.
 """
 
 from __future__ import annotations
@@ -28,7 +29,12 @@ from airmuscle.physics import AntagonisticJoint, FillDischarge, Supply, Valve, f
 pytestmark = pytest.mark.tool
 VALVE = Valve(2.6167e-9, 0.433)
 PLANT = replace(plants.EXAMPLES["dmsp-20-300"], circuit=FillDischarge(Supply(5.5e5), VALVE, VALVE))
-SCHEDULE = Schedule({"fill": ((0.0, 0.0), (0.1, 1.0), (0.4, 0.0)), "discharge": ((0.0, 0.0), (0.5, 1.0), (0.6, 0.0))})
+SCHEDULE = Schedule(
+    {
+        "fill": ((0.0, 0.0), (0.1, 1.0), (0.4, 0.0)),
+        "discharge": ((0.0, 0.0), (0.5, 1.0), (0.6, 0.0)),
+    }
+)
 ENDS = np.array([0.1, 0.4, 0.5, 0.6, 0.8])
 
 
@@ -48,7 +54,9 @@ def actuator(mujoco, tmp_path_factory):
     return write_mujoco_plugin(PLANT, tmp_path_factory.mktemp("plugin"), name="festo")
 
 
-def hanging_mass(mujoco, actuator, integrator="RK4", step=1e-3, transmission="tendon", plant=PLANT, **options):
+def hanging_mass(
+    mujoco, actuator, integrator="RK4", step=1e-3, transmission="tendon", plant=PLANT, **options
+):
     """A mass on a muscle, the position upwards from where the muscle is at rest."""
     rest = plant.muscle.geometry.resting_length
     spec = mujoco.MjSpec()
@@ -77,7 +85,8 @@ def hanging_mass(mujoco, actuator, integrator="RK4", step=1e-3, transmission="te
 
 def run(mujoco, model, data):
     """Positions at ENDS."""
-    step, found = model.opt.timestep, []
+    step = model.opt.timestep
+    found = []
     for k in range(round(ENDS[-1] / step)):
         t = k * step + 1e-9
         data.ctrl[0] = 1.0 if 0.1 <= t < 0.4 else -1.0 if 0.5 <= t < 0.6 else 0.0
@@ -94,14 +103,22 @@ def expected(state, integrator, plant=PLANT):
 
 def joint_angle(mujoco, plant, made, step):
     """Angles of an antagonistic joint every 20 ms."""
-    spec, mechanism = mujoco.MjSpec(), plant.mechanism
-    spec.option.timestep, spec.option.gravity = step, [0, 0, 0]
+    spec = mujoco.MjSpec()
+    mechanism = plant.mechanism
+    spec.option.timestep = step
+    spec.option.gravity = [0, 0, 0]
     body = spec.worldbody.add_body(name="arm")
-    body.add_joint(name="angle", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0], damping=mechanism.damping)
-    body.mass, body.inertia, body.explicitinertial = 1.0, [mechanism.inertia] * 3, 1
+    body.add_joint(
+        name="angle", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0], damping=mechanism.damping
+    )
+    body.mass = 1.0
+    body.inertia = [mechanism.inertia] * 3
+    body.explicitinertial = 1
     for muscle, gear in zip(made, (-1.0, 1.0), strict=True):
         rest = mechanism.offset * muscle.plant.muscles[0].geometry.resting_length
-        muscle.add_to(spec, name=muscle.name, joint="angle", gear=gear * mechanism.radius, rest_length=rest)
+        muscle.add_to(
+            spec, name=muscle.name, joint="angle", gear=gear * mechanism.radius, rest_length=rest
+        )
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qpos[0] = find_equilibrium(plant, pressure=2e5)["angle"]
@@ -125,7 +142,16 @@ def test_a_mass_moves_as_in_the_library(transmission, mujoco, actuator):
     assert np.abs(found - expected(state, RungeKutta4(1e-3))).max() <= 1e-12
 
 
-STIFF = ["LuGre", "Dahl", "Bouc-Wen", "Maxwell slip", "heat", "tube with inertia", "pressure damper, creep", "real gas"]
+STIFF = [
+    "LuGre",
+    "Dahl",
+    "Bouc-Wen",
+    "Maxwell slip",
+    "heat",
+    "tube with inertia",
+    "pressure damper, creep",
+    "real gas",
+]
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
@@ -134,7 +160,9 @@ def test_at_the_default_step_of_mujoco_a_mass_moves_as_in_the_library(integrator
     assert np.abs(run(mujoco, model, data) - expected(state, Rodas4(1e-10))).max() <= 1e-8
 
 
-@pytest.mark.parametrize("name", widened(STIFF, lambda name: name in ("LuGre", "tube with inertia")))
+@pytest.mark.parametrize(
+    "name", widened(STIFF, lambda name: name in ("LuGre", "tube with inertia"))
+)
 def test_stiff_muscles_move_as_in_the_library_at_the_default_step(name, mujoco, tmp_path):
     plant = plants.EXAMPLES[name]
     made = write_mujoco_plugin(plant, tmp_path, name=f"stiff_{STIFF.index(name)}")
@@ -146,24 +174,31 @@ def test_stiff_muscles_move_as_in_the_library_at_the_default_step(name, mujoco, 
 
 @pytest.mark.parametrize("damping", [0.0, 0.2, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_two_muscles_on_a_joint_move_it_as_in_the_library(damping, mujoco, tmp_path):
-    """Each muscle knows the force of the other from the step before; the error at 2 ms is of second order, also that of
-    the damping [N m s] of the joint, which MuJoCo alone integrates with an error of first order."""
+    """Each muscle knows the force of the other from the step before; the error at 2 ms is of second
+    order, also that of the damping [N m s] of the joint, which MuJoCo alone integrates with an
+    error of first order."""
     joint = AntagonisticJoint(0.03, 0.05, damping=damping)
-    plant, name = replace(plants.EXAMPLES["joint with an external torque"], mechanism=joint), f"joint{10 * damping:.0f}"
+    plant = replace(plants.EXAMPLES["joint with an external torque"], mechanism=joint)
+    name = f"joint{10 * damping:.0f}"
     made = [
-        write_mujoco_plugin(plant, tmp_path / m.name, name=f"{name}_{m.name}", muscle=m.name) for m in plant.muscles
+        write_mujoco_plugin(plant, tmp_path / m.name, name=f"{name}_{m.name}", muscle=m.name)
+        for m in plant.muscles
     ]
     angles = [joint_angle(mujoco, plant, made, step) for step in (2e-3, 1e-3)]
     state = find_equilibrium(plant, pressure=2e5)
     schedule = Schedule({"m0.fill": ((0.0, 0.0), (0.1, 1.0), (0.3, 0.0))})
-    right = solve(Problem(plant, schedule, 0.5, state, integrator=Rodas4(1e-10), output_times=2e-2)).recording["angle"]
+    right = solve(
+        Problem(plant, schedule, 0.5, state, integrator=Rodas4(1e-10), output_times=2e-2)
+    ).recording["angle"]
     errors = [np.abs(found - right[1:]).max() for found in angles]
     assert np.ptp(right) > 0.05
     assert errors[0] * plant.mechanism.radius <= 1e-5
     assert errors[1] <= errors[0] / 3.5
 
 
-def test_a_step_of_rk4_that_does_not_resolve_the_muscle_is_said(mujoco, tmp_path, capfd, monkeypatch):
+def test_a_step_of_rk4_that_does_not_resolve_the_muscle_is_said(
+    mujoco, tmp_path, capfd, monkeypatch
+):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working folder
     plant = plants.EXAMPLES["LuGre"]
     made = write_mujoco_plugin(plant, tmp_path, name="coarse")
@@ -192,7 +227,9 @@ def test_two_different_plugins_of_one_name_are_refused(mujoco, tmp_path, monkeyp
 
     add("one", PLANT)
     add("same", PLANT)
-    with pytest.raises(ParameterError, match=r"airmuscle\.twice of this process is another one .* another name"):
+    with pytest.raises(
+        ParameterError, match=r"airmuscle\.twice of this process is another one .* another name"
+    ):
         add("other", plants.EXAMPLES["LuGre"])
 
 
@@ -245,7 +282,17 @@ def test_a_copied_state_runs_on_by_itself(mujoco, actuator):
 
 def test_the_source_causes_no_warning(mujoco, actuator):
     include = Path(mujoco.__file__).parent / "include"
-    command = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-fsyntax-only", "-isystem", str(include)]
+    command = [
+        "gcc",
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Wshadow",
+        "-Werror",
+        "-fsyntax-only",
+        "-isystem",
+        str(include),
+    ]
     done = subprocess.run([*command, str(actuator.source)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[:2000]
 
@@ -259,7 +306,10 @@ def test_the_source_causes_no_warning(mujoco, actuator):
         ({}, "either a tendon or a joint"),
         ({"tendon": "t", "joint": "z"}, "either a tendon or a joint"),
         ({"joint": "z", "parameters": {"mass": 1.0}}, "there is no parameter 'mass'"),
-        ({"joint": "z", "parameters": {"muscle.geometry.resting_length": float("nan")}}, "must be finite"),
+        (
+            {"joint": "z", "parameters": {"muscle.geometry.resting_length": float("nan")}},
+            "must be finite",
+        ),
         ({"joint": "z", "rest_length": float("inf")}, "must be finite"),
     ],
 )
@@ -271,7 +321,9 @@ def test_a_wrong_transmission_or_parameter_is_refused(options, message, mujoco, 
 @pytest.mark.parametrize("version", ["3.16.2", "2.3.7", "4.0.0"])
 def test_an_unsuitable_mujoco_is_refused_and_the_source_is_written(version, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", types.SimpleNamespace(__version__=version))
-    with pytest.raises(ParameterError, match=rf"MuJoCo {version} is not supported.*install mujoco>=3\.17,!=4\.0\.0"):
+    with pytest.raises(
+        ParameterError, match=rf"MuJoCo {version} is not supported.*install mujoco>=3\.17,!=4\.0\.0"
+    ):
         mujoco_plugin.check_mujoco()
     made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
     assert made.library is None
@@ -279,11 +331,15 @@ def test_an_unsuitable_mujoco_is_refused_and_the_source_is_written(version, tmp_
     assert sorted(p.name for p in tmp_path.iterdir()) == ["festo.c", "festo.h", "festo_plugin.c"]
 
 
-def test_without_a_compiler_the_source_is_written_and_the_remedy_stated(mujoco, tmp_path, monkeypatch):
+def test_without_a_compiler_the_source_is_written_and_the_remedy_stated(
+    mujoco, tmp_path, monkeypatch
+):
     monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
     made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
     assert made.library is None
-    assert "no C compiler (gcc, clang, cc) was found; install the package gcc or clang" in made.remark
+    assert (
+        "no C compiler (gcc, clang, cc) was found; install the package gcc or clang" in made.remark
+    )
     assert sorted(p.name for p in tmp_path.iterdir()) == ["festo.c", "festo.h", "festo_plugin.c"]
 
 
@@ -294,7 +350,9 @@ def test_without_mujoco_the_remedy_is_stated(monkeypatch):
 
 
 def test_muscles_that_share_a_circuit_are_refused_by_name(tmp_path):
-    with pytest.raises(ParameterError, match=r"m0, m1 share the circuit .* cannot be separate actuators"):
+    with pytest.raises(
+        ParameterError, match=r"m0, m1 share the circuit .* cannot be separate actuators"
+    ):
         write_mujoco_plugin(plants.EXAMPLES["overlap"], tmp_path, muscle="m0")
 
 

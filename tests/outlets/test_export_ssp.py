@@ -1,7 +1,9 @@
-"""Controllers as FMUs: a master that follows the connections of an SSP package gives the closed loop of the library.
+"""Controllers as FMUs: a master that follows the connections of an SSP package gives the closed
+loop of the library.
 
-At every sample it passes the outputs of the plant to the controller, and the commands to the plant, and steps both. The
-error of a column is its greatest difference divided by its greatest value; bound 1e-7, as for FMUs of plants.
+At every sample it passes the outputs of the plant to the controller, and the commands to the plant,
+and steps both. The error of a column is its greatest difference divided by its greatest value;
+bound 1e-7, as for FMUs of plants.
 """
 
 from __future__ import annotations
@@ -15,16 +17,31 @@ from command_line import airmuscle
 from control_plants import LIFT, PRESSURE, SPLIT
 
 from airmuscle.control import PID, Cascade, OnOffController, SuperTwisting
-from airmuscle.engine import PWM, ColumnSensor, ControlLoop, Problem, Rodas4, Schedule, WithSensors, solve
+from airmuscle.engine import (
+    PWM,
+    ColumnSensor,
+    ControlLoop,
+    Problem,
+    Rodas4,
+    Schedule,
+    WithSensors,
+    solve,
+)
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_controller_fmu, write_ssp
 
 pytestmark = pytest.mark.tool
 SAMPLE = 0.005
 CASCADE = Cascade(
-    PID("position", "pressure", gain=4e6, integral_time=0.4, derivative_time=0.01), PRESSURE, (0.0,), (5e5,)
+    PID("position", "pressure", gain=4e6, integral_time=0.4, derivative_time=0.01),
+    PRESSURE,
+    (0.0,),
+    (5e5,),
 )
-SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))
+SENSED = (
+    ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3),
+    ColumnSensor("pressure", noise=500.0, delay=1),
+)
 LAWS = {
     "PI": (PRESSURE, "pressure", 3e5),
     "cascade": (CASCADE, "position", 0.01),
@@ -37,7 +54,9 @@ LAWS = {
 def problem_of(name, drivers=None):
     law, signal, goal = LAWS[name]
     loop = ControlLoop(law, SAMPLE, Schedule({signal: ((0.0, goal),)}), drivers=drivers or {})
-    return Problem(LIFT, loop, 0.5, LIFT.state_at(pressure=1e5), integrator=Rodas4(1e-9), output_times=SAMPLE)
+    return Problem(
+        LIFT, loop, 0.5, LIFT.state_at(pressure=1e5), integrator=Rodas4(1e-9), output_times=SAMPLE
+    )
 
 
 class Slave:
@@ -51,9 +70,11 @@ class Slave:
         kind = fmpy.fmi2.FMU2Slave if self.fmi == 2 else fmpy.fmi3.FMU3Slave
         self.references = {v.name: v.valueReference for v in about.modelVariables}
         self.unit = kind(
-            guid=about.guid, unzipDirectory=fmpy.extract(str(path), str(folder)),
-            modelIdentifier=about.coSimulation.modelIdentifier, instanceName=path.stem,
-        )  # fmt: skip
+            guid=about.guid,
+            unzipDirectory=fmpy.extract(str(path), str(folder)),
+            modelIdentifier=about.coSimulation.modelIdentifier,
+            instanceName=path.stem,
+        )
         self.unit.instantiate()
         if self.fmi == 2:
             self.unit.setupExperiment(startTime=0.0)
@@ -93,9 +114,16 @@ def test_the_joined_fmus_give_the_closed_loop_of_the_library(name, fmi, tmp_path
     written = write_ssp(problem, tmp_path / "loop.ssp", fmi=fmi, name="lift")
     assert written.remark == ""
     slaves, connections = unpacked(written.path, tmp_path)
-    exchanged = sorted(connections, key=lambda c: c.startElement == "controller")  # measurements, then commands
-    columns = [n for n in slaves["plant"].references if n in ("position", "pressure", "speed", "fill", "discharge")]
-    rows, samples = [], round(0.5 / SAMPLE)
+    exchanged = sorted(
+        connections, key=lambda c: c.startElement == "controller"
+    )  # measurements, then commands
+    columns = [
+        n
+        for n in slaves["plant"].references
+        if n in ("position", "pressure", "speed", "fill", "discharge")
+    ]
+    rows = []
+    samples = round(0.5 / SAMPLE)
     for k in range(samples):
         for c in exchanged:
             slaves[c.endElement].set(c.endConnector, slaves[c.startElement].get(c.startConnector))
@@ -113,7 +141,9 @@ def test_the_joined_fmus_give_the_closed_loop_of_the_library(name, fmi, tmp_path
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_the_description_of_a_controller_is_valid_and_its_command_can_be_read_before_a_step(fmi, tmp_path):
+def test_the_description_of_a_controller_is_valid_and_its_command_can_be_read_before_a_step(
+    fmi, tmp_path
+):
     fmpy = pytest.importorskip("fmpy")
     printed.require("gcc")
     written = write_controller_fmu(problem_of("on-off"), tmp_path / "law.fmu", fmi=fmi, name="law")
@@ -137,17 +167,23 @@ def test_the_description_of_a_controller_is_valid_and_its_command_can_be_read_be
     (slave.unit.setFMUstate if fmi == 2 else slave.unit.setFMUState)(state)
     assert slave.get("discharge") == 0.0
     with pytest.raises(Exception, match="error"):
-        slave.set("parameters.sample_time" if "parameters.sample_time" in slave.references else "fill", 1.0)
+        slave.set(
+            "parameters.sample_time" if "parameters.sample_time" in slave.references else "fill",
+            1.0,
+        )
 
 
 def test_fmpy_runs_a_package_to_the_band_of_an_on_off_law(tmp_path):
     simulation = pytest.importorskip("fmpy.ssp.simulation")
     printed.require("gcc")
-    # its master begins with measurements of zero, to which a law without memory is indifferent, and passes signals
-    # after each step, so that its steps are short
+    # its master begins with measurements of zero, to which a law without memory is indifferent, and
+    # passes signals after each step, so that its steps are short
     path = write_ssp(problem_of("on-off"), tmp_path / "loop.ssp", fmi=2, name="lift").path
     result = simulation.simulate_ssp(
-        str(path), stop_time=0.5, step_size=SAMPLE / 5, input={"setpoint.pressure": lambda time: 3e5}
+        str(path),
+        stop_time=0.5,
+        step_size=SAMPLE / 5,
+        input={"setpoint.pressure": lambda time: 3e5},
     )
     name = next(n for n in result.dtype.names if n.endswith("plant.pressure"))
     assert abs(result[name][-1] - 3e5) < 2e4
@@ -161,11 +197,15 @@ def test_a_loop_with_drivers_is_refused_as_a_package(tmp_path):
 def test_the_commands_write_both(tmp_path):
     printed.require("gcc")
     loop = "examples/pressure_loop.toml"
-    law = airmuscle("export", loop, "--controller", "--to", "fmu", "--out", str(tmp_path / "law.fmu"))
+    law = airmuscle(
+        "export", loop, "--controller", "--to", "fmu", "--out", str(tmp_path / "law.fmu")
+    )
     assert law.exit_code == 0, law.output
     assert "Co-Simulation" in law.stdout
     refused = airmuscle("export", loop, "--to", "ssp", "--out", str(tmp_path / "loop.ssp"))
     assert "drivers of fill" in refused.output
-    both = airmuscle("export", "examples/joint_cascade.toml", "--to", "ssp", "--out", str(tmp_path / "loop.ssp"))
+    both = airmuscle(
+        "export", "examples/joint_cascade.toml", "--to", "ssp", "--out", str(tmp_path / "loop.ssp")
+    )
     assert both.exit_code == 0, both.output
     assert zipfile.is_zipfile(tmp_path / "loop.ssp")

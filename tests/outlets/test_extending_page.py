@@ -1,4 +1,6 @@
-"""The page on extensions is true: every block runs, and its models are fitted, linearised and cited like built-in ones."""
+"""The page on extensions is true: every block runs, and its models are fitted, linearised and cited
+like built-in ones.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ import pytest
 import airmuscle as am
 
 DOCS = Path(__file__).parents[2] / "docs"
-BLOCKS = re.findall(r"```python\n(.*?)```", (DOCS / "extending.md").read_text(encoding="utf-8"), re.DOTALL)
+BLOCKS = re.findall(
+    r"```python\n(.*?)```", (DOCS / "extending.md").read_text(encoding="utf-8"), re.DOTALL
+)
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +36,14 @@ def test_every_interface_has_a_block(page):
 def test_the_law_is_inverted_fitted_and_cited(page):
     law = page["law"]
     assert law.force(4e5, law.contraction(4e5, 100.0)) == pytest.approx(100.0)
-    pressure, contraction = (side.ravel() for side in np.meshgrid([1e5, 2e5, 4e5], [0.0, 0.05, 0.1]))
-    columns = {"pressure": pressure, "contraction": contraction, "force": law.force(pressure, contraction)}
+    pressure, contraction = (
+        side.ravel() for side in np.meshgrid([1e5, 2e5, 4e5], [0.0, 0.05, 0.1])
+    )
+    columns = {
+        "pressure": pressure,
+        "contraction": contraction,
+        "force": law.force(pressure, contraction),
+    }
     fitted = am.fit(page["LinearLaw"](1e-3, 0.2, 10.0), am.Recording(columns, "page")).model
     assert fitted.area == pytest.approx(law.area, rel=1e-6)
     assert "me-2026" in {r.key for r in am.cite(page["plant"])}

@@ -1,4 +1,6 @@
-"""A fitted muscle has one geometry and one resting length, those of the data; without a geometry its file says so."""
+"""A fitted muscle has one geometry and one resting length, those of the data; without a geometry
+its file says so.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +44,9 @@ duration = "1 s"
 output_times = "10 ms"
 """
 BARE_SCENARIO = re.sub(
-    r"\[plant.muscle\]\n(.*)\n.*\n", "", SCENARIO.replace("[plant]", '[plant]\nmuscle = "fit/muscle.toml"')
+    r"\[plant.muscle\]\n(.*)\n.*\n",
+    "",
+    SCENARIO.replace("[plant]", '[plant]\nmuscle = "fit/muscle.toml"'),
 )
 
 
@@ -50,9 +54,14 @@ def bench(path: Path, radius: float = 0.01) -> Path:
     """Points of a DMSP-20 of 200 mm with this radius; the file states no resting length."""
     law = scale_to_length(load(MUSCLE).characteristic, 0.2, "test")
     law = replace(law, geometry=replace(law.geometry, radius=radius))
-    pressure, contraction = (g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.01, 0.2, 9)))
+    pressure, contraction = (
+        g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.01, 0.2, 9))
+    )
     force = law.force(pressure, contraction)
-    rows = [f"{p!r},{c!r},{f!r}" for p, c, f in zip(*(v.tolist() for v in (pressure, contraction, force)), strict=True)]
+    rows = [
+        f"{p!r},{c!r},{f!r}"
+        for p, c, f in zip(*(v.tolist() for v in (pressure, contraction, force)), strict=True)
+    ]
     path.write_text("\n".join(["pressure [Pa],contraction [1],force [N]", *rows]), encoding="utf-8")
     return path
 
@@ -100,7 +109,10 @@ def test_a_muscle_that_cannot_be_scaled_is_refused(tmp_path):
     said = " ".join(result.stderr.split())
     assert result.exit_code == 1
     assert "--characteristic saga2007: " in said
-    assert "resting length of the data is 0.2 m, and Saga2007 cannot be scaled to another length" in said
+    assert (
+        "resting length of the data is 0.2 m, and Saga2007 cannot be scaled to another length"
+        in said
+    )
     assert not (tmp_path / "fit").exists()
 
 
@@ -117,7 +129,9 @@ def test_a_law_with_its_own_resting_length_is_scaled():
     family = EffectiveLength(blank_surface(2), 0.3, 0.01)
     assert scale_to_length(family, 0.2, "test").resting_length == 0.2
     assert scale_to_length(blank_surface(2), 0.2, "test") == blank_surface(2)
-    with pytest.raises(ParameterError, match=r"^here: resting_length of .* cannot be scaled to another length"):
+    with pytest.raises(
+        ParameterError, match=r"^here: resting_length of .* cannot be scaled to another length"
+    ):
         scale_to_length(load("saga2007").geometry, 0.2, "here")
 
 
@@ -149,13 +163,37 @@ def test_a_muscle_without_a_geometry_says_how_to_give_and_measure_it(tmp_path):
     ("options", "code", "message"),
     [
         ((*SURFACE, "--braid", "radius=10 mm"), 2, "must give radius and angle once each, such as"),
-        ((*SURFACE, "--braid", "radius=10 mm, angle=24 deg, turns=2"), 2, "must give radius and angle once each"),
-        ((*SURFACE, "--braid", "radius=10, angle=24.4 deg"), 1, "--braid, radius: '10' has no unit"),
-        ((*SURFACE, "--braid", "radius=10 mm, angle=24.4 mm"), 1, "--braid, angle: unit 'mm' cannot be converted"),
+        (
+            (*SURFACE, "--braid", "radius=10 mm, angle=24 deg, turns=2"),
+            2,
+            "must give radius and angle once each",
+        ),
+        (
+            (*SURFACE, "--braid", "radius=10, angle=24.4 deg"),
+            1,
+            "--braid, radius: '10' has no unit",
+        ),
+        (
+            (*SURFACE, "--braid", "radius=10 mm, angle=24.4 mm"),
+            1,
+            "--braid, angle: unit 'mm' cannot be converted",
+        ),
         ((*SURFACE, "--braid", "radius=10 m, angle=24.4 deg"), 1, "--braid: Braid.radius"),
-        ((*SURFACE, *BRAID), 1, "--braid: a braid has exactly one resting length; the data state none. Give --resting"),
-        (("--characteristic", MUSCLE, *BRAID), 1, "--braid: MartensBoblan2017 contains its geometry"),
-        (("--compare", *BRAID), 1, "--braid: a braid has exactly one resting length; the data state none"),
+        (
+            (*SURFACE, *BRAID),
+            1,
+            "--braid: a braid has exactly one resting length; the data state none. Give --resting",
+        ),
+        (
+            ("--characteristic", MUSCLE, *BRAID),
+            1,
+            "--braid: MartensBoblan2017 contains its geometry",
+        ),
+        (
+            ("--compare", *BRAID),
+            1,
+            "--braid: a braid has exactly one resting length; the data state none",
+        ),
     ],
 )
 def test_a_braid_that_cannot_be_is_refused(options, code, message, tmp_path):

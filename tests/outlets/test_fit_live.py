@@ -1,6 +1,8 @@
-"""A growing file or a serial log is read row by row; damaged rows are left out; the surface and the next point follow.
+"""A growing file or a serial log is read row by row; damaged rows are left out; the surface and the
+next point follow.
 
-The replay has the data rate of a logger at 1 kHz by its stamps; computing time is measured in benchmarks/live.py.
+The replay has the data rate of a logger at 1 kHz by its stamps; computing time is measured in
+benchmarks/live.py.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ def replay(count: int = 6000, decimal: str = ".") -> str:
     pressure = 6.0 * np.abs((time / 0.7) % 2 - 1)
     contraction = 12.5 * (1 - np.cos(2 * np.pi * time / 5.3))
     force = 2.2e2 * pressure * (1 - 0.035 * contraction) - 4 * contraction + rng.normal(0, 2, count)
-    rows = (f"{t:.3f};{p:.5f};{c:.4f};{f:.2f}" for t, p, c, f in zip(time, pressure, contraction, force, strict=True))
+    rows = (
+        f"{t:.3f};{p:.5f};{c:.4f};{f:.2f}"
+        for t, p, c, f in zip(time, pressure, contraction, force, strict=True)
+    )
     text = "Zeit [s];Druck [bar];Kontraktion [%];Kraft [N]\n" + "\n".join(rows) + "\n"
     return text.replace(".", decimal)
 
@@ -57,7 +62,12 @@ def test_rows_as_they_come_are_those_of_the_complete_file(tmp_path: Path):
         "time [s];pressure [kPa];force [N]\n0,0;1,5;5;\n0,1;1,6;6;\n",
         'time [s],pressure [kPa],force [N]\n"0.0","1.5","5"\n0.1,1.6,6\n',
     ],
-    ids=["several blanks", "delimiter at the end of each line", "delimiter at the end of numbers", "quotation marks"],
+    ids=[
+        "several blanks",
+        "delimiter at the end of each line",
+        "delimiter at the end of numbers",
+        "quotation marks",
+    ],
 )
 def test_a_stream_is_split_into_cells_as_a_file_is(tmp_path: Path, text: str):
     (tmp_path / "log.csv").write_text(text)
@@ -65,12 +75,20 @@ def test_a_stream_is_split_into_cells_as_a_file_is(tmp_path: Path, text: str):
     reader = RowReader("log")
     rows = [row for line in text.splitlines() if (row := reader.read(line))]
     assert reader.skipped == 0
-    assert [list(row.values()) for row in rows] == np.transpose(list(whole.columns.values())).tolist()
+    assert [list(row.values()) for row in rows] == np.transpose(
+        list(whole.columns.values())
+    ).tolist()
 
 
 def test_a_growing_file_is_read_as_it_comes_and_a_partial_line_waits_for_its_rest(tmp_path: Path):
     file = tmp_path / "log.csv"
-    pieces = ["pressure [kPa],contraction [%],fo", "rce [N]\n100,1", "0,200\n110,11,210\n", "120,12,2", "20\n"]
+    pieces = [
+        "pressure [kPa],contraction [%],fo",
+        "rce [N]\n100,1",
+        "0,200\n110,11,210\n",
+        "120,12,2",
+        "20\n",
+    ]
     file.write_text("")
     clock = itertools.count()
     feed = iter(pieces)
@@ -106,17 +124,30 @@ def test_a_stream_whose_beginning_is_no_table_is_refused():
 
 
 @pytest.mark.parametrize(
-    "lines", [["time_[s] force_[N] valve x y", "0 1,5 A 2,5 3,5", "0,1 2,5 1 2,5 3,5"], ["time [s];force [N]", "0,5"]]
+    "lines",
+    [
+        ["time_[s] force_[N] valve x y", "0 1,5 A 2,5 3,5", "0,1 2,5 1 2,5 3,5"],
+        ["time [s];force [N]", "0,5"],
+    ],
 )
 def test_a_stream_whose_numbers_are_not_separated_as_its_headings_is_refused(lines: list[str]):
     reader = RowReader("port")
     assert not any(map(reader.read, lines[:-1]))
-    with pytest.raises(ColumnError, match=rf"port, line {len(lines)}: the numbers are separated by '.', the headings"):
+    with pytest.raises(
+        ColumnError,
+        match=rf"port, line {len(lines)}: the numbers are separated by '.', the headings",
+    ):
         reader.read(lines[-1])
 
 
 def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
-    reader = RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"}, constants={"resting_length": "200 mm"}))  # fmt: skip
+    reader = RowReader(
+        "port",
+        ColumnMapping(
+            columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"},
+            constants={"resting_length": "200 mm"},
+        ),
+    )
     rows = [
         reader.read(line)
         for line in (
@@ -136,11 +167,20 @@ def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
 
 @pytest.mark.parametrize(
     ("row", "is_read"),
-    [("-0.94,0.1", True), ("-0.96,0.1", False), ("1,1.01", False), ("1,-0.51", False), ("1e30,0.1", False)],
+    [
+        ("-0.94,0.1", True),
+        ("-0.96,0.1", False),
+        ("1,1.01", False),
+        ("1,-0.51", False),
+        ("1e30,0.1", False),
+    ],
 )
 def test_a_row_of_numbers_that_no_sensor_measures_is_left_out(row: str, is_read: bool):
     reader = RowReader(
-        "port", ColumnMapping(columns={"1": "pressure [barg]", "2": "contraction"}, constants={"ambient": "950 mbar"})
+        "port",
+        ColumnMapping(
+            columns={"1": "pressure [barg]", "2": "contraction"}, constants={"ambient": "950 mbar"}
+        ),
     )
     rows = [reader.read("1,0.1"), reader.read(row)]
     assert [each is not None for each in rows] == [True, is_read]
@@ -153,10 +193,14 @@ def test_a_stream_of_noise_is_refused():
         reader.read(line)
     for _ in range(MAX_UNREADABLE):
         assert reader.read("garbage,") is None
-    with pytest.raises(ColumnError, match=r"successive lines are no rows of 3 numbers. Check the baud rate"):
+    with pytest.raises(
+        ColumnError, match=r"successive lines are no rows of 3 numbers. Check the baud rate"
+    ):
         reader.read("garbage,")
     with pytest.raises(ColumnError, match="no column '7'; the columns are 1, 2"):
-        RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "7": "force [N]"})).read("1,2")
+        RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "7": "force [N]"})).read(
+            "1,2"
+        )
     with pytest.raises(FileError, match="cannot be read"):
         list(follow_lines("no/such.csv", idle=0))
 
@@ -197,7 +241,10 @@ def test_standard_input_is_followed_to_its_end():
     [
         (
             "pressure [bar],force [N]\n1,2\n",
-            "there is no contraction or a length with --resting-length; the columns are pressure, force",
+            (
+                "there is no contraction or a length with --resting-length; the columns are"
+                " pressure, force"
+            ),
         ),
         (
             "pressure [bar],contraction [%],force [N]\n9,2,3\n",

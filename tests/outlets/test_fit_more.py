@@ -1,6 +1,8 @@
-"""What `airmuscle fit` answers beyond the fit is what the library answers: bootstrap, profiles, shape, bands.
+"""What `airmuscle fit` answers beyond the fit is what the library answers: bootstrap, profiles,
+shape, bands.
 
-Remedies are those of the command line. A surface held to a muscle's shape is the one that is written.
+Remedies are those of the command line. A surface held to a muscle's shape is the one that is
+written.
 """
 
 from __future__ import annotations
@@ -51,8 +53,19 @@ def bench(path: Path, noise: float = 5.0, count: int = 120, seed: int = 1) -> Re
 
 def test_bootstrap_and_profiles_are_those_of_the_library(tmp_path):
     recording = bench(tmp_path / "bench.csv")
-    asked = ("--bootstrap", 50, "--leave-out", "pressure", "--profile", "weak", "--profile", "coefficients[0]")
-    result = airmuscle("fit", tmp_path / "bench.csv", *SURFACE, *asked, "--json", "--out", tmp_path / "fit")
+    asked = (
+        "--bootstrap",
+        50,
+        "--leave-out",
+        "pressure",
+        "--profile",
+        "weak",
+        "--profile",
+        "coefficients[0]",
+    )
+    result = airmuscle(
+        "fit", tmp_path / "bench.csv", *SURFACE, *asked, "--json", "--out", tmp_path / "fit"
+    )
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)["uncertainty"]
     found = fit(blank_surface(2), recording)
@@ -69,21 +82,30 @@ def test_bootstrap_and_profiles_are_those_of_the_library(tmp_path):
     assert profiled == {"coefficients[0]", *weakly_determined(found)}
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     assert all(
-        word in page for word in ("Uncertainty of the parameters", "50 refits, 6 blocks resampled", "by profile")
+        word in page
+        for word in ("Uncertainty of the parameters", "50 refits, 6 blocks resampled", "by profile")
     )
-    assert {"intervals.svg", "bands.svg"} <= {p.name for p in (tmp_path / "fit" / "figures").iterdir()}
+    assert {"intervals.svg", "bands.svg"} <= {
+        p.name for p in (tmp_path / "fit" / "figures").iterdir()
+    }
 
 
 def test_weak_says_so_where_no_parameter_is(tmp_path):
     bench(tmp_path / "bench.csv")
-    result = airmuscle("fit", tmp_path / "bench.csv", *SURFACE, "--profile", "weak", "--out", tmp_path / "fit")
+    result = airmuscle(
+        "fit", tmp_path / "bench.csv", *SURFACE, "--profile", "weak", "--out", tmp_path / "fit"
+    )
     assert "note: no parameter is weakly determined" in result.stdout
 
 
 @pytest.mark.slow
 def test_a_muscle_with_a_law_of_tied_parameters_has_them_profiled(tmp_path):
-    result = airmuscle("fit", MUSCLE, "--characteristic", MUSCLE, "--profile", "weak", "--json", "--out", tmp_path)
-    weak = weakly_determined(fit(load(MUSCLE).characteristic, load_data(MUSCLE), fixed=("wall_thickness",)))
+    result = airmuscle(
+        "fit", MUSCLE, "--characteristic", MUSCLE, "--profile", "weak", "--json", "--out", tmp_path
+    )
+    weak = weakly_determined(
+        fit(load(MUSCLE).characteristic, load_data(MUSCLE), fixed=("wall_thickness",))
+    )
     rows = json.loads(result.stdout)["uncertainty"]["intervals"]
     assert {row["parameter"] for row in rows if row["by_profile"] is not None} == set(weak) != set()
 
@@ -96,7 +118,9 @@ def test_a_shape_on_request_is_the_one_written(tmp_path):
     assert "of the validity range), most at" in loose.stdout
     assert "Monotonicity violations" in (tmp_path / "loose" / "report.html").read_text("utf-8")
     result = airmuscle("fit", tmp_path / "bench.csv", *degree, "--shape", "--out", tmp_path / "fit")
-    assert re.search(r"Shape-constrained surface\nRms error [\d.]+ N with constraints", result.stdout)
+    assert re.search(
+        r"Shape-constrained surface\nRms error [\d.]+ N with constraints", result.stdout
+    )
     law = load(tmp_path / "fit" / "muscle.toml").characteristic
     assert find_shape_violations(law, law.validity_range, points=201) == ()
     assert law.coefficients == pytest.approx(
@@ -107,8 +131,17 @@ def test_a_shape_on_request_is_the_one_written(tmp_path):
 
 def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
     bench(tmp_path / "bench.csv")
-    asked = (*SURFACE, "--shape", "--free-contraction", "2 bar=18 %", "--free-contraction", "600 kPa=19.5 %")
-    assert airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit").exit_code == 0
+    asked = (
+        *SURFACE,
+        "--shape",
+        "--free-contraction",
+        "2 bar=18 %",
+        "--free-contraction",
+        "600 kPa=19.5 %",
+    )
+    assert (
+        airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit").exit_code == 0
+    )
     law = load(tmp_path / "fit" / "muscle.toml").characteristic
     for pressure, contraction in ((2e5, 0.18), (6e5, 0.195)):
         assert law.unclamped_force(pressure, contraction) == pytest.approx(0.0, abs=1e-6)
@@ -124,15 +157,35 @@ def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
             1,
             "--free-contraction: unit 'N' cannot be converted to 'Pa'",
         ),
-        ((*SURFACE, "--shape", "--free-contraction", "2 bar=1800 %"), 2, "must be from 0 to 100 %, not '1800 %'"),
-        ((*SURFACE, "--shape", "--free-contraction", "2 bar=-18 %"), 2, "must be from 0 to 100 %, not '-18 %'"),
+        (
+            (*SURFACE, "--shape", "--free-contraction", "2 bar=1800 %"),
+            2,
+            "must be from 0 to 100 %, not '1800 %'",
+        ),
+        (
+            (*SURFACE, "--shape", "--free-contraction", "2 bar=-18 %"),
+            2,
+            "must be from 0 to 100 %, not '-18 %'",
+        ),
         (("--compare", "--shape"), 2, "it excludes --compare"),
-        (("--characteristic", "Sarosi2012", "--shape"), 1, "only a ContractileSurface can be constrained"),
+        (
+            ("--characteristic", "Sarosi2012", "--shape"),
+            1,
+            "only a ContractileSurface can be constrained",
+        ),
         ((*SURFACE, "--profile", "coefficient[0]"), 1, "no parameter 'coefficient[0]'"),
         ((*SURFACE, "--bootstrap", "50", "--leave-out", "run"), 1, "use --leave-out contraction"),
         ((*SURFACE, "--bootstrap", "3"), 2, "greater than or equal to 20"),
-        ((*SURFACE, "--profile", "coefficients[0]", "--robust", "5 N"), 1, "a robust loss is no likelihood"),
-        ((*SURFACE, "--leave-out", "row"), 2, "allowed range: run, specimen, contraction, pressure, block"),
+        (
+            (*SURFACE, "--profile", "coefficients[0]", "--robust", "5 N"),
+            1,
+            "a robust loss is no likelihood",
+        ),
+        (
+            (*SURFACE, "--leave-out", "row"),
+            2,
+            "allowed range: run, specimen, contraction, pressure, block",
+        ),
         (("--characteristic", "ContractileSurface", "--degree", "9"), 1, "use --degree 5"),
     ],
 )
@@ -148,7 +201,13 @@ def test_what_cannot_be_asked_is_refused(options, code, message, tmp_path):
 def test_a_law_that_data_can_start_needs_no_entry(tmp_path):
     bench(tmp_path / "bench.csv", noise=0.5)
     result = airmuscle(
-        "fit", tmp_path / "bench.csv", "--characteristic", "Sarosi2012", "--json", "--out", tmp_path / "f"
+        "fit",
+        tmp_path / "bench.csv",
+        "--characteristic",
+        "Sarosi2012",
+        "--json",
+        "--out",
+        tmp_path / "f",
     )
     assert json.loads(result.stdout)["fit"]["rms_error"] == pytest.approx(0.5, rel=0.2)
 
@@ -172,18 +231,25 @@ def test_the_figure_draws_the_band_that_the_library_gives(tmp_path):
     found = fit(blank_surface(2), bench(tmp_path / "bench.csv"))
     plot = band_plot(found)
     left, right = plot.draw().axes
-    curve, half = left.lines[0], right.lines[0]
+    curve = left.lines[0]
+    half = right.lines[0]
     x = np.asarray(curve.get_xdata()) / 100
     points = Recording({"pressure": np.full(x.size, 1e5), "contraction": x}, "curve")
     expected = confidence_band(found, points)
     kept = np.isfinite(x)
     assert np.asarray(curve.get_ydata())[kept] == pytest.approx(expected.value[kept])
-    assert np.asarray(half.get_ydata())[kept] == pytest.approx((expected.high - expected.value)[kept])
+    assert np.asarray(half.get_ydata())[kept] == pytest.approx(
+        (expected.high - expected.value)[kept]
+    )
     assert left.get_ylabel() == "force [N]"
 
 
 def test_without_a_point_to_spare_there_is_no_band():
-    columns = {"pressure": [1e5, 3e5, 1e5], "contraction": [0.0, 0.0, 0.1], "force": [100.0, 300.0, 50.0]}
+    columns = {
+        "pressure": [1e5, 3e5, 1e5],
+        "contraction": [0.0, 0.0, 0.1],
+        "force": [100.0, 300.0, 50.0],
+    }
     rows = Recording({name: np.array(values) for name, values in columns.items()}, "three")
     assert band_plot(fit(ContractileSurface.blank(1, max_force=1e3), rows)) is None
 

@@ -1,4 +1,5 @@
-"""A hint names an argument that Python takes; the command line writes it as its option, or omits it if it has none.
+"""A hint names an argument that Python takes; the command line writes it as its option, or omits it
+if it has none.
 
 Texts that are joined, prefixed, stored in results or pickled keep their hints.
 """
@@ -50,12 +51,30 @@ SOURCE = Path(am.__file__).parent
 SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
 SURFACE = ("--characteristic", "ContractileSurface", "--degree")
 VALUES = {
-    "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
-    "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ..., "ambient": ...,
-    "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time": NoTime(),
-    "degree": 2, "skip_rows": 1, "drop_outliers": True, "loss": Huber(10.0), "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
-    "all_rows": True, "law": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
-}  # fmt: skip
+    "fixed": ("wall_thickness",),
+    "sigma": 1.0,
+    "by": LevelSplit("contraction"),
+    "leave_out": LevelSplit("pressure"),
+    "units": {"pressure": ...},
+    "columns": {1: "pressure [kPa]"},
+    "decimal": ",",
+    "resting_length": ...,
+    "ambient": ...,
+    "constants": {"length": "73.2 mm"},
+    "file_name": "held{length [mm]}",
+    "time": NoTime(),
+    "degree": 2,
+    "skip_rows": 1,
+    "drop_outliers": True,
+    "loss": Huber(10.0),
+    "missing": DropMissing((-999.0,)),
+    "displacement_zero": "12 mm",
+    "all_rows": True,
+    "law": ...,
+    "censoring": ...,
+    "free": ("circuit.fill.conductance",),
+    "": ...,
+}
 """A value of every argument that a hint of the source names."""
 
 
@@ -71,11 +90,23 @@ def source_hints() -> Iterator[tuple[str, str, str]]:
     for path in sorted(SOURCE.rglob("*.py")):
         source = path.read_text(encoding="utf-8")
         for node in ast.walk(ast.parse(source)) if "Hint(" in source else ():
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Hint":
+            if (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Name)
+                and node.func.id == "Hint"
+            ):
                 given = dict(zip(Hint.__match_args__, node.args, strict=False))
                 given |= {str(keyword.arg): keyword.value for keyword in node.keywords}
-                texts = {name: ast.literal_eval(given[name]) for name in ("argument", "function") if name in given}
-                yield f"{path.name}:{node.lineno}", texts.get("argument", ""), texts.get("function", "")
+                texts = {
+                    name: ast.literal_eval(given[name])
+                    for name in ("argument", "function")
+                    if name in given
+                }
+                yield (
+                    f"{path.name}:{node.lineno}",
+                    texts.get("argument", ""),
+                    texts.get("function", ""),
+                )
 
 
 HINTS = list(source_hints())
@@ -83,15 +114,28 @@ HINTS = list(source_hints())
 
 def public_functions() -> dict[str, Callable[..., Any]]:
     """All functions and classes of the faces, by module and name."""
-    faces = [am, *(importlib.import_module(".".join(["airmuscle", *path.parent.relative_to(SOURCE).parts]))
-                   for path in SOURCE.rglob("__init__.py") if path.parent != SOURCE)]  # fmt: skip
+    faces = [
+        am,
+        *(
+            importlib.import_module(".".join(["airmuscle", *path.parent.relative_to(SOURCE).parts]))
+            for path in SOURCE.rglob("__init__.py")
+            if path.parent != SOURCE
+        ),
+    ]
     names = [(face, name) for face in faces for name in getattr(face, "__all__", ())]
-    things = {f"{face.__name__}.{name}".removeprefix("airmuscle."): getattr(face, name) for face, name in names}
-    things |= {f"characteristic.{name}": getattr(am.characteristic, name) for name in am.characteristic.__all__}
+    things = {
+        f"{face.__name__}.{name}".removeprefix("airmuscle."): getattr(face, name)
+        for face, name in names
+    }
+    things |= {
+        f"characteristic.{name}": getattr(am.characteristic, name)
+        for name in am.characteristic.__all__
+    }
     return {
         name: thing
         for name, thing in things.items()
-        if inspect.isroutine(thing) or (inspect.isclass(thing) and not issubclass(thing, BaseException))
+        if inspect.isroutine(thing)
+        or (inspect.isclass(thing) and not issubclass(thing, BaseException))
     }
 
 
@@ -102,14 +146,20 @@ def test_there_is_a_hint_for_every_remedy_and_a_value_for_every_hint():
     assert remedies == {key for table in INSTRUCTIONS.values() for key in table}
 
 
-@pytest.mark.parametrize(("place", "argument", "function"), HINTS, ids=[place for place, _, _ in HINTS])
-def test_every_hint_names_an_argument_of_a_public_function(place: str, argument: str, function: str):
+@pytest.mark.parametrize(
+    ("place", "argument", "function"), HINTS, ids=[place for place, _, _ in HINTS]
+)
+def test_every_hint_names_an_argument_of_a_public_function(
+    place: str, argument: str, function: str
+):
     functions = public_functions()
     owner, _, method = function.rpartition(".")
     known = functions.get(function) or getattr(functions.get(owner), method, None)
     assert not function or known
     asked = [known] if known else list(functions.values())
-    assert not argument or any(argument in inspect.signature(each).parameters for each in asked if not _is_enum(each))
+    assert not argument or any(
+        argument in inspect.signature(each).parameters for each in asked if not _is_enum(each)
+    )
 
 
 def _is_enum(thing: object) -> bool:
@@ -134,21 +184,34 @@ def test_every_instruction_names_options_that_its_command_has(command: str):
 def test_a_hint_is_a_sentence_in_python():
     assert str(Hint("To fix one", "fixed", ("a",))) == "To fix one, use fixed=('a',)."
     assert str(Hint("To fix one", "fixed")) == "To fix one, use fixed=...."
-    assert str(Hint("To leave out levels", "leave_out", LevelSplit("pressure"))).endswith("LevelSplit('pressure').")
+    assert str(Hint("To leave out levels", "leave_out", LevelSplit("pressure"))).endswith(
+        "LevelSplit('pressure')."
+    )
     assert str(Hint("To leave out levels", "by", LevelSplit("force", 0.1))).endswith(
         "LevelSplit('force', min_gap=0.1)."
     )
-    assert str(Hint("To state it", "resting_length", "300 mm", "read")).endswith("resting_length='300 mm' of read.")
+    assert str(Hint("To state it", "resting_length", "300 mm", "read")).endswith(
+        "resting_length='300 mm' of read."
+    )
 
 
-TEXT = HintedText("a: ", HintedText("no unit.", Hint("To state it", "units", {"force": ...})), "\nb: wrong.")
+TEXT = HintedText(
+    "a: ", HintedText("no unit.", Hint("To state it", "units", {"force": ...})), "\nb: wrong."
+)
 
 
 @pytest.mark.parametrize("same", [copy.deepcopy, lambda text: pickle.loads(pickle.dumps(text))])
 def test_a_text_with_hints_is_a_string_that_keeps_them(same: Callable[[HintedText], HintedText]):
     assert TEXT == "a: no unit. To state it, use units={'force': ...}.\nb: wrong."
-    assert in_options(same(TEXT), "fit") == "a: no unit. To state it, use --unit 'force=...'.\nb: wrong."
-    assert in_options(same(TEXT), "evaluate") == in_options(same(TEXT), None) == "a: no unit.\nb: wrong."
+    assert (
+        in_options(same(TEXT), "fit")
+        == "a: no unit. To state it, use --unit 'force=...'.\nb: wrong."
+    )
+    assert (
+        in_options(same(TEXT), "evaluate")
+        == in_options(same(TEXT), None)
+        == "a: no unit.\nb: wrong."
+    )
     assert json.loads(json.dumps(TEXT)) == str(TEXT)
 
 
@@ -159,20 +222,27 @@ def test_an_error_keeps_its_hint_where_a_location_is_added():
     error = pickle.loads(pickle.dumps(caught.value))
     assert str(error) == "study.toml: no \\x1b unit. To state it, use units={'force': ...}."
     assert error.hint == hint
-    assert in_options(error.message, "inspect") == "study.toml: no \\x1b unit. To state it, use --unit 'force=...'."
+    assert (
+        in_options(error.message, "inspect")
+        == "study.toml: no \\x1b unit. To state it, use --unit 'force=...'."
+    )
     assert ColumnError("no unit").hint is None
 
 
 def test_an_error_of_a_simulation_keeps_its_results_where_a_location_is_added():
     results = object()
-    with pytest.raises(SimulationError, match=r"^here: it ended\.$") as caught, located_errors("here"):
+    with (
+        pytest.raises(SimulationError, match=r"^here: it ended\.$") as caught,
+        located_errors("here"),
+    ):
         raise SimulationError("it ended.", results, interrupted=True)
     assert caught.value.solution is results
     assert caught.value.interrupted
 
 
 def test_a_diagnostic_may_have_a_hint_of_either_kind():
-    code, hint = DiagnosticCode.MODEL, Hint("To fix one", "fixed", ("a",))
+    code = DiagnosticCode.MODEL
+    hint = Hint("To fix one", "fixed", ("a",))
     assert str(Diagnostic(code, "run", "it ended", hint="Begin again.")) == "it ended. Begin again."
     assert (
         in_options(Diagnostic(code, "run", "it ended", hint=hint).message, "fit")
@@ -191,20 +261,34 @@ def table(path: Path, *, resting_length: float | None = None, **columns: np.ndar
 
 def points(path: Path, count: int = 120, zero: bool = False) -> Path:
     rng = np.random.default_rng(1)
-    pressure, contraction = np.repeat(np.linspace(1e5, 6e5, 6), count // 6), rng.uniform(0.0, 0.2, count // 6 * 6)
+    pressure = np.repeat(np.linspace(1e5, 6e5, 6), count // 6)
+    contraction = rng.uniform(0.0, 0.2, count // 6 * 6)
     force = SAROSI.force(pressure, contraction) + 30.0 * rng.standard_normal(pressure.size)
     return table(
-        path, pressure=pressure, contraction=contraction, force=0.0 * force if zero else np.maximum(force, 0.0)
+        path,
+        pressure=pressure,
+        contraction=contraction,
+        force=0.0 * force if zero else np.maximum(force, 0.0),
     )
 
 
 def sweep(
-    path: Path, ends: tuple[float, ...], pressures: tuple[float, ...], resting_length: float | None = None
+    path: Path,
+    ends: tuple[float, ...],
+    pressures: tuple[float, ...],
+    resting_length: float | None = None,
 ) -> Path:
-    contraction, pressure = (np.concatenate([np.linspace(a, b, 60) for a, b in itertools.pairwise(x)])
-                             for x in (ends, pressures))  # fmt: skip
+    contraction, pressure = (
+        np.concatenate([np.linspace(a, b, 60) for a, b in itertools.pairwise(x)])
+        for x in (ends, pressures)
+    )
     force = SAROSI.force(pressure, contraction) + 300.0
-    columns = {"time": np.arange(force.size) * 0.2, "pressure": pressure, "contraction": contraction, "force": force}
+    columns = {
+        "time": np.arange(force.size) * 0.2,
+        "pressure": pressure,
+        "contraction": contraction,
+        "force": force,
+    }
     return table(path, resting_length=resting_length, **columns)
 
 
@@ -230,53 +314,106 @@ NO_UNIT = "pressure,contraction [%],force [N]\n1,2,3\n2,3,4\n"
 NO_HEADINGS = "1;2;3\n2;3;4\n"
 THOUSANDS = "pressure [kPa];contraction [%];force [N]\n100;5;1,234\n200;6;0.5\n"
 RISE_AND_FALL = (0.0, 0.15, 0.0)
-CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any, ...], str, str]] = {
+CASES: dict[
+    str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any, ...], str, str]
+] = {
     "greatest degree of a surface": (
-        points, lambda file: fit(law(9), read(file)), ("fit", *SURFACE, 9),
-        "use degree=5 of characteristic.ContractileSurface.blank.", "For the greatest degree that the levels determine, use --degree 5."),
+        points,
+        lambda file: fit(law(9), read(file)),
+        ("fit", *SURFACE, 9),
+        "use degree=5 of characteristic.ContractileSurface.blank.",
+        "For the greatest degree that the levels determine, use --degree 5.",
+    ),
     "parameters fixed": (
-        lambda path: points(path, 30), lambda file: fit(law(9), read(file)), ("fit", *SURFACE, 9),
-        "use fixed=....", "To fix parameters, use --fix PARAMETER."),
+        lambda path: points(path, 30),
+        lambda file: fit(law(9), read(file)),
+        ("fit", *SURFACE, 9),
+        "use fixed=....",
+        "To fix parameters, use --fix PARAMETER.",
+    ),
     "all rows censored": (
-        lambda path: points(path, zero=True), lambda file: fit(law(2), read(file)), ("fit", *SURFACE, 2),
-        "use censoring=UNCENSORED.", "To treat them as measured values, use --uncensored."),
+        lambda path: points(path, zero=True),
+        lambda file: fit(law(2), read(file)),
+        ("fit", *SURFACE, 2),
+        "use censoring=UNCENSORED.",
+        "To treat them as measured values, use --uncensored.",
+    ),
     "levels drawn": (
-        points, lambda file: bootstrap(fit(law(2), read(file)), read(file), by=RunSplit()),
+        points,
+        lambda file: bootstrap(fit(law(2), read(file)), read(file), by=RunSplit()),
         ("fit", *SURFACE, 2, "--bootstrap", 50, "--leave-out", "run"),
-        "use by=LevelSplit('contraction').", "To resample by levels of contraction, use --leave-out contraction."),
+        "use by=LevelSplit('contraction').",
+        "To resample by levels of contraction, use --leave-out contraction.",
+    ),
     "levels left out": (
-        points, ranked, ("fit", "--compare", "--leave-out", "run"),
-        "use leave_out=LevelSplit('contraction'). To leave out levels of pressure, use leave_out=LevelSplit('pressure').",
-        "To leave out levels of contraction, use --leave-out contraction. "
-        "To leave out levels of pressure, use --leave-out pressure."),
+        points,
+        ranked,
+        ("fit", "--compare", "--leave-out", "run"),
+        (
+            "use leave_out=LevelSplit('contraction'). To leave out levels of pressure, use"
+            " leave_out=LevelSplit('pressure')."
+        ),
+        (
+            "To leave out levels of contraction, use --leave-out contraction. "
+            "To leave out levels of pressure, use --leave-out pressure."
+        ),
+    ),
     "no unit": (
-        lambda path: text_file(path, NO_UNIT), read_csv, ("fit", *SURFACE, 1),
-        "use units={'pressure': ...} of ColumnMapping.", "To state the unit, use --unit 'pressure=...'."),
+        lambda path: text_file(path, NO_UNIT),
+        read_csv,
+        ("fit", *SURFACE, 1),
+        "use units={'pressure': ...} of ColumnMapping.",
+        "To state the unit, use --unit 'pressure=...'.",
+    ),
     "no headings": (
-        lambda path: text_file(path, NO_HEADINGS), read, ("hysteresis",),
+        lambda path: text_file(path, NO_HEADINGS),
+        read,
+        ("hysteresis",),
         "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of ColumnMapping.",
-        'use --column "1=pressure [kPa]" --column "2=force [N]".'),
+        'use --column "1=pressure [kPa]" --column "2=force [N]".',
+    ),
     "no headings, inspected": (
-        lambda path: text_file(path, NO_HEADINGS), read, ("inspect",),
+        lambda path: text_file(path, NO_HEADINGS),
+        read,
+        ("inspect",),
         "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of ColumnMapping.",
-        'use --column "1=pressure [kPa]" --column "2=force [N]".'),
+        'use --column "1=pressure [kPa]" --column "2=force [N]".',
+    ),
     "ambiguous decimal sign": (
-        lambda path: text_file(path, THOUSANDS), read, ("fit", *SURFACE, 1),
-        "use decimal=',' of ColumnMapping.", "To specify the decimal sign, use --decimal ','."),
+        lambda path: text_file(path, THOUSANDS),
+        read,
+        ("fit", *SURFACE, 1),
+        "use decimal=',' of ColumnMapping.",
+        "To specify the decimal sign, use --decimal ','.",
+    ),
     "no resting length": (
-        lambda path: sweep(path, RISE_AND_FALL, (3e5, 3e5, 3e5)), loops, ("hysteresis",),
-        "use resting_length=... of ColumnMapping.", 'To state it, use --resting-length "...".'),
+        lambda path: sweep(path, RISE_AND_FALL, (3e5, 3e5, 3e5)),
+        loops,
+        ("hysteresis",),
+        "use resting_length=... of ColumnMapping.",
+        'To state it, use --resting-length "...".',
+    ),
     "one branch": (
-        lambda path: sweep(path, (0.0, 0.15), (3e5, 3e5), 0.3), loops, ("hysteresis",),
-        "use all_rows=True.", "To fit all rows, if only the length changes quickly, use --all-rows."),
+        lambda path: sweep(path, (0.0, 0.15), (3e5, 3e5), 0.3),
+        loops,
+        ("hysteresis",),
+        "use all_rows=True.",
+        "To fit all rows, if only the length changes quickly, use --all-rows.",
+    ),
     "pressure and length together": (
-        lambda path: sweep(path, RISE_AND_FALL, (1e5, 6e5, 1e5)), loops, ("hysteresis",),
-        "use law=....", "use --muscle NAME with --use-characteristic."),
-}  # fmt: skip
+        lambda path: sweep(path, RISE_AND_FALL, (1e5, 6e5, 1e5)),
+        loops,
+        ("hysteresis",),
+        "use law=....",
+        "use --muscle NAME with --use-characteristic.",
+    ),
+}
 """File, call in Python, arguments of the command; the remedy in Python and on the command line."""
 
 
-@pytest.mark.parametrize(("write", "call", "command", "python", "option"), CASES.values(), ids=CASES.keys())
+@pytest.mark.parametrize(
+    ("write", "call", "command", "python", "option"), CASES.values(), ids=CASES.keys()
+)
 def test_a_remedy_is_in_the_words_of_the_interface(
     tmp_path: Path, write: Any, call: Any, command: Any, python: str, option: str
 ):
@@ -296,7 +433,9 @@ def test_two_files_that_disagree_name_the_option_for_the_unit(tmp_path: Path):
     for name, unit in (("a.csv", "kPa"), ("b.csv", "bar")):
         rows = "".join(f"{100 + i},{i / 10},{200 + i}\n" for i in range(20))
         text_file(tmp_path / name, f"pressure [{unit}],contraction [%],force [N]\n{rows}")
-    result = airmuscle("fit", tmp_path / "a.csv", tmp_path / "b.csv", *SURFACE, 1, "--out", tmp_path / "out")
+    result = airmuscle(
+        "fit", tmp_path / "a.csv", tmp_path / "b.csv", *SURFACE, 1, "--out", tmp_path / "out"
+    )
     assert "To state the unit, use --unit 'pressure=...'." in in_one_line(result.stderr)
 
 
@@ -313,21 +452,35 @@ def test_notes_of_a_fit_name_options_in_text_and_json_and_arguments_in_python(tm
     file = points(tmp_path / "bench.csv")
     assert any("use censoring=UNCENSORED." in note for note in fit(law(2), read(file)).notes)
     outputs = [
-        airmuscle("fit", file, *SURFACE, 2, *more, "--out", tmp_path / "out").stdout for more in ((), ("--json",))
+        airmuscle("fit", file, *SURFACE, 2, *more, "--out", tmp_path / "out").stdout
+        for more in ((), ("--json",))
     ]
-    assert all("To treat them as measured values, use --uncensored." in in_one_line(text) for text in outputs)
+    assert all(
+        "To treat them as measured values, use --uncensored." in in_one_line(text)
+        for text in outputs
+    )
     said = airmuscle("fit", file, *SURFACE, 2, "--uncensored", "--out", tmp_path / "out").stdout
-    assert "To treat them as censored, if the muscle was slack there, omit --uncensored." in in_one_line(said)
+    assert (
+        "To treat them as censored, if the muscle was slack there, omit --uncensored."
+        in in_one_line(said)
+    )
 
 
-def test_a_law_without_default_censoring_is_not_told_to_omit_an_option_that_was_not_given(tmp_path: Path):
+def test_a_law_without_default_censoring_is_not_told_to_omit_an_option_that_was_not_given(
+    tmp_path: Path,
+):
     law_of_contraction = am.load("borzikova-exponential").characteristic
     notes = fit(law_of_contraction, _hung(law_of_contraction)).notes
-    assert any(note.endswith("rows at zero force or below are treated as measured values.") for note in notes)
+    assert any(
+        note.endswith("rows at zero force or below are treated as measured values.")
+        for note in notes
+    )
 
 
 def _hung(law_of_contraction: Any) -> Recording:
-    pressure, force = (x.ravel() for x in np.meshgrid(np.linspace(1e5, 5e5, 8), np.linspace(0.0, 200.0, 8)))
+    pressure, force = (
+        x.ravel() for x in np.meshgrid(np.linspace(1e5, 5e5, 8), np.linspace(0.0, 200.0, 8))
+    )
     contraction = law_of_contraction.contraction(pressure, force)
     return Recording({"pressure": pressure, "force": force, "contraction": contraction}, "bench")
 
@@ -376,13 +529,24 @@ file = "run.csv"
     ("content", "remedy"),
     [
         ("time [s],pressure\n0,1\n1,2\n", "To state the unit, write it in the heading"),
-        ("0;1\n1;2\n", 'write columns = { 1 = "pressure [kPa]", 2 = "force [N]" } in the record\'s mapping file.'),
-        ("time [s];pressure [Pa]\n0;1,234\n1;0.5\n", 'write decimal = "," in the record\'s mapping file.'),
+        (
+            "0;1\n1;2\n",
+            (
+                'write columns = { 1 = "pressure [kPa]", 2 = "force [N]" } in the record\'s mapping'
+                " file."
+            ),
+        ),
+        (
+            "time [s];pressure [Pa]\n0;1,234\n1;0.5\n",
+            'write decimal = "," in the record\'s mapping file.',
+        ),
     ],
 )
 def test_a_record_of_a_study_names_keys_of_its_files(tmp_path: Path, content: str, remedy: str):
     text_file(tmp_path / "run.csv", content)
-    result = airmuscle("fit-dynamic", text_file(tmp_path / "study.toml", RECORD), "--out", tmp_path / "out")
+    result = airmuscle(
+        "fit-dynamic", text_file(tmp_path / "study.toml", RECORD), "--out", tmp_path / "out"
+    )
     assert result.exit_code == 1, result.output
     assert "[record 1]" in result.stderr
     assert remedy in in_one_line(result.stderr), result.stderr

@@ -1,4 +1,6 @@
-"""The pages on identification, hysteresis, reading and studies are true: their code runs on data that a plant made."""
+"""The pages on identification, hysteresis, reading and studies are true: their code runs on data
+that a plant made.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +41,15 @@ def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for seed in (1, 2, 3):
         rng = np.random.default_rng(seed)
-        p, eps = (side.ravel() for side in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.02, 0.2, 7)))
+        p, eps = (
+            side.ravel()
+            for side in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.02, 0.2, 7))
+        )
         force = LAW.force(p, eps) + rng.normal(0.0, 1.0, p.size)
-        write(Recording({"pressure": p, "contraction": eps, "force": force}, "bench"), Path(f"run{seed}.csv"))
+        write(
+            Recording({"pressure": p, "contraction": eps, "force": force}, "bench"),
+            Path(f"run{seed}.csv"),
+        )
     found = run("identification.md")
     assert found["fit"].model == found["found"].recommended.fit.model
     assert "recommend" in capsys.readouterr().out.lower()
@@ -49,17 +57,28 @@ def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
 
 
 def test_the_code_on_dynamic_identification_runs(capsys):
-    plant = replace(third_paper(UnpublishedParameters(), hanging_load(UnpublishedParameters())), gas=WallHeatTransfer())
+    plant = replace(
+        third_paper(UnpublishedParameters(), hanging_load(UnpublishedParameters())),
+        gas=WallHeatTransfer(),
+    )
     command = Schedule({"fill": ((0.1, 1.0), (0.8, 0.0)), "discharge": ((1.0, 1.0),)})
     exact = simulate(plant, command, duration=1.5, output_times=0.01)
     rng = np.random.default_rng(4)
     noise = {"pressure": 500.0, "position": 5e-5}
     records = [
-        exact.with_columns(**{name: exact[name] + s * rng.standard_normal(len(exact)) for name, s in noise.items()})
+        exact.with_columns(
+            **{name: exact[name] + s * rng.standard_normal(len(exact)) for name, s in noise.items()}
+        )
         for _ in range(2)
     ]
     another = Experiment(records[1], command, InitialConditions.at_rest(plant, pressure=0.0))
-    found = run("dynamic-identification.md", plant=plant, recording=records[0], command=command, another=another)
+    found = run(
+        "dynamic-identification.md",
+        plant=plant,
+        recording=records[0],
+        command=command,
+        another=another,
+    )
     coefficient = found["fit"]["gas.coefficient"]
     assert coefficient.value == pytest.approx(25.0, abs=4 * coefficient.stderr)
     assert coefficient.stderr < 2.5
@@ -80,7 +99,9 @@ def test_the_code_on_hysteresis_runs(tmp_path, monkeypatch, capsys):
     assert isinstance(found["muscle"].friction, MaxwellSlip)
     assert len(found["joint"][0].agreement) == 2
     assert capsys.readouterr().out.strip().endswith("The data justify this friction.")
-    (command,) = re.findall(r"```sh\nairmuscle (hysteresis .*?)\n```", (DOCS / "hysteresis.md").read_text(), re.DOTALL)
+    (command,) = re.findall(
+        r"```sh\nairmuscle (hysteresis .*?)\n```", (DOCS / "hysteresis.md").read_text(), re.DOTALL
+    )
     done = airmuscle(*shlex.split(command.replace("\\\n", " ")))
     assert done.exit_code == 0, done.output
     assert "muscle: friction/muscle.toml" in done.stdout

@@ -1,4 +1,6 @@
-"""Input of any size and depth costs a bounded time, and a message quotes at most 200 characters of it."""
+"""Input of any size and depth costs a bounded time, and a message quotes at most 200 characters of
+it.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +28,21 @@ LIMIT = 5.0
         ("x." * 20_000 + "y = 1", "a key has more than 50 parts between dots"),
         ("[" + "x." * 20_000 + "y]", "a key has more than 50 parts between dots"),
         ("x = {" + "a . " * 60 + "b = 1}", "a key has more than 50 parts between dots"),
-        ("x = [" + "1," * 2_500_000 + "]", r"more than 4000000 bytes\. Write its numbers to a data file"),
+        (
+            "x = [" + "1," * 2_500_000 + "]",
+            r"more than 4000000 bytes\. Write its numbers to a data file",
+        ),
         ("x = " + "[" * 100_000 + "]" * 100_000, "cannot be read"),
         ("x = " + "1" * 5000, "cannot be read"),
     ],
-    ids=["dotted key", "dotted table", "dotted key in a table", "numbers", "lists in lists", "digits"],
+    ids=[
+        "dotted key",
+        "dotted table",
+        "dotted key in a table",
+        "numbers",
+        "lists in lists",
+        "digits",
+    ],
 )
 def test_a_toml_file_that_would_take_minutes_is_refused(tmp_path: Path, text: str, message: str):
     (tmp_path / "m.toml").write_text(text, encoding="utf-8")
@@ -49,10 +61,14 @@ def test_a_key_of_fifty_parts_is_read(tmp_path: Path):
 def test_a_message_quotes_at_most_200_characters_of_a_value(tmp_path: Path, text: str):
     head = 'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\n'
     (tmp_path / "m.toml").write_text(f'{head}geometry = "{text}"', encoding="utf-8")
-    with pytest.raises(UnknownNameError, match=r"m\.toml, \[characteristic\.geometry\], model: no model") as raised:
+    with pytest.raises(
+        UnknownNameError, match=r"m\.toml, \[characteristic\.geometry\], model: no model"
+    ) as raised:
         load(tmp_path / "m.toml")
     assert len(str(raised.value)) < len(str(tmp_path)) + 400
-    (tmp_path / "s.toml").write_text(f'run = {{ duration = "1 s" }}\n[plant]\nmuscle = [{text!r}]', encoding="utf-8")
+    (tmp_path / "s.toml").write_text(
+        f'run = {{ duration = "1 s" }}\n[plant]\nmuscle = [{text!r}]', encoding="utf-8"
+    )
     with pytest.raises((UnknownNameError, ParameterError)) as raised:
         load_scenario(tmp_path / "s.toml")
     assert text[:500] not in str(raised.value)
@@ -74,17 +90,22 @@ def wide(folder: Path, columns: int) -> Path:
 
 def test_a_table_of_more_columns_than_any_test_rig_has_is_refused(tmp_path: Path):
     start = time.process_time()
-    with pytest.raises(ColumnError, match=r"wide\.csv: the table has 50000 columns; at most 5000 are read\. Export"):
+    with pytest.raises(
+        ColumnError, match=r"wide\.csv: the table has 50000 columns; at most 5000 are read\. Export"
+    ):
         read(wide(tmp_path, 50_000))
     assert len(list(read(wide(tmp_path, 2000))[0])) == 2000
     assert time.process_time() - start < LIMIT
 
 
 def test_a_run_of_more_rows_than_a_command_writes_is_refused(tmp_path: Path):
-    text = (Path(__file__).parents[2] / "examples" / "fill_discharge.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "examples" / "fill_discharge.toml").read_text(
+        encoding="utf-8"
+    )
     (tmp_path / "s.toml").write_text(text.replace('"10 ms"', '"0.11 us"'), encoding="utf-8")
     with pytest.raises(
-        ParameterError, match=r"s\.toml, \[run\]: output_times of 1\.1e-07 s gives 2\.27e\+08 rows in 25 s"
+        ParameterError,
+        match=r"s\.toml, \[run\]: output_times of 1\.1e-07 s gives 2\.27e\+08 rows in 25 s",
     ):
         load_scenario(tmp_path / "s.toml")
 
@@ -97,7 +118,9 @@ def test_a_message_lists_the_first_columns_of_a_wide_table(tmp_path: Path):
     assert len(str(raised.value)) < 700
 
 
-def test_a_message_on_an_unknown_parameter_shows_the_first_of_hundreds_and_the_closest_one(tmp_path: Path):
+def test_a_message_on_an_unknown_parameter_shows_the_first_of_hundreds_and_the_closest_one(
+    tmp_path: Path,
+):
     scenario = load_scenario("joint-dmsp-20-matrix")
     plant = scenario.plant
     paths = [leaf.path for leaf in leaves(plant)]
@@ -108,7 +131,9 @@ def test_a_message_on_an_unknown_parameter_shows_the_first_of_hundreds_and_the_c
         lambda: write_program(scenario.problem, tmp_path / "c", C99(), tunable=[wrong]),
     )
     for call in refused:
-        with pytest.raises(ParameterError, match=r"has no parameter .*, and \d+ more\. Did you mean ") as raised:
+        with pytest.raises(
+            ParameterError, match=r"has no parameter .*, and \d+ more\. Did you mean "
+        ) as raised:
             call()
         assert len(str(raised.value)) < 700
         assert str(raised.value).endswith(f"Did you mean '{paths[-1]}'?")
@@ -131,7 +156,9 @@ def test_what_stands_between_two_quotations_is_not_cut(name: str):
 
 def test_a_message_quotes_little_of_a_path_of_thousands_of_characters(tmp_path: Path):
     with pytest.raises(FileError, match=r"….*: cannot be written to: File name too long") as raised:
-        write_program(load_scenario("joint-dmsp-20-matrix").problem, tmp_path / ("a b " * 1500), C99())
+        write_program(
+            load_scenario("joint-dmsp-20-matrix").problem, tmp_path / ("a b " * 1500), C99()
+        )
     assert len(str(raised.value)) < 400
 
 
@@ -143,8 +170,12 @@ def test_a_command_quotes_little_of_a_folder_that_the_system_refuses():
 
 
 def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):
-    (tmp_path / "a.csv").write_text("force [N],pressure [kPa]\n" + f"{'a' * 3000},1\n" * 3, encoding="utf-8")
-    with pytest.raises(ColumnError, match="3 cells in 3 of 3 lines are no finite numbers") as raised:
+    (tmp_path / "a.csv").write_text(
+        "force [N],pressure [kPa]\n" + f"{'a' * 3000},1\n" * 3, encoding="utf-8"
+    )
+    with pytest.raises(
+        ColumnError, match="3 cells in 3 of 3 lines are no finite numbers"
+    ) as raised:
         read(tmp_path / "a.csv")
     assert len(str(raised.value)) < 1000
     assert "missing" not in str(raised.value)
@@ -152,6 +183,8 @@ def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_pat
 
 def test_a_heading_of_100_000_brackets_is_read_at_once(tmp_path: Path):
     start = time.process_time()
-    (tmp_path / "a.csv").write_text(f"x = {'[' * 100_000}\nforce [N],pressure [kPa]\n1,2\n2,3\n", encoding="utf-8")
+    (tmp_path / "a.csv").write_text(
+        f"x = {'[' * 100_000}\nforce [N],pressure [kPa]\n1,2\n2,3\n", encoding="utf-8"
+    )
     assert len(read(tmp_path / "a.csv")[0]) == 2
     assert time.process_time() - start < LIMIT

@@ -1,7 +1,7 @@
 """`airmuscle inspect` prints the inspection of recordings and changes nothing.
 
-The output equals that of the library: columns with their original units, sampling, runs, branches, plateaus, outliers,
-saturation. Files that a fit would reject are inspected, with the reason.
+The output equals that of the library: columns with their original units, sampling, runs, branches,
+plateaus, outliers, saturation. Files that a fit would reject are inspected, with the reason.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ def seen(*arguments: object) -> dict:
 
 
 def bench(path: Path, *, glitch: int | None = 95, swap: bool = False) -> Path:
-    """Twenty steps up and twenty down, the force rounded to 0.5 N and saturated at -5 N, an outlier of one row."""
+    """Twenty steps up and twenty down, the force rounded to 0.5 N and saturated at -5 N, an outlier
+    of one row.
+    """
     random = np.random.default_rng(5)
     levels = [*np.linspace(0, 570, 20), *np.linspace(540, 0, 20)]
     pressure = np.repeat(levels, 10) + random.normal(0, 0.4, ROWS)
@@ -49,15 +51,30 @@ def test_json_contains_the_results_of_the_library(tmp_path: Path):
     expected = inspect(recording)
     assert (found["recording"], found["rows"], found["resting_length"]) == ("run.csv", ROWS, 0.3)
     columns = {column["column"]: column for column in found["columns"]}
-    pressure, force = columns["pressure"], columns["force"]
+    pressure = columns["pressure"]
+    force = columns["force"]
     assert (pressure["unit"], pressure["unit_in_file"]) == ("Pa", "kPa")
-    assert (pressure["min"], pressure["max"]) == (recording["pressure"].min(), recording["pressure"].max())
+    assert (pressure["min"], pressure["max"]) == (
+        recording["pressure"].min(),
+        recording["pressure"].max(),
+    )
     assert found["rows_per_second"] == pytest.approx(20.0)
-    assert (force["resolution"], force["lower_limit"], force["upper_limit"]) == (pytest.approx(0.5), -5.0, None)
+    assert (force["resolution"], force["lower_limit"], force["upper_limit"]) == (
+        pytest.approx(0.5),
+        -5.0,
+        None,
+    )
     assert found["runs"] == [
-        {"run": "isometric", "first_row": 1, "last_row": ROWS, "constant": "contraction",
-         "level": pytest.approx(0.1), "unit": "1", "swept": "pressure, force"}
-    ]  # fmt: skip
+        {
+            "run": "isometric",
+            "first_row": 1,
+            "last_row": ROWS,
+            "constant": "contraction",
+            "level": pytest.approx(0.1),
+            "unit": "1",
+            "swept": "pressure, force",
+        }
+    ]
     assert [(b["branch"], b["first_row"], b["last_row"]) for b in found["branches"]] == [
         ("inflating", 1, 200),
         ("deflating", 201, ROWS),
@@ -112,13 +129,19 @@ def test_the_figures_are_written_to_the_folder_and_reproducible(tmp_path: Path):
         result = airmuscle("inspect", tmp_path / "*.csv", "--out", tmp_path / folder)
         assert result.exit_code == 0, result.stderr
         assert f"report: {tmp_path / folder / 'report.html'}" in result.stdout
-    names = sorted(path.relative_to(tmp_path / "one").as_posix() for path in (tmp_path / "one").rglob("*.*"))
+    names = sorted(
+        path.relative_to(tmp_path / "one").as_posix() for path in (tmp_path / "one").rglob("*.*")
+    )
     figures = [f"figures/recording-{i}.{suffix}" for i in (1, 2) for suffix in ("png", "svg")]
     assert [name for name in names if name.startswith("figures/")] == figures
-    assert {"data/columns-1.csv", "data/outliers-1.csv", "data/runs-2.csv", "data/files.csv"} < set(names)
+    assert {"data/columns-1.csv", "data/outliers-1.csv", "data/runs-2.csv", "data/files.csv"} < set(
+        names
+    )
     assert "data/outliers-2.csv" not in names
     kept = [name for name in names if name != "report.html"]
-    assert all((tmp_path / "one" / n).read_bytes() == (tmp_path / "two" / n).read_bytes() for n in kept)
+    assert all(
+        (tmp_path / "one" / n).read_bytes() == (tmp_path / "two" / n).read_bytes() for n in kept
+    )
     assert (tmp_path / "one" / figures[0]).read_bytes().startswith(b"\x89PNG")
 
 
@@ -132,14 +155,19 @@ def test_the_figure_shows_branches_plateaus_outliers_and_limits(tmp_path: Path):
     assert contraction.get_ylabel() == "contraction\n[%]"
     glitches = next(line for line in force.lines if line.get_label() == "suspected outlier")
     assert list(glitches.get_xdata()) == [pytest.approx(0.05 * 95)]
-    assert any(list(line.get_ydata()) == [-5.0, -5.0] and line.get_linestyle() == "--" for line in force.lines)
+    assert any(
+        list(line.get_ydata()) == [-5.0, -5.0] and line.get_linestyle() == "--"
+        for line in force.lines
+    )
 
 
 def test_a_file_that_a_fit_rejects_is_inspected(tmp_path: Path):
     path = bench(tmp_path / "run.csv", swap=True)
     text = airmuscle("inspect", path).stdout
     assert "PROBLEM: time decreases in 1 row, first in row 22" in text
-    fitted = airmuscle("fit", path, "--characteristic", "ContractileSurface", "--out", tmp_path / "fit")
+    fitted = airmuscle(
+        "fit", path, "--characteristic", "ContractileSurface", "--out", tmp_path / "fit"
+    )
     assert fitted.exit_code == 1
     assert "is less than the time of the previous row" in fitted.stderr
 
@@ -155,7 +183,11 @@ def test_rounded_time_stamps_are_told_from_the_rate_of_the_rows_and_name_the_opt
 
 def test_options_and_mapping_are_equivalent(tmp_path: Path):
     path = tmp_path / "run.txt"
-    np.savetxt(path, np.column_stack([np.arange(9.0), np.linspace(2, 6, 9), np.linspace(290, 250, 9)]), delimiter="\t")
+    np.savetxt(
+        path,
+        np.column_stack([np.arange(9.0), np.linspace(2, 6, 9), np.linspace(290, 250, 9)]),
+        delimiter="\t",
+    )
     flags = ("--column", "1=time [s]", "--column", "2=pressure [bara]", "--column", "3=length [mm]")
     by_flags = seen(path, *flags, "--resting-length", "300 mm", "--ambient", "1 bar")
     (tmp_path / "rig.toml").write_text(
@@ -173,12 +205,18 @@ def test_options_and_mapping_are_equivalent(tmp_path: Path):
     [
         (("none.csv",), 1, "cannot be read"),
         (("run.csv", "--column", "p"), 2, "--column must be NAME=TEXT"),
-        (("run.csv", "--column", "x=pressure [bar]"), 1, "the mapping names column 'x', but the columns are t [s]"),
+        (
+            ("run.csv", "--column", "x=pressure [bar]"),
+            1,
+            "the mapping names column 'x', but the columns are t [s]",
+        ),
         (("run.csv", "--unit", "pressure=mm"), 1, "cannot be converted to 'Pa'"),
         ((), 2, "Missing argument"),
     ],
 )
-def test_an_unreadable_file_is_an_error_on_one_line(tmp_path: Path, monkeypatch, arguments, code: int, expected: str):
+def test_an_unreadable_file_is_an_error_on_one_line(
+    tmp_path: Path, monkeypatch, arguments, code: int, expected: str
+):
     bench(tmp_path / "run.csv")
     monkeypatch.chdir(tmp_path)
     result = airmuscle("inspect", *arguments)

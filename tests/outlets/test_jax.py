@@ -1,6 +1,7 @@
 """A plant inside the user's own JAX program: jit, vmap and grad work, and the numbers are NumPy's.
 
-Rates are compared relative to their size or the size of their state in a second, whichever is larger.
+Rates are compared relative to their size or the size of their state in a second, whichever is
+larger.
 """
 
 from __future__ import annotations
@@ -74,7 +75,9 @@ def test_the_rates_under_jit_are_those_of_numpy(gas):
     found = jax.jit(plant.rates)(as_jax(state), as_jax(INPUTS))
     for variable in plant.states:
         size = abs(float(expected[variable.name])) + 100 * variable.nominal
-        assert abs(float(found[variable.name]) - float(expected[variable.name])) < 1e-12 * size, variable.name
+        assert abs(float(found[variable.name]) - float(expected[variable.name])) < 1e-12 * size, (
+            variable.name
+        )
 
 
 @pytest.mark.parametrize("gas", GASES, ids=repr)
@@ -82,7 +85,9 @@ def test_outputs_over_many_states_at_once_are_those_of_each(gas):
     plant = plant_of_everything(gas)
     state = find_equilibrium(plant, pressure=2e5)
     heights = np.linspace(0.9, 1.1, 7) * state["position"]
-    forces = jax.vmap(lambda y: plant.outputs({**as_jax(state), "position": y}, as_jax(INPUTS))["force"])(heights)
+    forces = jax.vmap(
+        lambda y: plant.outputs({**as_jax(state), "position": y}, as_jax(INPUTS))["force"]
+    )(heights)
     each = [float(plant.outputs({**state, "position": float(y)}, INPUTS)["force"]) for y in heights]
     np.testing.assert_allclose(forces, each, rtol=1e-12, atol=1e-10)
 
@@ -98,7 +103,11 @@ def test_a_gradient_by_every_parameter_is_the_difference_quotient():
 
     gradient = np.asarray(jax.jit(jax.grad(inflow))(jnp.asarray(leaves)))
     assert np.isfinite(gradient).all()
-    for path in ("circuit.circuit.circuit.fill.conductance", "muscle.series.stiffness", "mechanism.mass"):
+    for path in (
+        "circuit.circuit.circuit.fill.conductance",
+        "muscle.series.stiffness",
+        "mechanism.mass",
+    ):
         i = [leaf.path for leaf in tree.leaves(plant)].index(path)
         step = 1e-6 * leaves[i] * np.eye(leaves.size)[i]
         quotient = (inflow(leaves + step) - inflow(leaves - step)) / (2e-6 * leaves[i])
@@ -130,6 +139,8 @@ def test_a_direction_of_a_law_is_traced_or_refused(name: str, direction: str):
         warnings.simplefilter("ignore", AirmuscleWarning)
         entry = load(name)
     law = entry.characteristic
-    arguments = {"contraction": (2e5, 100.0), "pressure": (0.1, 100.0), "force": (2e5, 0.1)}[direction]
+    arguments = {"contraction": (2e5, 100.0), "pressure": (0.1, 100.0), "force": (2e5, 0.1)}[
+        direction
+    ]
     with contextlib.suppress(TraceError):
         jax.jit(getattr(law, direction))(*arguments)

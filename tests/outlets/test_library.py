@@ -1,6 +1,7 @@
 """A library file becomes a model, and a model a file that gives the same numbers.
 
-What is wrong with a file is said with file, table, key, value and what is allowed; nothing half written is left.
+What is wrong with a file is said with file, table, key, value and what is allowed; nothing half
+written is left.
 """
 
 from __future__ import annotations
@@ -16,7 +17,14 @@ import pytest
 
 from airmuscle.bench import fit
 from airmuscle.core import cite
-from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
+from airmuscle.errors import (
+    AirmuscleError,
+    AirmuscleWarning,
+    FileError,
+    ParameterError,
+    UnitError,
+    UnknownNameError,
+)
 from airmuscle.files import Entry, library
 from airmuscle.files.library import PLANT_READER, Location, files, model_class, model_names, write
 from airmuscle.physics import (
@@ -97,7 +105,10 @@ def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
     entry = library.load(written(tmp_path, GOOD))
     assert entry.name == "muscle"
     assert isinstance(entry.characteristic, Clamped)
-    assert (entry.characteristic.max_force, entry.characteristic.inner.geometry.radius) == (1200.0, 0.01)
+    assert (entry.characteristic.max_force, entry.characteristic.inner.geometry.radius) == (
+        1200.0,
+        0.01,
+    )
     assert entry.spring == LinearSpring(2000.0)
     assert entry.damper == PressureDamper(50.0, 1e-5)
     assert entry.validity_range.pressure == (0.0, 6e5)
@@ -127,10 +138,13 @@ def test_a_published_data_set_is_cited_also_by_a_fit_to_it(name: str, tmp_path: 
     (source,) = cite(data)
     words = re.findall(r"[A-Z][a-z]+", source.authors)
     assert words
-    assert all(word in data.notes[-1] for word in words), "the header of the file names the same authors"
+    assert all(word in data.notes[-1] for word in words), (
+        "the header of the file names the same authors"
+    )
     assert cite(data.rows(slice(20))) == [source]
     result = fit(
-        ContractileSurface.blank(2, max_force=1e5), [data.rows(slice(0, None, 2)), data.rows(slice(1, None, 2))]
+        ContractileSurface.blank(2, max_force=1e5),
+        [data.rows(slice(0, None, 2)), data.rows(slice(1, None, 2))],
     )
     assert {r.key for r in cite(result)} == {source.key, *(r.key for r in cite(result.model))}
     entry = library.load(write.save(result, tmp_path / "muscle.toml"))
@@ -155,19 +169,24 @@ def test_a_muscle_file_carries_its_friction(law, tmp_path: Path):
     assert {r.key for r in cite(again)} >= {r.key for r in law.references}
     bristles = {state.name: 1e-4 for state in law.states}
     held = again.muscle.unclamped_tension(3e5, 0.1, 0.01, bristles)
-    assert held == dataclasses.replace(entry, friction=None).muscle.unclamped_tension(3e5, 0.1) - law.force(
-        bristles, 0.01
-    )
+    assert held == dataclasses.replace(entry, friction=None).muscle.unclamped_tension(
+        3e5, 0.1
+    ) - law.force(bristles, 0.01)
 
 
-def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_another(tmp_path: Path):
+def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_another(
+    tmp_path: Path,
+):
     entry = dataclasses.replace(library.load("dmsp-20-300"), friction=FRICTION[0])
     write.save(entry, tmp_path / "muscle.toml")
     table = {"library": "muscle.toml", "damper": {"model": "LinearDamper", "damping": 100.0}}
     place = Location("scenario.toml", "plant.muscle", tmp_path)
     assert PLANT_READER.build(table, place, kind=Muscle).friction == FRICTION[0]
     assert (
-        PLANT_READER.build({**table, "friction": {"model": "NoFriction"}}, place, kind=Muscle).friction == NoFriction()
+        PLANT_READER.build(
+            {**table, "friction": {"model": "NoFriction"}}, place, kind=Muscle
+        ).friction
+        == NoFriction()
     )
 
 
@@ -185,8 +204,13 @@ def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
 
 def test_a_friction_of_another_kind_is_refused(tmp_path: Path):
     spring = '[friction]\nmodel = "LinearSpring"\nstiffness = 1.0\n'
-    with pytest.raises(ParameterError, match=r"\[friction\]: LinearSpring is not allowed here; a Friction is required"):
-        library.load(written(tmp_path, GOOD.replace("[validity_range]", spring + "[validity_range]")))
+    with pytest.raises(
+        ParameterError,
+        match=r"\[friction\]: LinearSpring is not allowed here; a Friction is required",
+    ):
+        library.load(
+            written(tmp_path, GOOD.replace("[validity_range]", spring + "[validity_range]"))
+        )
 
 
 def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
@@ -206,7 +230,9 @@ def test_every_library_entry_survives_saving(name: str, tmp_path: Path):
 
 def test_texts_with_quotes_and_new_lines_survive_saving(tmp_path: Path):
     law = ChouHannaford1996(Braid(0.01, 0.4, 0.3))
-    entry = Entry("odd", 'called "odd" \\ here', "chosen", law, law.geometry, note="two\nlines\tä\x7f")
+    entry = Entry(
+        "odd", 'called "odd" \\ here', "chosen", law, law.geometry, note="two\nlines\tä\x7f"
+    )
     assert library.load(write.save(entry, tmp_path / "odd.toml")) == entry
 
 
@@ -287,10 +313,23 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             '"LinearSpring"',
             '"Braid"',
             ParameterError,
-            r"\[spring\]: Braid is not allowed here; a Spring is required: CubicSpring, LinearSpring",
+            (
+                r"\[spring\]: Braid is not allowed here; a Spring is required: CubicSpring,"
+                r" LinearSpring"
+            ),
         ),
-        ("year = 2024", 'year = "2024"', ParameterError, r"\[reference 1\]: year is '2024'; it must be an integer"),
-        ('title = "A muscle of our own"', "title = 7", ParameterError, r"title is 7; it must be a text in quotes"),
+        (
+            "year = 2024",
+            'year = "2024"',
+            ParameterError,
+            r"\[reference 1\]: year is '2024'; it must be an integer",
+        ),
+        (
+            'title = "A muscle of our own"',
+            "title = 7",
+            ParameterError,
+            r"title is 7; it must be a text in quotes",
+        ),
         # non-physical
         (
             '"10 mm"',
@@ -298,7 +337,12 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             ParameterError,
             r"radius of the braid at rest\) is -0.01 m; allowed range: 0.0001 to 0.2 m",
         ),
-        ('"25 deg"', '"25 rad"', ParameterError, r"theta_0.* is 25 rad; allowed range: 0.05 to 1.5 rad"),
+        (
+            '"25 deg"',
+            '"25 rad"',
+            ParameterError,
+            r"theta_0.* is 25 rad; allowed range: 0.05 to 1.5 rad",
+        ),
         ('"300 mm"', "nan", ParameterError, r"L_0.* is nan; it must be finite"),
         (
             '"1.2 kN"',
@@ -327,23 +371,36 @@ def test_a_model_of_another_kind_is_refused(tmp_path: Path):
     braid = 'model = "Braid"\nradius = 0.01\nbraid_angle = 0.4\nresting_length = 0.3\n'
     text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\n{braid}'
     with pytest.raises(
-        ParameterError, match=r"\[characteristic\]: Braid is not allowed here; a Characteristic is required"
+        ParameterError,
+        match=r"\[characteristic\]: Braid is not allowed here; a Characteristic is required",
     ):
         library.load(written(tmp_path, text))
-    text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Clamped"\n[characteristic.inner]\n{braid}'
+    text = (
+        'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel ='
+        f' "Clamped"\n[characteristic.inner]\n{braid}'
+    )
     with pytest.raises(
-        ParameterError, match=r"\[characteristic.inner\]: Braid is not allowed here; a ForceLaw is required"
+        ParameterError,
+        match=r"\[characteristic.inner\]: Braid is not allowed here; a ForceLaw is required",
     ):
         library.load(written(tmp_path, text))
 
 
 def test_a_value_where_a_table_belongs_is_refused(tmp_path: Path):
-    with pytest.raises(ParameterError, match=r"\[characteristic\] is 3; it must be a table. Write model = "):
+    with pytest.raises(
+        ParameterError, match=r"\[characteristic\] is 3; it must be a table. Write model = "
+    ):
         library.load(written(tmp_path, 'title = "t"\nprovenance = "chosen"\ncharacteristic = 3\n'))
-    text = 'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\ngeometry = 3\n'
+    text = (
+        'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel ='
+        ' "ChouHannaford1996"\ngeometry = 3\n'
+    )
     with pytest.raises(
         ParameterError,
-        match=r"\[characteristic.geometry\] is 3; it must be a table. Write its values in it: radius, braid_angle",
+        match=(
+            r"\[characteristic.geometry\] is 3; it must be a table. Write its values in it: radius,"
+            r" braid_angle"
+        ),
     ):
         library.load(written(tmp_path, text))
 
@@ -365,10 +422,13 @@ def test_a_byte_order_mark_does_no_harm(tmp_path: Path):
 
 def test_a_unique_beginning_of_a_name_is_enough():
     assert library.load("chou").name == "chou-hannaford"
-    with pytest.raises(UnknownNameError, match=r"'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300\. Write more"):
+    with pytest.raises(
+        UnknownNameError, match=r"'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300\. Write more"
+    ):
         library.load("dmsp")
     with pytest.raises(
-        UnknownNameError, match=r"no library entry 'dsmp-20-300'; there are .* Did you mean 'dmsp-20-300'\?"
+        UnknownNameError,
+        match=r"no library entry 'dsmp-20-300'; there are .* Did you mean 'dmsp-20-300'\?",
     ):
         library.load("dsmp-20-300")
     with pytest.raises(UnknownNameError, match="no library entry ''"):
@@ -384,7 +444,9 @@ def test_an_entry_that_is_no_muscle_says_what_it_lacks():
     with pytest.raises(UnknownNameError, match=r"sarosi-dmsp-10 .* lacks a \[geometry\]"):
         _ = library.load("sarosi-dmsp-10").muscle
     table = dataclasses.replace(library.load("festo-tool-dmsp-20"), geometry=Braid(0.01, 0.4, 0.2))
-    with pytest.raises(UnknownNameError, match="lacks a law solved for the force: see as_force_law"):
+    with pytest.raises(
+        UnknownNameError, match="lacks a law solved for the force: see as_force_law"
+    ):
         _ = table.muscle
 
 
@@ -403,11 +465,16 @@ def test_the_measured_maps_know_their_resting_length():
 
 def test_a_column_of_a_file_that_is_not_there(tmp_path: Path):
     table = '{ file = "map.csv", column = "force" }'
-    text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Tabulated"\npressures = {table}\n'
+    text = (
+        'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Tabulated"\npressures ='
+        f" {table}\n"
+    )
     text += f"contractions = {table}\nforces = {table}\n"
     with pytest.raises(FileError, match=r"map\.csv"):
         library.load(written(tmp_path, text))
-    with pytest.raises(ParameterError, match=r"pressures is .*; write a column of a file as \{ file = "):
+    with pytest.raises(
+        ParameterError, match=r"pressures is .*; write a column of a file as \{ file = "
+    ):
         library.load(written(tmp_path, text.replace("column", "colum")))
 
 
@@ -425,5 +492,9 @@ def test_a_table_without_a_model_is_of_the_only_class_unless_a_file_may_name_a_s
 
 def test_a_muscle_is_loaded_without_the_modules_of_control_laws():
     program = "import sys, airmuscle; airmuscle.load('dmsp-20-300'); print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert not [name for name in done.stdout.split() if re.match(r"airmuscle\.control\.\w+\.", name)]
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not [
+        name for name in done.stdout.split() if re.match(r"airmuscle\.control\.\w+\.", name)
+    ]

@@ -1,4 +1,6 @@
-"""Plants of the library: each is loaded, listed, shown and simulated by its name, and each number has its source."""
+"""Plants of the library: each is loaded, listed, shown and simulated by its name, and each number
+has its source.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +49,10 @@ def numbers(table: Any, path: str = "") -> Iterator[str]:
 @each
 def test_every_number_of_a_plant_has_its_source_or_is_labelled_chosen(name):
     tables = tomllib.loads((PLANTS / f"{name}.toml").read_text(encoding="utf-8"))
-    paths = {*numbers(tables["plant"]), *(f"{key}.{p}" for key in ("input", "run") for p in numbers(tables[key]))}
+    paths = {
+        *numbers(tables["plant"]),
+        *(f"{key}.{p}" for key in ("input", "run") for p in numbers(tables[key])),
+    }
     sources = tables["sources"]
     missing = [p for p in paths if not any(p == s or p.startswith(f"{s}.") for s in sources)]
     assert missing == []
@@ -57,21 +62,29 @@ def test_every_number_of_a_plant_has_its_source_or_is_labelled_chosen(name):
 
 
 def test_a_copied_file_of_a_plant_is_a_scenario_and_remains_an_entry(tmp_path):
-    """Its provenance, sources and references stand in the file and do not disturb a run or a prediction."""
+    """Its provenance, sources and references stand in the file and do not disturb a run or a
+    prediction.
+    """
     path = tmp_path / "mine.toml"
     path.write_bytes((PLANTS / "joint-dmsp-20-itv2050.toml").read_bytes())
-    scenario, own = load_scenario(path), load_scenario("joint-dmsp-20-itv2050")
+    scenario = load_scenario(path)
+    own = load_scenario("joint-dmsp-20-itv2050")
     assert (scenario.plant, scenario.initial_state) == (own.plant, own.initial_state)
     assert am.load(path).references == am.load("joint-dmsp-20-itv2050").references != ()
     assert load_plant_model(path).scenario.plant == own.plant
-    path.write_text(path.read_text(encoding="utf-8").replace("provenance =", "provenence ="), encoding="utf-8")
-    with pytest.raises(ParameterError, match=r"unknown key 'provenence'.*Did you mean 'provenance'"):
+    path.write_text(
+        path.read_text(encoding="utf-8").replace("provenance =", "provenence ="), encoding="utf-8"
+    )
+    with pytest.raises(
+        ParameterError, match=r"unknown key 'provenence'.*Did you mean 'provenance'"
+    ):
         load_scenario(path)
 
 
 @each
 def test_a_plant_is_loaded_by_name_and_its_example_moves_within_its_range_of_angles(name):
-    entry, scenario = am.load(name), load_scenario(name)
+    entry = am.load(name)
+    scenario = load_scenario(name)
     assert isinstance(entry, PlantEntry)
     assert scenario.plant == entry.plant
     assert scenario.title == entry.title
@@ -110,7 +123,11 @@ def test_a_scenario_replaces_parts_of_a_library_plant(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('"joint-dmsp-20-matrix"', '"joint-nothing"', r"plant.library\]: no plant 'joint-nothing'.*joint-sam-30x290"),
+        (
+            '"joint-dmsp-20-matrix"',
+            '"joint-nothing"',
+            r"plant.library\]: no plant 'joint-nothing'.*joint-sam-30x290",
+        ),
         ('"joint-dmsp-20-matrix"', '"joint-dmsp"', "'joint-dmsp' is ambiguous"),
         ('"joint-dmsp-20-matrix"', "3", "name a library plant"),
     ],
@@ -122,7 +139,9 @@ def test_a_library_plant_that_does_not_exist_is_refused(tmp_path, old, new, mess
 
 
 def test_a_plant_is_no_muscle():
-    with pytest.raises(UnknownNameError, match="'joint-sam-30x290' is a plant; a muscle or a law is required"):
+    with pytest.raises(
+        UnknownNameError, match="'joint-sam-30x290' is a plant; a muscle or a law is required"
+    ):
         load_law("joint-sam-30x290")
     with pytest.raises(ParameterError, match="describes a plant; a muscle or a law is required"):
         load_law(PLANTS / "joint-sam-30x290.toml")

@@ -1,4 +1,6 @@
-"""MATLAB tables and timetables in MAT files are read with the package mat-io; other objects are named with their export."""
+"""MATLAB tables and timetables in MAT files are read with the package mat-io; other objects are
+named with their export.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +29,18 @@ def text_element(text: str) -> bytes:
 
 
 def opaque(name: str, class_name: str, *, compressed: bool) -> bytes:
-    """An opaque variable as MATLAB writes it, with the identifiers of the object in place of its values."""
-    head = struct.pack("<4I", 6, 8, 17, 0) + text_element(name) + text_element("MCOS") + text_element(class_name)
-    values = struct.pack("<4I", 6, 8, 13, 0) + struct.pack("<4I", 5, 8, 6, 1) + struct.pack("<2I", 1, 0)
+    """An opaque variable as MATLAB writes it, with the identifiers of the object in place of its
+    values.
+    """
+    head = (
+        struct.pack("<4I", 6, 8, 17, 0)
+        + text_element(name)
+        + text_element("MCOS")
+        + text_element(class_name)
+    )
+    values = (
+        struct.pack("<4I", 6, 8, 13, 0) + struct.pack("<4I", 5, 8, 6, 1) + struct.pack("<2I", 1, 0)
+    )
     values += struct.pack("<2I", 6, 24) + struct.pack("<6I", 0xDD000000, 2, 1, 1, 1, 1)
     body = head + struct.pack("<2I", 14, len(values)) + values
     element = struct.pack("<2I", 14, len(body)) + body
@@ -39,7 +50,9 @@ def opaque(name: str, class_name: str, *, compressed: bool) -> bytes:
     return struct.pack("<2I", 15, len(packed)) + packed
 
 
-def with_objects(path: Path, objects: dict[str, str], content: dict[str, object], *, compressed: bool = False) -> Path:
+def with_objects(
+    path: Path, objects: dict[str, str], content: dict[str, object], *, compressed: bool = False
+) -> Path:
     """A file of version 5 or 7 with numeric variables and objects."""
     scipy_io.savemat(path, content)
     with path.open("ab") as file:
@@ -74,7 +87,10 @@ def test_a_damaged_file_has_no_objects(tmp_path):
 @pytest.mark.parametrize(
     ("class_name", "export"),
     [
-        ("table", r"S = table2struct\(T, 'ToScalar', true\); save\('data.mat', 'S'\).*pip install mat-io"),
+        (
+            "table",
+            r"S = table2struct\(T, 'ToScalar', true\); save\('data.mat', 'S'\).*pip install mat-io",
+        ),
         ("timetable", r"S = table2struct\(timetable2table\(T\), 'ToScalar', true\)"),
         ("timeseries", r"S = struct\('time', T.Time, 'force', T.Data\)"),
     ],
@@ -87,7 +103,9 @@ def test_an_object_alone_is_named_with_the_command_that_exports_it(tmp_path, cla
 
 @pytest.mark.usefixtures("without_package")
 def test_an_object_beside_vectors_is_a_note_and_no_column(tmp_path):
-    path = with_objects(tmp_path / "run.mat", {"T": "table"}, {"force_N": FORCE, "pressure_kPa": 10 * FORCE})
+    path = with_objects(
+        tmp_path / "run.mat", {"T": "table"}, {"force_N": FORCE, "pressure_kPa": 10 * FORCE}
+    )
     (table,) = read_mat_tables.__wrapped__(path, None)
     assert table.headings == ("force_N", "pressure_kPa")
     assert "Not read: T is a MATLAB table." in table.notes[-1]
@@ -98,7 +116,9 @@ def test_an_object_beside_vectors_is_a_note_and_no_column(tmp_path):
 def test_tables_are_read_with_their_units(tmp_path, version):
     matio = pytest.importorskip("matio", reason="mat-io is not installed")
     pandas = pytest.importorskip("pandas")
-    frame = pandas.DataFrame({"time": 0.1 * np.arange(12), "pressure": 10.0 * FORCE, "force": FORCE, "rig": ["a"] * 12})
+    frame = pandas.DataFrame(
+        {"time": 0.1 * np.arange(12), "pressure": 10.0 * FORCE, "force": FORCE, "rig": ["a"] * 12}
+    )
     frame.attrs["VariableUnits"] = ["s", "kPa", "N", ""]
     path = tmp_path / "run.mat"
     with warnings.catch_warnings():
@@ -107,5 +127,7 @@ def test_tables_are_read_with_their_units(tmp_path, version):
     (recording,) = read(path, ColumnMapping(units={"time": "s", "pressure": "kPa", "force": "N"}))
     assert recording["pressure"] == pytest.approx(1e4 * FORCE)
     assert recording["force"] == pytest.approx(FORCE)
-    (alone,) = read(path, ColumnMapping(units={"time": "s", "pressure": "kPa", "force": "N"}, group="T"))
+    (alone,) = read(
+        path, ColumnMapping(units={"time": "s", "pressure": "kPa", "force": "N"}, group="T")
+    )
     assert len(alone) == 12

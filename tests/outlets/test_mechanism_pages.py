@@ -1,4 +1,6 @@
-"""The pages on mechanisms, linearisation, drivers and batches are true: their code runs, tables name what there is."""
+"""The pages on mechanisms, linearisation, drivers and batches are true: their code runs, tables
+name what there is.
+"""
 
 from __future__ import annotations
 
@@ -87,7 +89,9 @@ def test_the_table_of_a_scenario_is_built():
 
 def test_every_mechanism_is_on_the_page_and_may_stand_in_a_file():
     text = (DOCS / "mechanisms.md").read_text(encoding="utf-8")
-    classes = [c for c in vars(mechanism).values() if isinstance(c, type) and issubclass(c, Mechanism)]
+    classes = [
+        c for c in vars(mechanism).values() if isinstance(c, type) and issubclass(c, Mechanism)
+    ]
     final = {c.__name__ for c in classes} - {"Mechanism", "MechanismWrapper"}
     assert final == {name for name in final if f"`{name}`" in text}
     assert final <= set(model_names())

@@ -17,8 +17,11 @@ from airmuscle.recording import Recording
 
 TIME = np.linspace(0.0, 2.0, 41)
 COLUMNS = {
-    "time": TIME, "pressure": 100.0 + 50.0 * TIME, "length": 300.0 - 10.0 * TIME, "force": 50.0 + np.sin(TIME),
-}  # fmt: skip
+    "time": TIME,
+    "pressure": 100.0 + 50.0 * TIME,
+    "length": 300.0 - 10.0 * TIME,
+    "force": 50.0 + np.sin(TIME),
+}
 UNITS = {"time": "s", "pressure": "kPa", "length": "mm", "force": "N"}
 XLS = (
     "eNrtWE1IFGEYfr75WXdF113TQAMRISvzEl266JZUntqsSyGBrTrZoq4yux3qUJZ5CYKoUxGB4KWL/RyyqKBuQYFRh0AIduvoqSjooE7v++7Mpr"
@@ -51,12 +54,16 @@ def refusal(kind: type[InputError], path: Path, **options) -> str:
 def ods(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
     """A minimal OpenDocument spreadsheet."""
     namespaces = " ".join(
-        f'xmlns:{p}="urn:oasis:names:tc:opendocument:xmlns:{p}:1.0"' for p in ("office", "table", "text")
+        f'xmlns:{p}="urn:oasis:names:tc:opendocument:xmlns:{p}:1.0"'
+        for p in ("office", "table", "text")
     )
 
     def cell(value: object) -> str:
         if isinstance(value, str):
-            return f'<table:table-cell office:value-type="string"><text:p>{value}</text:p></table:table-cell>'
+            return (
+                "<table:table-cell"
+                f' office:value-type="string"><text:p>{value}</text:p></table:table-cell>'
+            )
         return f'<table:table-cell office:value-type="float" office:value="{value}"/>'
 
     tables = "".join(
@@ -70,7 +77,8 @@ def ods(path: Path, sheets: dict[str, list[list[object]]]) -> Path:
         archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
         archive.writestr(
             "content.xml",
-            f'<?xml version="1.0"?><office:document-content {namespaces}>{body}</office:document-content>',
+            '<?xml version="1.0"?><office:document-content'
+            f" {namespaces}>{body}</office:document-content>",
         )
         archive.writestr("META-INF/manifest.xml", "<manifest/>")
     return path
@@ -88,7 +96,9 @@ def test_an_ods_spreadsheet_gives_each_sheet_with_a_table(tmp_path: Path):
     same(first)
     assert (first.origin, len(second)) == ("runs.ods, sheet 'First'", 41)
     same(read(path, ColumnMapping(sheet="Second"))[0])
-    assert "no sheet 'Third'; the sheets are Notes, First, Second" in refusal(FileError, path, sheet="Third")
+    assert "no sheet 'Third'; the sheets are Notes, First, Second" in refusal(
+        FileError, path, sheet="Third"
+    )
 
 
 def test_an_ods_spreadsheet_names_the_row_of_a_bad_cell(tmp_path: Path):
@@ -115,7 +125,9 @@ def test_parquet_with_units_in_the_metadata_or_in_the_names(tmp_path: Path):
 
     fields = [pyarrow.field(n, pyarrow.float64(), metadata={"unit": UNITS[n]}) for n in COLUMNS]
     schema = pyarrow.schema(fields, metadata={"resting_length": "310 mm"})
-    parquet.write_table(pyarrow.table(list(COLUMNS.values()), schema=schema), tmp_path / "run.parquet")
+    parquet.write_table(
+        pyarrow.table(list(COLUMNS.values()), schema=schema), tmp_path / "run.parquet"
+    )
     same(read(tmp_path / "run.parquet")[0])
     named = pyarrow.table({f"{n} [{UNITS[n]}]": values for n, values in COLUMNS.items()})
     parquet.write_table(named, tmp_path / "named.parquet")
@@ -151,7 +163,12 @@ def test_hdf5_groups_matrices_and_records_are_runs(tmp_path: Path):
 
 @pytest.mark.parametrize(
     ("ending", "package"),
-    [(".ods", "python_calamine"), (".xls", "python_calamine"), (".parquet", "pyarrow"), (".h5", "h5py")],
+    [
+        (".ods", "python_calamine"),
+        (".xls", "python_calamine"),
+        (".parquet", "pyarrow"),
+        (".h5", "h5py"),
+    ],
 )
 def test_a_damaged_file_and_a_missing_package_are_one_error_each(
     tmp_path: Path, monkeypatch, ending: str, package: str
@@ -162,7 +179,9 @@ def test_a_damaged_file_and_a_missing_package_are_one_error_each(
     assert f"broken{ending}: cannot be read as" in refusal(FileError, path)
     assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
     monkeypatch.setitem(sys.modules, package, None)
-    assert f"needs the package {package}. Install it: pip install airmuscle[lab]" in refusal(FileError, path)
+    assert f"needs the package {package}. Install it: pip install airmuscle[lab]" in refusal(
+        FileError, path
+    )
 
 
 def test_attributes_of_an_hdf5_file_count_in_its_groups_unless_these_state_others(tmp_path: Path):
@@ -172,7 +191,8 @@ def test_attributes_of_an_hdf5_file_count_in_its_groups_unless_these_state_other
         file.attrs["specimen"] = "A"
         for name in ("first", "second"):
             group = file.create_group(f"day/{name}")
-            group["time [s]"], group["pressure [bara]"] = [0.0, 1.0], [1.0, 2.0]
+            group["time [s]"] = [0.0, 1.0]
+            group["pressure [bara]"] = [1.0, 2.0]
         group.attrs["ambient"] = "900 hPa"
     first, second = read(tmp_path / "rig.h5")
     assert first["pressure"] == pytest.approx([5e3, 1.05e5])

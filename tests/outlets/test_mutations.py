@@ -1,5 +1,5 @@
-"""A damaged file is read or refused with a short message in airmuscle's own words: bytes of tables and workbooks, and
-values, keys and bytes of TOML files, are replaced at random (seeded).
+"""A damaged file is read or refused with a short message in airmuscle's own words: bytes of tables
+and workbooks, and values, keys and bytes of TOML files, are replaced at random (seeded).
 """
 
 from __future__ import annotations
@@ -23,11 +23,61 @@ LIBRARY = Path(library.__file__).parent
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LONGEST = 2000
 VALUES: tuple[Any, ...] = (
-    0, -1, 10**30, 1e308, 1e-308, float("inf"), float("nan"), True, "", " ", "x", "1", "5 bar", "-5 bar", "300 mm", "nan s",
-    "5 furlong", "9**9**9 m", "a" * 3000, "\x1b[31m", "/dev/zero", "../x.toml", "Braid", "Valve", "dmsp-20-300", [], [[]],
-    [1, 2], ["x"], [{}], {}, {"model": "Braid"}, {"model": 5}, {"library": "x"}, {"x": 1}, [1] * 500, "chosen.x",
-)  # fmt: skip
-PARTS = (b"[", b"]", b"=", b'"', b"\n", b"'''", b",", b";", b"\xff", b"\0", b"#", b"nan", b"1e999", b"-", b"a" * 500)
+    0,
+    -1,
+    10**30,
+    1e308,
+    1e-308,
+    float("inf"),
+    float("nan"),
+    True,
+    "",
+    " ",
+    "x",
+    "1",
+    "5 bar",
+    "-5 bar",
+    "300 mm",
+    "nan s",
+    "5 furlong",
+    "9**9**9 m",
+    "a" * 3000,
+    "\x1b[31m",
+    "/dev/zero",
+    "../x.toml",
+    "Braid",
+    "Valve",
+    "dmsp-20-300",
+    [],
+    [[]],
+    [1, 2],
+    ["x"],
+    [{}],
+    {},
+    {"model": "Braid"},
+    {"model": 5},
+    {"library": "x"},
+    {"x": 1},
+    [1] * 500,
+    "chosen.x",
+)
+PARTS = (
+    b"[",
+    b"]",
+    b"=",
+    b'"',
+    b"\n",
+    b"'''",
+    b",",
+    b";",
+    b"\xff",
+    b"\0",
+    b"#",
+    b"nan",
+    b"1e999",
+    b"-",
+    b"a" * 500,
+)
 
 
 def refused(call: Callable[[], object]) -> bool:
@@ -45,7 +95,8 @@ def damaged(content: bytes, draw: random.Random) -> bytes:
     """The bytes with some of them replaced, left out or inserted."""
     changed = bytearray(content)
     for _ in range(draw.choice([1, 2, 5])):
-        place, kind = draw.randrange(len(changed)), draw.randrange(4)
+        place = draw.randrange(len(changed))
+        kind = draw.randrange(4)
         if kind == 0:
             changed[place] = draw.randrange(256)
         elif kind == 1:
@@ -53,12 +104,22 @@ def damaged(content: bytes, draw: random.Random) -> bytes:
         elif kind == 2:
             changed[place:place] = draw.choice(PARTS)
         else:
-            changed = changed[: max(place, 1)] if draw.random() < 0.2 else changed[:place] + changed[place // 2 :]
+            changed = (
+                changed[: max(place, 1)]
+                if draw.random() < 0.2
+                else changed[:place] + changed[place // 2 :]
+            )
     return bytes(changed)
 
 
 def paths(node: Any, at: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    for key, value in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
+    for key, value in (
+        node.items()
+        if isinstance(node, dict)
+        else enumerate(node)
+        if isinstance(node, list)
+        else ()
+    ):
         yield (*at, key)
         yield from paths(value, (*at, key))
 
@@ -89,7 +150,8 @@ def table() -> bytes:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("count", [250, pytest.param(5000, marks=pytest.mark.slow)])
 def test_a_damaged_table_of_text(tmp_path: Path, count: int):
-    draw, refusals = random.Random(26), 0
+    draw = random.Random(26)
+    refusals = 0
     for _ in range(count):
         (tmp_path / "run.csv").write_bytes(damaged(table(), draw))
         refusals += refused(lambda: read(tmp_path / "run.csv"))
@@ -101,7 +163,11 @@ def test_a_damaged_table_of_text(tmp_path: Path, count: int):
 @pytest.mark.parametrize("suffix", ["mat", "xlsx"])
 def test_a_damaged_binary_file(tmp_path: Path, suffix: str, count: int):
     path = tmp_path / f"run.{suffix}"
-    columns = {"time": np.arange(30.0), "pressure": np.linspace(1e5, 2e5, 30), "force": np.linspace(0.0, 100.0, 30)}
+    columns = {
+        "time": np.arange(30.0),
+        "pressure": np.linspace(1e5, 2e5, 30),
+        "force": np.linspace(0.0, 100.0, 30),
+    }
     if suffix == "mat":
         pytest.importorskip("scipy.io").savemat(path, columns)
         mapping = ColumnMapping(units={"time": "s", "pressure": "Pa", "force": "N"})
@@ -112,7 +178,8 @@ def test_a_damaged_binary_file(tmp_path: Path, suffix: str, count: int):
             book.active.append(row)
         book.save(path)
         mapping = ColumnMapping()
-    content, draw = path.read_bytes(), random.Random(26)
+    content = path.read_bytes()
+    draw = random.Random(26)
     assert not refused(lambda: read(path, mapping))
     refusals = 0
     for _ in range(count):
@@ -135,12 +202,19 @@ def test_a_damaged_binary_file(tmp_path: Path, suffix: str, count: int):
     ],
     ids=lambda each: getattr(each, "stem", getattr(each, "__name__", "")),
 )
-def test_a_toml_file_with_another_value_key_or_byte(tmp_path: Path, source: Path, open_file: Any, count: int):
+def test_a_toml_file_with_another_value_key_or_byte(
+    tmp_path: Path, source: Path, open_file: Any, count: int
+):
     path, text, draw = tmp_path / "m.toml", source.read_bytes(), random.Random(26)
-    tree, refusals = tomllib.loads(text.decode()), 0
+    tree = tomllib.loads(text.decode())
+    refusals = 0
     path.write_bytes(text)
     assert not refused(lambda: open_file(path))
     for i in range(count):
-        path.write_bytes(damaged(text, draw) if i % 4 == 0 else changed(tree, draw).encode("utf-8", "surrogatepass"))
+        path.write_bytes(
+            damaged(text, draw)
+            if i % 4 == 0
+            else changed(tree, draw).encode("utf-8", "surrogatepass")
+        )
         refusals += refused(lambda: open_file(path))
     assert 0.2 * count < refusals

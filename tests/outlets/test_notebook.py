@@ -1,4 +1,6 @@
-"""Notebooks: results show a chart and a short table, their `repr` is short, and plots accept Matplotlib axes."""
+"""Notebooks: results show a chart and a short table, their `repr` is short, and plots accept
+Matplotlib axes.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,9 @@ from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisp
 from airmuscle.recording.plot import panels_of
 
 MAX_BYTES = 200_000
-BULKY = re.compile(r"\b(\w*Array|NDArray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b")
+BULKY = re.compile(
+    r"\b(\w*Array|NDArray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b"
+)
 """Annotations of fields that may fill pages."""
 TITLE = "<script>alert('1')</script> & \"quoted\".csv"
 
@@ -40,12 +44,20 @@ def recording() -> am.Recording:
         "contraction": np.tile(np.linspace(0.0, 0.2, 8), 4),
     }
     noise = np.random.default_rng(1).normal(0.0, 3.0, 32)
-    return am.Recording({**columns, "force": law.force(**columns) + noise}, TITLE, notes=("a <b>note</b>",))
+    return am.Recording(
+        {**columns, "force": law.force(**columns) + noise}, TITLE, notes=("a <b>note</b>",)
+    )
 
 
 @pytest.fixture(scope="module")
 def displayed(recording: am.Recording) -> dict[str, NotebookDisplay]:
-    names = ("dmsp-20-300", "matrix-821", "festo-dmsp-20", "joint-dmsp-20-matrix", "borzikova-monotone")
+    names = (
+        "dmsp-20-300",
+        "matrix-821",
+        "festo-dmsp-20",
+        "joint-dmsp-20-matrix",
+        "borzikova-monotone",
+    )
     entries = {name: am.load(name) for name in names}
     lift = am.design.LiftRequirement(stroke=0.03, force=300.0)
     return {
@@ -55,11 +67,15 @@ def displayed(recording: am.Recording) -> dict[str, NotebookDisplay]:
         "recording": recording,
         "fit": am.fit(ContractileSurface.blank(2), recording),
         "inspection": am.bench.inspect(recording),
-        "sizing": am.design.size_muscles(lift, am.design.SizingConditions(6e5, max_count=1), (entries[names[0]],)),
+        "sizing": am.design.size_muscles(
+            lift, am.design.SizingConditions(6e5, max_count=1), (entries[names[0]],)
+        ),
     }
 
 
-def test_the_display_is_well_formed_html_without_scripts_below_200_kB(displayed: dict[str, NotebookDisplay]):
+def test_the_display_is_well_formed_html_without_scripts_below_200_kB(
+    displayed: dict[str, NotebookDisplay],
+):
     for name, thing in displayed.items():
         html = thing._repr_html_()
         minidom.parseString(html)  # raises an error if it is not well-formed
@@ -76,7 +92,8 @@ def test_texts_of_the_user_are_escaped(displayed: dict[str, NotebookDisplay]):
 
 
 def test_a_table_states_the_default_name_of_a_muscle_once():
-    muscle, valve = am.load("dmsp-20-300").muscle, am.load("matrix-821").valve
+    muscle = am.load("dmsp-20-300").muscle
+    valve = am.load("matrix-821").valve
     plant = am.Plant(muscle, am.FillDischarge(am.Supply(6e5), valve, valve), am.HangingMass(5.0))
     assert ("muscle", "MartensBoblan2017, 300 mm") in [row[:2] for row in plant._card().table]
 
@@ -97,7 +114,9 @@ def test_a_chart_that_cannot_be_drawn_is_replaced_by_the_reason():
 
 def test_a_recording_of_a_million_rows_and_one_of_none_are_displayed():
     time = np.linspace(0.0, 1e3, 1_000_000)
-    large = am.Recording({"time": time, **{f"m{i}.pressure": 1e5 * np.sin(i + time) for i in range(3)}}, "large")
+    large = am.Recording(
+        {"time": time, **{f"m{i}.pressure": 1e5 * np.sin(i + time) for i in range(3)}}, "large"
+    )
     assert len(large._repr_html_()) < MAX_BYTES
     minidom.parseString(am.Recording({"pressure": np.array([])}, "empty")._repr_html_())
     minidom.parseString(am.Recording({"pressure": np.array([np.nan, 1.0])}, "gap")._repr_html_())
@@ -111,12 +130,18 @@ def test_the_repr_of_each_object_is_short(displayed: dict[str, NotebookDisplay])
 
 
 def result_classes() -> Iterator[type]:
-    """The dataclasses in the faces of the rooms that are no models and contain arrays or other results."""
+    """The dataclasses in the faces of the rooms that are no models and contain arrays or other
+    results.
+    """
     packages = [m.name for m in pkgutil.iter_modules(am.__path__, "airmuscle.") if m.ispkg]
     for package in map(importlib.import_module, packages):
         for name in getattr(package, "__all__", ()):
             thing = getattr(package, name)
-            is_result = inspect.isclass(thing) and dataclasses.is_dataclass(thing) and not hasattr(thing, "from_file")
+            is_result = (
+                inspect.isclass(thing)
+                and dataclasses.is_dataclass(thing)
+                and not hasattr(thing, "from_file")
+            )
             if is_result and any(BULKY.search(str(f.type)) for f in dataclasses.fields(thing)):
                 yield thing
 
@@ -154,17 +179,34 @@ def test_axes_that_are_none_are_refused(ax):
         given_axes(ax, 1, "plot")
 
 
-def test_too_few_axes_are_refused_with_the_number_that_is_needed(displayed: dict[str, NotebookDisplay]):
-    with pytest.raises(ParameterError, match=r"3 panels need 3 Axes, but 1 is given; allowed range: at least 3"):
+def test_too_few_axes_are_refused_with_the_number_that_is_needed(
+    displayed: dict[str, NotebookDisplay],
+):
+    with pytest.raises(
+        ParameterError, match=r"3 panels need 3 Axes, but 1 is given; allowed range: at least 3"
+    ):
         displayed["recording"].plot(ax=axes(1)[0])
 
 
-JOINT = ("angle", "left.pressure", "right.pressure", "left.fill", "right.discharge", "setpoint.angle", "measured.angle",
-         "command.left.fill", "left.air_mass", "right.air_mass")  # fmt: skip
+JOINT = (
+    "angle",
+    "left.pressure",
+    "right.pressure",
+    "left.fill",
+    "right.discharge",
+    "setpoint.angle",
+    "measured.angle",
+    "command.left.fill",
+    "left.air_mass",
+    "right.air_mass",
+)
 
 
 def test_one_panel_shows_a_quantity_with_set_point_and_measurement():
-    panels = {panel.quantity: [curve.label for curve in panel.curves] for panel in panels_of(JOINT, {}, ordered=True)}
+    panels = {
+        panel.quantity: [curve.label for curve in panel.curves]
+        for panel in panels_of(JOINT, {}, ordered=True)
+    }
     assert panels == {
         "angle": ["angle", "set point", "measured"],
         "pressure": ["left", "right"],
@@ -175,14 +217,37 @@ def test_one_panel_shows_a_quantity_with_set_point_and_measurement():
 
 def test_the_set_point_of_a_pressure_regulator_is_in_the_panel_of_the_pressure():
     (panel,) = panels_of(("left.setpoint", "left.pressure"), {"left.setpoint": "Pa"}, ordered=True)
-    assert [(curve.label, curve.role) for curve in panel.curves] == [("left", ""), ("set point left", "set point")]
+    assert [(curve.label, curve.role) for curve in panel.curves] == [
+        ("left", ""),
+        ("set point left", "set point"),
+    ]
 
 
 def test_a_run_of_27_columns_of_a_joint_fits_on_a_page():
     time = np.linspace(0.0, 1.0, 5)
-    sides = [f"{side}.{q}" for side in ("left", "right") for q in ("pressure", "contraction", "force", "volume", "fill",
-             "mass_flow", "air_mass", "discharge", "temperature")]  # fmt: skip
-    loop = ["angle", "angular_speed", "angular_acceleration", "setpoint.angle", "measured.angle", "command.left.fill"]
+    sides = [
+        f"{side}.{q}"
+        for side in ("left", "right")
+        for q in (
+            "pressure",
+            "contraction",
+            "force",
+            "volume",
+            "fill",
+            "mass_flow",
+            "air_mass",
+            "discharge",
+            "temperature",
+        )
+    ]
+    loop = [
+        "angle",
+        "angular_speed",
+        "angular_acceleration",
+        "setpoint.angle",
+        "measured.angle",
+        "command.left.fill",
+    ]
     figure = am.Recording({"time": time, **dict.fromkeys((*sides, *loop), time)}, "joint").plot()
     assert len(figure.axes) <= 12
     assert figure.get_figheight() <= 9.0
@@ -193,8 +258,11 @@ def test_many_curves_are_named_by_colour_and_line_style():
     time = np.linspace(0.0, 1.0, 5)
     names = [f"m{i}.{quantity}" for i in range(6) for quantity in ("fill", "discharge")]
     (panel,) = am.Recording({"time": time, **dict.fromkeys(names, time)}, "arm").plot().axes
-    assert [text.get_text() for text in panel.get_legend().get_texts()] == [*(f"m{i}" for i in range(6)), "fill",
-                                                                            "discharge"]  # fmt: skip
+    assert [text.get_text() for text in panel.get_legend().get_texts()] == [
+        *(f"m{i}" for i in range(6)),
+        "fill",
+        "discharge",
+    ]
 
 
 def test_a_plot_shows_its_picture_as_the_last_line_of_a_cell(recording: am.Recording):
@@ -214,8 +282,13 @@ def test_a_kernel_shows_the_picture_and_the_card(tmp_path: Path):
         "import matplotlib.pyplot as plt\nfit.plot()",
     )
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in cells])
-    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
-    card, *plots = [[output["data"] for output in cell["outputs"] if "data" in output] for cell in notebook.cells]
+    nbclient.NotebookClient(
+        notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}
+    ).execute()
+    card, *plots = [
+        [output["data"] for output in cell["outputs"] if "data" in output]
+        for cell in notebook.cells
+    ]
     assert "<table" in card[0]["text/html"]
     for shown in plots:
         assert len(shown) == 1
@@ -234,7 +307,8 @@ def test_a_legend_is_inside_the_axes_of_a_caller(recording: am.Recording):
         )
         run.plot(ax=axes)
         figure.draw_without_rendering()
-        legend, box = axes.get_legend().get_window_extent(), axes.get_window_extent()
+        legend = axes.get_legend().get_window_extent()
+        box = axes.get_window_extent()
         assert (legend.x1 <= box.x1 + 1) == inside
         assert legend.x1 <= figure.bbox.x1
 
@@ -249,7 +323,10 @@ def test_a_pulsed_input_is_drawn_as_duty_cycle_and_envelope():
     assert len(means) <= 150
     assert np.mean(means[(middles > 0.05) & (middles < 1.9)]) == pytest.approx(0.3, rel=0.02)
     (envelope,) = axes.collections
-    assert (envelope.get_paths()[0].vertices[:, 1].min(), envelope.get_paths()[0].vertices[:, 1].max()) == (0.0, 1.0)
+    assert (
+        envelope.get_paths()[0].vertices[:, 1].min(),
+        envelope.get_paths()[0].vertices[:, 1].max(),
+    ) == (0.0, 1.0)
     for other in (np.sin(20.0 * time), np.zeros_like(time)):
         axes = am.Recording({"time": time, "fill": other}, "no pulses").plot().axes[0]
         assert len(axes.get_lines()[0].get_xdata()) == len(time)

@@ -1,5 +1,6 @@
-"""A prediction states what it does not know: rows without tension where the law pulls count as errors, and speeds, ranges,
-specimens and records that were not part of the fit are named with their numbers.
+"""A prediction states what it does not know: rows without tension where the law pulls count as
+errors, and speeds, ranges, specimens and records that were not part of the fit are named with their
+numbers.
 """
 
 from __future__ import annotations
@@ -24,13 +25,19 @@ from airmuscle.recording import Recording
 LAW = "chou-hannaford"
 
 
-def sweep(pressure: float = 3e5, seed: int = 1, rows: int = 300, top: float = 0.2, duration: float = 60.0) -> Recording:
+def sweep(
+    pressure: float = 3e5, seed: int = 1, rows: int = 300, top: float = 0.2, duration: float = 60.0
+) -> Recording:
     """A triangle of the length at constant pressure, with noise of 4 N."""
     contraction = np.interp(np.linspace(0.0, 2.0, rows), [0.0, 1.0, 2.0], [0.02, top, 0.02])
     force = am.load(LAW).characteristic.force(np.full(rows, pressure), contraction)
     columns = {"time": np.linspace(0.0, duration, rows), "pressure": np.full(rows, pressure)}
     noise = np.random.default_rng(seed).normal(0.0, 4.0, rows)
-    return Recording({**columns, "force": force + noise, "contraction": contraction}, "run", {"resting_length": 0.3})
+    return Recording(
+        {**columns, "force": force + noise, "contraction": contraction},
+        "run",
+        {"resting_length": 0.3},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +56,14 @@ def predicted(muscle: Path, record: Recording, tmp_path: Path, length: str = "30
     """The prediction of a record by the command, with the folder of its files."""
     write(record, tmp_path / "run.csv")
     done = airmuscle(
-        "predict", muscle, tmp_path / "run.csv", "--resting-length", length, "--out", tmp_path / "p", "--json"
+        "predict",
+        muscle,
+        tmp_path / "run.csv",
+        "--resting-length",
+        length,
+        "--out",
+        tmp_path / "p",
+        "--json",
     )
     assert done.exit_code == 0, done.stderr
     said = json.loads(done.stdout)
@@ -57,7 +71,9 @@ def predicted(muscle: Path, record: Recording, tmp_path: Path, length: str = "30
     return {**row, "notes": said["prediction_1"]["notes"]}
 
 
-def test_rows_without_tension_where_the_law_pulls_count_as_errors_outside_the_band(muscle, tmp_path):
+def test_rows_without_tension_where_the_law_pulls_count_as_errors_outside_the_band(
+    muscle, tmp_path
+):
     run = sweep()
     force = run["force"].copy()
     force[:60] = -6.7
@@ -72,9 +88,11 @@ def test_rows_without_tension_where_the_law_pulls_count_as_errors_outside_the_ba
 
 def test_rows_without_tension_where_the_law_is_slack_are_not_compared():
     run = sweep()
-    law, force = am.load(LAW).characteristic, run["force"].copy()
+    law = am.load(LAW).characteristic
+    force = run["force"].copy()
     slack = run.with_columns(
-        pressure=np.where(np.arange(300) < 60, 0.0, 3e5), force=np.where(np.arange(300) < 60, -2.0, force)
+        pressure=np.where(np.arange(300) < 60, 0.0, 3e5),
+        force=np.where(np.arange(300) < 60, -2.0, force),
     )
     prediction = predict_static(law, slack, half_width=8.0)
     assert int(prediction.quantities[0].compared.sum()) == 240
@@ -86,11 +104,15 @@ def test_a_faster_record_is_named_with_both_rates_in_terminal_report_and_csv(mus
     assert band.max_contraction_rate == pytest.approx(0.006, rel=0.02)
     record = predicted(muscle, sweep(duration=12.0), tmp_path)
     (note,) = record["notes"]
-    assert note.startswith("the record is faster than those of the fit: contraction changes by up to 3")
+    assert note.startswith(
+        "the record is faster than those of the fit: contraction changes by up to 3"
+    )
     assert "in the fit by 0.6" in note
     with (tmp_path / "p" / "data" / "predictions.csv").open(encoding="utf-8") as file:
         assert "faster than those of the fit" in file.read()
-    assert "faster than those of the fit" in (tmp_path / "p" / "report.html").read_text(encoding="utf-8")
+    assert "faster than those of the fit" in (tmp_path / "p" / "report.html").read_text(
+        encoding="utf-8"
+    )
     assert not predicted(muscle, sweep(), tmp_path)["notes"]
 
 
@@ -109,12 +131,21 @@ def test_another_length_than_that_of_one_muscle_has_no_band_and_says_so(muscle, 
     assert record["rows_within_the_band"] is None
     notes = " ".join(record["notes"])
     assert "specimen 200 mm was not measured (measured: 300 mm); the band is not known" in notes
-    done = airmuscle("predict", muscle, tmp_path / "run.csv", "--resting-length", "200 mm", "--out", tmp_path / "p")
+    done = airmuscle(
+        "predict",
+        muscle,
+        tmp_path / "run.csv",
+        "--resting-length",
+        "200 mm",
+        "--out",
+        tmp_path / "p",
+    )
     assert "not known for a specimen that was not measured" in " ".join(done.stdout.split())
 
 
 def test_the_rate_of_a_quantity_is_that_of_its_motion_and_not_of_its_noise():
-    time, rng = np.linspace(0.0, 10.0, 1001), np.random.default_rng(0)
+    time = np.linspace(0.0, 10.0, 1001)
+    rng = np.random.default_rng(0)
     ramp = Recording({"time": time, "pressure": 1e4 * time + rng.normal(0.0, 50.0, 1001)}, "ramp")
     assert rate_of_change(ramp, "pressure") == pytest.approx(1e4, rel=0.2)
     still = Recording({"time": time, "pressure": 3e5 + rng.normal(0.0, 50.0, 1001)}, "held")
@@ -125,13 +156,25 @@ def test_the_rate_of_a_quantity_is_that_of_its_motion_and_not_of_its_noise():
 @pytest.fixture(scope="module")
 def plants(tmp_path_factory) -> Path:
     """A plant fitted to one record and to three, and a further record of it."""
-    place, rng = tmp_path_factory.mktemp("dynamic"), np.random.default_rng(5)
+    place = tmp_path_factory.mktemp("dynamic")
+    rng = np.random.default_rng(5)
     command = tomllib.loads(STUDY)["input"]
     text = f"[input]\nfill = {command['fill']}\ndischarge = {command['discharge']}\n"
-    for name, conductance in (("a", 3e-9), ("b", 3.1e-9), ("c", 2.9e-9), ("later", 3.05e-9), ("far", 6e-9)):
-        truth = plant_table(HELD, exponent=1.25, conductance=conductance) + run_table("0.2 bar") + text
+    for name, conductance in (
+        ("a", 3e-9),
+        ("b", 3.1e-9),
+        ("c", 2.9e-9),
+        ("later", 3.05e-9),
+        ("far", 6e-9),
+    ):
+        truth = (
+            plant_table(HELD, exponent=1.25, conductance=conductance) + run_table("0.2 bar") + text
+        )
         (place / "truth.toml").write_text(truth, encoding="utf-8")
-        write(Recording(noisy_run(place / "truth.toml", rng, {"pressure": 500.0}), name), place / f"{name}.csv")
+        write(
+            Recording(noisy_run(place / "truth.toml", rng, {"pressure": 500.0}), name),
+            place / f"{name}.csv",
+        )
     start = plant_table(HELD, exponent=1.2, conductance=4e-9) + STUDY
     for name, files in (("one", "a"), ("three", "abc")):
         records = "".join(f'[[record]]\nfile = "{each}.csv"\n' for each in files)
@@ -142,11 +185,20 @@ def plants(tmp_path_factory) -> Path:
 
 
 def test_a_plant_of_one_record_states_no_band_for_another(plants, tmp_path):
-    done = airmuscle("predict", plants / "one" / "scenario.toml", plants / "later.csv", "--out", tmp_path, "--json")
+    done = airmuscle(
+        "predict",
+        plants / "one" / "scenario.toml",
+        plants / "later.csv",
+        "--out",
+        tmp_path,
+        "--json",
+    )
     (record,) = json.loads(done.stdout)["prediction"]["predictions"]
     assert record["rows_within_the_band"] is None
     assert record["band"] == "not known from one record"
-    said = airmuscle("predict", plants / "one" / "scenario.toml", plants / "later.csv", "--out", tmp_path)
+    said = airmuscle(
+        "predict", plants / "one" / "scenario.toml", plants / "later.csv", "--out", tmp_path
+    )
     assert "not known from one record" in " ".join(said.stdout.split())
 
 
@@ -154,14 +206,28 @@ def test_the_band_of_a_plant_of_three_records_is_that_of_the_records_left_out(pl
     uncertainty = load_scenario(plants / "three" / "scenario-1.toml").uncertainty
     assert uncertainty.records == 3
     assert 3.0 < uncertainty.factors["pressure"] <= 4.31
-    done = airmuscle("predict", plants / "three" / "scenario-1.toml", plants / "later.csv", "--out", tmp_path, "--json")
+    done = airmuscle(
+        "predict",
+        plants / "three" / "scenario-1.toml",
+        plants / "later.csv",
+        "--out",
+        tmp_path,
+        "--json",
+    )
     (record,) = json.loads(done.stdout)["prediction"]["predictions"]
     assert record["rows_within_the_band"] > 0.9
     assert "errors of 3 records, each predicted by the others" in record["band"]
 
 
 def test_a_record_of_a_plant_that_is_faster_than_those_of_the_fit_is_named(plants, tmp_path):
-    done = airmuscle("predict", plants / "three" / "scenario-1.toml", plants / "far.csv", "--out", tmp_path, "--json")
+    done = airmuscle(
+        "predict",
+        plants / "three" / "scenario-1.toml",
+        plants / "far.csv",
+        "--out",
+        tmp_path,
+        "--json",
+    )
     (record,) = json.loads(done.stdout)["prediction"]["predictions"]
     assert "the record is faster than those of the fit: pressure" in record["notes"]
 
@@ -172,7 +238,10 @@ def test_a_record_of_a_plant_that_is_faster_than_those_of_the_fit_is_named(plant
         ({"new_specimen_half_width": -1.0}, "new_specimen_half_width is -1"),
         ({"new_specimen_half_width": float("nan")}, "it must be finite"),
         ({"max_contraction_rate": float("inf")}, "it must be finite"),
-        ({"max_pressure_rate": -3.0}, "max_pressure_rate is -3; it must be finite and not negative"),
+        (
+            {"max_pressure_rate": -3.0},
+            "max_pressure_rate is -3; it must be finite and not negative",
+        ),
         ({"specimens": "A"}, "specimens is 'A'; it must be a list"),
         ({"resting_lengths": ["3 bar"]}, "cannot be converted to 'm'"),
         ({"specimen": ["A"]}, "Did you mean 'specimens'"),
@@ -196,7 +265,9 @@ def test_a_stated_band_with_a_number_that_is_none_is_refused(table, message):
         ("rates = { pressure = nan }", "must be finite"),
     ],
 )
-def test_an_uncertainty_of_a_plant_with_a_number_that_is_none_is_refused(plants, tmp_path, line, message):
+def test_an_uncertainty_of_a_plant_with_a_number_that_is_none_is_refused(
+    plants, tmp_path, line, message
+):
     text = (plants / "truth.toml").read_text(encoding="utf-8")
     (tmp_path / "s.toml").write_text(
         f"{text}\n[uncertainty]\ndeviations = {{ pressure = 500.0 }}\n{line}\n", encoding="utf-8"
@@ -207,24 +278,38 @@ def test_an_uncertainty_of_a_plant_with_a_number_that_is_none_is_refused(plants,
 
 def test_a_band_that_does_not_hold_is_said_with_the_likely_reason(muscle, tmp_path):
     def said(record: Recording) -> str:
-        (note,) = [note for note in predicted(muscle, record, tmp_path)["notes"] if "does not hold" in note]
+        (note,) = [
+            note for note in predicted(muscle, record, tmp_path)["notes"] if "does not hold" in note
+        ]
         return note
 
     shifted = said(sweep().with_columns(force=sweep()["force"] - 60.0))
     assert "is 60" in shifted or "is 59" in shifted
-    assert "too high on average; nothing recorded explains it; usual are another specimen" in shifted
+    assert (
+        "too high on average; nothing recorded explains it; usual are another specimen" in shifted
+    )
     far = sweep(top=0.26)
     beyond = far.with_columns(force=far["force"] + np.where(far["contraction"] > 0.201, 40.0, 0.0))
-    assert "too low on average; likely because of rows outside the range of the fit (inside it 9" in said(beyond)
+    assert (
+        "too low on average; likely because of rows outside the range of the fit (inside it 9"
+        in said(beyond)
+    )
     fast = sweep(duration=12.0)
-    assert "likely because of a faster motion" in said(fast.with_columns(force=fast["force"] + 30.0))
+    assert "likely because of a faster motion" in said(
+        fast.with_columns(force=fast["force"] + 30.0)
+    )
 
 
 def test_a_band_of_another_muscle_that_does_not_hold_names_the_difference():
-    law, other = am.load(LAW).characteristic, sweep().with_columns(force=sweep()["force"] + 40.0)
+    law = am.load(LAW).characteristic
+    other = sweep().with_columns(force=sweep()["force"] + 40.0)
     prediction = predict_static(law, other, half_width=8.0, differences=("another specimen",))
     assert "likely because of another specimen" in prediction.notes[-1]
 
 
 def test_a_band_that_holds_is_not_doubted(muscle, tmp_path):
-    assert not [note for note in predicted(muscle, sweep(seed=9), tmp_path)["notes"] if "does not hold" in note]
+    assert not [
+        note
+        for note in predicted(muscle, sweep(seed=9), tmp_path)["notes"]
+        if "does not hold" in note
+    ]

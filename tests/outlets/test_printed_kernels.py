@@ -1,4 +1,6 @@
-"""Kernels as text: the drivers that C, JavaScript and Octave print from the kernels compute the numbers of the kernels."""
+"""Kernels as text: the drivers that C, JavaScript and Octave print from the kernels compute the
+numbers of the kernels.
+"""
 
 from __future__ import annotations
 
@@ -22,32 +24,54 @@ from airmuscle.engine.compile.kernels.driven_inputs import DriverKind, apply_dri
 from airmuscle.errors import TraceError
 from airmuscle.outlets import C99, JavaScript, Octave, write_program
 
-CASES, CAPACITY, PIECES = 2000, 64, 5
-SIGNAL, TABLE = ("", "CAPACITY"), ("1", "4")
+CASES = 2000
+CAPACITY = 64
+PIECES = 5
+SIGNAL = ("", "CAPACITY")
+TABLE = ("1", "4")
 SHAPES = {
-    "columns": ("1", "3", "CAPACITY"), "scratch": ("2", "3", "CAPACITY"), "kinds": ("1", "2"),
-    **dict.fromkeys(("signal", "result", "events"), SIGNAL), **dict.fromkeys(("settings", "states", "later"), TABLE),
-}  # fmt: skip
+    "columns": ("1", "3", "CAPACITY"),
+    "scratch": ("2", "3", "CAPACITY"),
+    "kinds": ("1", "2"),
+    **dict.fromkeys(("signal", "result", "events"), SIGNAL),
+    **dict.fromkeys(("settings", "states", "later"), TABLE),
+}
 LANGUAGES = (CKernels(SHAPES), JavaScriptKernels(), MatlabKernels())
 FUNCTION = {DriverKind.MODULATOR: "pulse_width_modulation", DriverKind.SWITCH: "delayed_switch"}
 
 
 def random_case(rng):
-    """Kind, start, settings and state (4,) of a driver at random, and a signal (3, PIECES) from the start."""
-    kind, start = int(rng.integers(len(DriverKind))), float(rng.choice([0.0, rng.uniform(0, 5)]))
+    """Kind, start, settings and state (4,) of a driver at random, and a signal (3, PIECES) from the
+    start.
+    """
+    kind = int(rng.integers(len(DriverKind)))
+    start = float(rng.choice([0.0, rng.uniform(0, 5)]))
     ends = start + np.cumsum(rng.uniform(1e-4, 0.02, PIECES))
     values = rng.choice([0.0, 0.5, 1.0, rng.uniform()], PIECES)
-    slopes = np.where(rng.uniform(size=PIECES) < 0.5, 0.0, (rng.uniform(size=PIECES) - values) / 0.02)
+    slopes = np.where(
+        rng.uniform(size=PIECES) < 0.5, 0.0, (rng.uniform(size=PIECES) - values) / 0.02
+    )
     if kind == DriverKind.MODULATOR:
         frequency = rng.uniform(10, 200)
         begun = rng.integers(0, 3)
         settings = (frequency, rng.choice([0.0, 0.2 / frequency]), 0.0, 0.0)
-        state = (start - begun / frequency, begun, rng.choice([-np.inf, np.inf, start + rng.uniform(-0.01, 0.01)]), 0.0)
+        state = (
+            start - begun / frequency,
+            begun,
+            rng.choice([-np.inf, np.inf, start + rng.uniform(-0.01, 0.01)]),
+            0.0,
+        )
     else:
         settings = rng.choice([0.0, 1e-3, rng.uniform(0, 0.02)], 4)
         pending = rng.choice([np.inf, start + rng.uniform(0, 0.05)])
         state = (rng.integers(2), pending, rng.integers(2), rng.choice([0.0, 1.0, rng.uniform()]))
-    return kind, start, np.array(settings, dtype=float), np.array(state, dtype=float), np.array([ends, values, slopes])
+    return (
+        kind,
+        start,
+        np.array(settings, dtype=float),
+        np.array(state, dtype=float),
+        np.array([ends, values, slopes]),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,10 +87,14 @@ def expected(cases):
 
 
 def by_kernel(kind, start, settings, state, signal):
-    columns, scratch, counts = np.zeros((1, 3, CAPACITY)), np.zeros((2, 3, CAPACITY)), np.array([PIECES])
+    columns = np.zeros((1, 3, CAPACITY))
+    scratch = np.zeros((2, 3, CAPACITY))
+    counts = np.array([PIECES])
     columns[0, :, :PIECES], states = signal, state[None].copy()
     ulp = float(np.spacing(signal[0, -1]))
-    apply_drivers.py_func(np.array([[0, kind]]), settings[None], states, states, columns, counts, scratch, start, ulp)
+    apply_drivers.py_func(
+        np.array([[0, kind]]), settings[None], states, states, columns, counts, scratch, start, ulp
+    )
     return row(counts[0], states[0], columns[0])
 
 
@@ -79,7 +107,8 @@ def row(count, state, segments):
 
 def test_c_computes_what_the_kernels_compute(cases, expected, tmp_path):
     text = (
-        f"#include <math.h>\n#define CAPACITY {CAPACITY}\n{CKernels(SHAPES).text('driven_inputs', ['apply_drivers'])}"
+        "#include <math.h>\n#define CAPACITY"
+        f" {CAPACITY}\n{CKernels(SHAPES).text('driven_inputs', ['apply_drivers'])}"
     )
     text += """
 void drive(int kind, double start, double ulp, double *setting, double *state, double *column, double *scratch, int *count);
@@ -91,20 +120,33 @@ void drive(int kind, double start, double ulp, double *setting, double *state, d
                 (double (*)[3][CAPACITY])column, count, (double (*)[3][CAPACITY])scratch, start, ulp);
 }
 """
-    library, ctypes, found = printed.shared_library(text, tmp_path), printed.ctypes, []
+    library = printed.shared_library(text, tmp_path)
+    ctypes = printed.ctypes
+    found = []
     (tmp_path / "printed.cpp").write_text(text)
-    plus = [printed.require("g++"), "-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-c", "printed.cpp"]
+    plus = [
+        printed.require("g++"),
+        "-std=c++17",
+        "-Wall",
+        "-Wextra",
+        "-Werror",
+        "-pedantic",
+        "-c",
+        "printed.cpp",
+    ]
     printed.finished(plus, tmp_path)
     for kind, start, settings, state, signal in cases:
-        column, scratch, count, after = (
-            np.zeros((3, CAPACITY)),
-            np.zeros((2, 3, CAPACITY)),
-            ctypes.c_int(PIECES),
-            state.copy(),
-        )
+        column = np.zeros((3, CAPACITY))
+        scratch = np.zeros((2, 3, CAPACITY))
+        count = ctypes.c_int(PIECES)
+        after = state.copy()
         column[:, :PIECES] = signal
         arrays = [ctypes.c_void_p(a.ctypes.data) for a in (settings, after, column, scratch)]
-        numbers = ctypes.c_int(kind), ctypes.c_double(start), ctypes.c_double(float(np.spacing(signal[0, -1])))
+        numbers = (
+            ctypes.c_int(kind),
+            ctypes.c_double(start),
+            ctypes.c_double(float(np.spacing(signal[0, -1]))),
+        )
         library.drive(*numbers, *arrays, ctypes.byref(count))
         found.append(row(count.value, after, column))
     np.testing.assert_array_equal(found, expected)
@@ -113,7 +155,14 @@ void drive(int kind, double start, double ulp, double *setting, double *state, d
 def as_data(cases):
     """The cases as numbers that JSON can hold, with infinities as texts."""
     return [
-        [kind, start, float(np.spacing(signal[0, -1])), settings.tolist(), [str(x) for x in state], signal.tolist()]
+        [
+            kind,
+            start,
+            float(np.spacing(signal[0, -1])),
+            settings.tolist(),
+            [str(x) for x in state],
+            signal.tolist(),
+        ]
         for kind, start, settings, state, signal in cases
     ]
 
@@ -137,8 +186,9 @@ def test_octave_computes_what_the_kernels_compute(cases, expected, tmp_path):
     octave = printed.require("octave-cli")
     np.savetxt(
         tmp_path / "cases.txt",
-        [[c[0], c[1], np.spacing(c[4][0, -1]), *c[2], *c[3], *c[4].ravel()] for c in cases], fmt="%.17g",
-    )  # fmt: skip
+        [[c[0], c[1], np.spacing(c[4][0, -1]), *c[2], *c[3], *c[4].ravel()] for c in cases],
+        fmt="%.17g",
+    )
     script = f"""1;
 {MatlabKernels().text("driven_inputs", ["apply_drivers"])}
 cases = load('cases.txt');
@@ -151,7 +201,10 @@ end
 """
     (tmp_path / "drive.m").write_text(script)
     done = subprocess.run(
-        [octave, "--no-init-file", "--quiet", "drive.m"], cwd=tmp_path, capture_output=True, text=True
+        [octave, "--no-init-file", "--quiet", "drive.m"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr[:2000]
     rows = [np.array(line.split(), dtype=float) for line in done.stdout.splitlines()]
@@ -168,14 +221,19 @@ def test_every_kind_of_driver_is_printed_in_every_language(kind, language):
 
 def test_the_kernel_of_drivers_calls_a_function_for_each_kind():
     kernel = read_kernels("driven_inputs")["apply_drivers"]
-    assert {name for name, module in kernel.imported.items() if module == "drivers"} == set(FUNCTION.values())
+    assert {name for name, module in kernel.imported.items() if module == "drivers"} == set(
+        FUNCTION.values()
+    )
     assert set(FUNCTION) == set(DriverKind)
 
 
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("x = [i for i in range(3)]", "wrong.py, line 2, f: the expression ListComp has no printed form: `"),
+        (
+            "x = [i for i in range(3)]",
+            "wrong.py, line 2, f: the expression ListComp has no printed form: `",
+        ),
         ("x = a % 2", "line 2, f: the operator Mod has no printed form: `a % 2`"),
         ("x = open(a)", "line 2, f: the function open has no printed form"),
         ("for i in range(4, 1, -1): x = 1", "line 2, f: a range with a step has no printed form"),
@@ -196,13 +254,19 @@ def test_a_construct_without_printed_form_is_named_with_file_and_line(line, mess
 
 
 def test_a_conditional_value_within_an_expression_has_no_form_in_matlab():
-    kernel = typed(read_text("def f(a, b):\n    return a + (1.0 if b > 0.0 else 2.0)\n", "wrong.py")["f"], {})
-    with pytest.raises(TraceError, match=r"line 2, f: a conditional value that does not stand alone in an assignment"):
+    kernel = typed(
+        read_text("def f(a, b):\n    return a + (1.0 if b > 0.0 else 2.0)\n", "wrong.py")["f"], {}
+    )
+    with pytest.raises(
+        TraceError,
+        match=r"line 2, f: a conditional value that does not stand alone in an assignment",
+    ):
         MatlabKernels().printed({"f": kernel})
 
 
 @pytest.mark.parametrize(
-    "expression", ["a - (b - 1.0)", "a / (b * 3.0)", "-(a + b) * 2.0", "a - b - 1.0", "int(a - 0.5)"]
+    "expression",
+    ["a - (b - 1.0)", "a / (b * 3.0)", "-(a + b) * 2.0", "a - b - 1.0", "int(a - 0.5)"],
 )
 @pytest.mark.parametrize("language", LANGUAGES, ids=lambda language: type(language).__name__)
 def test_the_order_of_operations_is_kept(expression, language):

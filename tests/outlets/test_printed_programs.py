@@ -1,6 +1,8 @@
-"""Printed programs: the same instructions in C99, JavaScript and MATLAB text give the numbers of the library.
+"""Printed programs: the same instructions in C99, JavaScript and MATLAB text give the numbers of
+the library.
 
-Scale of a deviation: the greatest value that the rate, or the element of the Jacobian, has among the points.
+Scale of a deviation: the greatest value that the rate, or the element of the Jacobian, has among
+the points.
 """
 
 from __future__ import annotations
@@ -19,16 +21,28 @@ from airmuscle.engine.compile import compile_system, derivatives, functions
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.ir.interpreter import InterpretedBody
 from airmuscle.engine.compile.llvm.jit import engine_of, object_code
-from airmuscle.engine.compile.text.languages import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
+from airmuscle.engine.compile.text.languages import (
+    DEFINITION,
+    CLanguage,
+    JavaScriptLanguage,
+    MatlabLanguage,
+)
 from airmuscle.errors import TraceError
 
 SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tank and regulator")
-"""Plants with every kind of block: valves that are shut, clamps, selections, a spool, several coordinates."""
+"""Plants with every kind of block: valves that are shut, clamps, selections, a spool, several
+coordinates.
+"""
 SMALL_DIFFERENCES = (
-    "vessel", "three positions through a tube", "manifold on tank and regulator", "stop, lagging wall",
+    "vessel",
+    "three positions through a tube",
+    "manifold on tank and regulator",
+    "stop, lagging wall",
     "two pressure regulators on a tank",
-)  # fmt: skip
-ALL = [pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES]
+)
+ALL = [
+    pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES
+]
 JAVASCRIPT = """
 import * as M from "./models.mjs";
 import {readFileSync} from "fs";
@@ -55,10 +69,12 @@ def c_values(plant, states, inputs, folder, kind=np.float64):
     number = "double" if kind is np.float64 else "float"
     text, sizes = functions.system_module(traced(plant), CLanguage(number, public=None))
     library = printed.shared_library("#include <math.h>\n" + text, folder, number, "-O0")
-    c, rows = np.zeros(sizes.held + 1, kind), []
+    c = np.zeros(sizes.held + 1, kind)
+    rows = []
     printed.call(library.prepare, compile_system(plant).parameters, c, kind=kind)
     for x, u in zip(states, inputs, strict=True):
-        f, j = np.zeros(sizes.states, kind), np.zeros(sizes.jacobian + 1, kind)
+        f = np.zeros(sizes.states, kind)
+        j = np.zeros(sizes.jacobian + 1, kind)
         printed.call(library.jac, x, np.append(u, 0.0), c, f, j, kind=kind)
         rows.append(np.concatenate([f, j[: sizes.jacobian]]))
     return np.array(rows, dtype=float)
@@ -74,7 +90,9 @@ def test_c_gives_the_rates_and_slopes_of_the_library(name, tmp_path):
 
 @pytest.mark.parametrize("name", ALL)
 def test_single_precision_c_gives_the_rates_to_one_part_in_100_000(name, tmp_path):
-    """Where a small difference of pressures or volumes gives a rate, rounding of the state has a greater effect."""
+    """Where a small difference of pressures or volumes gives a rate, rounding of the state has a
+    greater effect.
+    """
     plant = plants.EXAMPLES[name]
     states, inputs = printed.points_of(plant)
     n = len(plant.states)
@@ -87,16 +105,25 @@ def test_single_precision_c_gives_the_rates_to_one_part_in_100_000(name, tmp_pat
 
 
 def rounding_effect(plant, states, inputs):
-    """Greatest change (n,) of each rate if every state is rounded to single precision: |J| |x| 2^-24."""
+    """Greatest change (n,) of each rate if every state is rounded to single precision: |J| |x|
+    2^-24.
+    """
     ready = compile_system(plant)
     slopes = [derivatives(ready, x, u).rates_by_state for x, u in zip(states, inputs, strict=True)]
-    return np.max([np.abs(j) @ np.abs(x) for j, x in zip(slopes, states, strict=True)], axis=0) * 2.0**-24
+    return (
+        np.max([np.abs(j) @ np.abs(x) for j, x in zip(slopes, states, strict=True)], axis=0)
+        * 2.0**-24
+    )
 
 
-@pytest.mark.parametrize("names", [SOME, pytest.param(tuple(plants.EXAMPLES), marks=pytest.mark.slow)], ids=len)
+@pytest.mark.parametrize(
+    "names", [SOME, pytest.param(tuple(plants.EXAMPLES), marks=pytest.mark.slow)], ids=len
+)
 def test_javascript_gives_the_rates_and_slopes_of_the_library(names, tmp_path):
     printed.require("node")
-    modules, data, expected = [], {}, {}
+    modules = []
+    data = {}
+    expected = {}
     for i, name in enumerate(names):
         plant = plants.EXAMPLES[name]
         text, sizes = functions.system_module(traced(plant), JavaScriptLanguage(f"m{i}_"))
@@ -104,12 +131,20 @@ def test_javascript_gives_the_rates_and_slopes_of_the_library(names, tmp_path):
         modules.append(text)
         expected[name] = printed.library_values(plant, states, inputs)
         data[name] = {
-            "prefix": f"m{i}_", "parameters": compile_system(plant).parameters.tolist(), "held": sizes.held,
-            "jacobian": sizes.jacobian, "states": states.tolist(), "inputs": inputs.tolist(),
-        }  # fmt: skip
+            "prefix": f"m{i}_",
+            "parameters": compile_system(plant).parameters.tolist(),
+            "held": sizes.held,
+            "jacobian": sizes.jacobian,
+            "states": states.tolist(),
+            "inputs": inputs.tolist(),
+        }
     (tmp_path / "models.mjs").write_text("\n".join(modules))
     found = printed.run_node(JAVASCRIPT, data, tmp_path)
-    assert {name: d for name in names if not (d := printed.deviation(found[name], expected[name])) < 1e-12} == {}
+    assert {
+        name: d
+        for name in names
+        if not (d := printed.deviation(found[name], expected[name])) < 1e-12
+    } == {}
 
 
 def octave(script, folder):
@@ -138,21 +173,55 @@ def test_octave_gives_the_rates_and_slopes_of_the_library(name, tmp_path):
         f"[f, J] = jac({column(x)}, {column([*u, 0.0])}, c); printf('%.17g ', f, J); printf('\\n');"
         for x, u in zip(states, inputs, strict=True)
     ]
-    script = "\n".join(["1;", DEFINITION, text, f"c = prepare({column(compile_system(plant).parameters)});", *calls])
+    script = "\n".join(
+        [
+            "1;",
+            DEFINITION,
+            text,
+            f"c = prepare({column(compile_system(plant).parameters)});",
+            *calls,
+        ]
+    )
     found = np.array([row.split() for row in octave(script, tmp_path).splitlines()], dtype=float)
     assert printed.deviation(found, printed.library_values(plant, states, inputs)) < 1e-12
 
 
-OF_TWO = {o for o in Operation if o.name in (
-    "ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "POWER", "CONSTANT_POWER", "FMIN", "FMAX", "LESS", "LESS_EQUAL", "EQUAL",
-    "NOT_EQUAL", "AND", "OR", "MASK", "MAXIMUM", "MINIMUM",
-)}  # fmt: skip
+OF_TWO = {
+    o
+    for o in Operation
+    if o.name
+    in (
+        "ADD",
+        "SUBTRACT",
+        "MULTIPLY",
+        "DIVIDE",
+        "POWER",
+        "CONSTANT_POWER",
+        "FMIN",
+        "FMAX",
+        "LESS",
+        "LESS_EQUAL",
+        "EQUAL",
+        "NOT_EQUAL",
+        "AND",
+        "OR",
+        "MASK",
+        "MAXIMUM",
+        "MINIMUM",
+    )
+}
 EVERY = tuple(o for o in Operation if o is not Operation.ASSIGN)
-POINTS = [(a, b, 7.0) for a in (-2.5, -1.0, -0.3, 0.0, 0.3, 1.0, 2.5) for b in (-1.5, -1.0, 0.0, 0.5, 1.0, 3.0)]
+POINTS = [
+    (a, b, 7.0)
+    for a in (-2.5, -1.0, -0.3, 0.0, 0.3, 1.0, 2.5)
+    for b in (-1.5, -1.0, 0.0, 0.5, 1.0, 3.0)
+]
 
 
 def every_operation(language):
-    """The text of a function f(x, y): every operation of an instruction list, with the operands x1, x2 and x3."""
+    """The text of a function f(x, y): every operation of an instruction list, with the operands x1,
+    x2 and x3.
+    """
     block = language.body()
     x = [block.load("x", i) for i in range(3)]
     for i, operation in enumerate(EVERY):
@@ -165,7 +234,9 @@ def every_operation(language):
 def operation_values():
     """The values of every operation at every point, by the machine code of the library."""
     engine = engine_of(object_code(every_operation(functions.LLVM)))
-    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("f"))
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(
+        engine.get_function_address("f")
+    )
     rows = np.empty((len(POINTS), len(EVERY)))
     for row, point in zip(rows, POINTS, strict=True):
         x = np.array(point)
@@ -180,7 +251,9 @@ def check_operations(found, expected):
 
 
 def test_every_operation_means_the_same_in_c(operation_values, tmp_path):
-    library = printed.shared_library("#include <math.h>\n" + every_operation(CLanguage(public=None)), tmp_path)
+    library = printed.shared_library(
+        "#include <math.h>\n" + every_operation(CLanguage(public=None)), tmp_path
+    )
     rows = np.empty_like(operation_values)
     for row, point in zip(rows, POINTS, strict=True):
         printed.call(library.f, point, row)
@@ -189,16 +262,24 @@ def test_every_operation_means_the_same_in_c(operation_values, tmp_path):
 
 def test_every_operation_means_the_same_in_javascript(operation_values, tmp_path):
     rows = [list(point) for point in POINTS]
-    results = f"{rows}.map((x) => {{ const y = new Array({len(EVERY)}); f(x, y); return y.map(String); }})"
+    results = (
+        f"{rows}.map((x) => {{ const y = new Array({len(EVERY)}); f(x, y); return"
+        " y.map(String); })"
+    )
     module = f"{every_operation(JavaScriptLanguage())}console.log(JSON.stringify({results}));\n"
-    found = [[number.replace("Infinity", "inf") for number in row] for row in printed.run_node(module, {}, tmp_path)]
+    found = [
+        [number.replace("Infinity", "inf") for number in row]
+        for row in printed.run_node(module, {}, tmp_path)
+    ]
     check_operations(found, operation_values)
 
 
 def test_every_operation_means_the_same_in_octave(operation_values, tmp_path):
     calls = [f"printf('%.17g ', f({column(p)})); printf('\\n');" for p in POINTS]
     script = "\n".join(["1;", DEFINITION, every_operation(MatlabLanguage()), *calls])
-    check_operations([row.split() for row in octave(script, tmp_path).splitlines()], operation_values)
+    check_operations(
+        [row.split() for row in octave(script, tmp_path).splitlines()], operation_values
+    )
 
 
 @pytest.mark.parametrize(
@@ -206,7 +287,10 @@ def test_every_operation_means_the_same_in_octave(operation_values, tmp_path):
 )
 def test_constants_are_read_back_as_they_were(language):
     body = language.body()
-    texts = [body.constant(value) for value in (0.0, -0.0, 1.0, -2.5, 1e300, 5e-324, math.inf, -math.inf, math.nan)]
+    texts = [
+        body.constant(value)
+        for value in (0.0, -0.0, 1.0, -2.5, 1e300, 5e-324, math.inf, -math.inf, math.nan)
+    ]
     if language == CLanguage("float"):
         assert texts[:4] == ["0.0f", "(-0.0f)", "1.0f", "(-2.5f)"]
         assert texts[4:6] == ["INFINITY", "0.0f"]
@@ -225,15 +309,21 @@ class Unknown(enum.Enum):
     ERF = -1
 
 
-@pytest.mark.parametrize("language", [functions.LLVM, CLanguage(), JavaScriptLanguage(), MatlabLanguage()], ids=repr)
+@pytest.mark.parametrize(
+    "language", [functions.LLVM, CLanguage(), JavaScriptLanguage(), MatlabLanguage()], ids=repr
+)
 def test_an_operation_without_a_form_is_refused(language):
-    with pytest.raises(TraceError, match=r"ERF has no [A-Za-z]+ form; write the law over airmuscle\.core\.ops"):
+    with pytest.raises(
+        TraceError, match=r"ERF has no [A-Za-z]+ form; write the law over airmuscle\.core\.ops"
+    ):
         language.body().operate(Unknown.ERF, ["x"])
 
 
 def test_the_text_is_the_same_every_time():
     texts = {
-        functions.system_module(functions.trace_system(plants.EXAMPLES["dmsp-20-300"]), CLanguage())[0]
+        functions.system_module(
+            functions.trace_system(plants.EXAMPLES["dmsp-20-300"]), CLanguage()
+        )[0]
         for _ in range(2)
     }
     assert len(texts) == 1
@@ -254,7 +344,9 @@ def test_the_text_is_the_same_every_time():
     ],
     ids=str,
 )
-def test_the_interpreter_gives_infinity_or_nan_where_the_c_library_does(operation, arguments, result):
+def test_the_interpreter_gives_infinity_or_nan_where_the_c_library_does(
+    operation, arguments, result
+):
     body = InterpretedBody({"x": arguments})
     body.store("y", 0, body.operate(operation, [body.load("x", i) for i in range(len(arguments))]))
     assert body.stored["y", 0] == pytest.approx(result, nan_ok=True)

@@ -1,7 +1,9 @@
-"""Figures of a fit to isometric ramps: force over pressure by contraction and length, and titles of any length.
+"""Figures of a fit to isometric ramps: force over pressure by contraction and length, and titles of
+any length.
 
-The pressures of isobars are round where the pressure was swept. The names of many files are abridged in figures, in the
-muscle file and in the report. Many markers are an image in SVG files, whose size they would multiply.
+The pressures of isobars are round where the pressure was swept. The names of many files are
+abridged in figures, in the muscle file and in the report. Many markers are an image in SVG files,
+whose size they would multiply.
 """
 
 from __future__ import annotations
@@ -27,16 +29,23 @@ from airmuscle.physics.muscle.isobars import isobar_figure
 from airmuscle.recording import Recording
 
 pytestmark = pytest.mark.drawn
-LENGTHS, CONTRACTIONS = (0.083, 0.182, 0.382), (0.0, 0.04, 0.08, 0.12)
+LENGTHS = (0.083, 0.182, 0.382)
+CONTRACTIONS = (0.0, 0.04, 0.08, 0.12)
 
 
 def a_ramp(length: float, contraction: float) -> Recording:
-    """A ramp up and down with one row before the valve opens, as pulsed valves give it; numbers are chosen."""
+    """A ramp up and down with one row before the valve opens, as pulsed valves give it; numbers are
+    chosen.
+    """
     scatter = np.random.default_rng(int(1e6 * (length + contraction))).uniform(-4e3, 4e3, 120)
     up = np.linspace(60e3, 620e3, 60)
     pressure = np.concatenate([[8180.0], np.concatenate([up, up[::-1]]) + scatter])
     force = np.maximum(0.0, 6e-4 * pressure * (1.0 - 6.0 * contraction) * (1.0 + length) - 20.0)
-    columns = {"pressure": pressure, "contraction": np.full(pressure.size, contraction), "force": force}
+    columns = {
+        "pressure": pressure,
+        "contraction": np.full(pressure.size, contraction),
+        "force": force,
+    }
     name = f"rig_cut{100 * length:.1f}cm_held{100 * length * (1 - contraction):.3f}cm.csv"
     return Recording(columns, name, {"resting_length": length})
 
@@ -52,22 +61,32 @@ def fitted(ramps: list[Recording]) -> Fit:
 
 
 def an_entry(fitted: Fit) -> Entry:
-    return Entry("muscle", "Ramps", "fitted", fitted.model, None, validity_range=fitted.validity_range)
+    return Entry(
+        "muscle", "Ramps", "fitted", fitted.model, None, validity_range=fitted.validity_range
+    )
 
 
 def texts(figure: Any) -> str:
-    return " ".join(t.get_text() for axes in figure.axes for t in (axes.get_legend() or axes).findobj(match=is_text))
+    return " ".join(
+        t.get_text()
+        for axes in figure.axes
+        for t in (axes.get_legend() or axes).findobj(match=is_text)
+    )
 
 
 def is_text(artist: Any) -> bool:
     return hasattr(artist, "get_text")
 
 
-def test_ramps_are_drawn_as_force_over_pressure_for_each_contraction_and_length(fitted: Fit) -> None:
+def test_ramps_are_drawn_as_force_over_pressure_for_each_contraction_and_length(
+    fitted: Fit,
+) -> None:
     plot = ramp_plot(fitted)
     assert plot is not None
     panels = [axes for axes in plot.draw().axes if axes.get_visible()]
-    assert [axes.get_title() for axes in panels] == [f"resting length {1e3 * x:.4g} mm" for x in LENGTHS]
+    assert [axes.get_title() for axes in panels] == [
+        f"resting length {1e3 * x:.4g} mm" for x in LENGTHS
+    ]
     for axes in panels:
         assert axes.get_xlabel() == "gauge pressure [kPa]"
         labels = [text.get_text() for text in axes.get_legend().get_texts()]
@@ -84,7 +103,9 @@ def test_the_curve_of_a_ramp_is_the_force_of_the_law_at_its_contraction(fitted: 
     assert curve.get_ydata() == pytest.approx(expected)
 
 
-def test_isobars_of_ramps_have_round_pressures_and_neither_the_first_row_nor_a_median(fitted: Fit) -> None:
+def test_isobars_of_ramps_have_round_pressures_and_neither_the_first_row_nor_a_median(
+    fitted: Fit,
+) -> None:
     plots = {plot.name: plot for plot in fit_chapter(fitted, an_entry(fitted)).plots}
     labels = texts(plots["isobars"].draw())
     assert "100 kPa" in labels
@@ -108,16 +129,29 @@ def test_a_ramp_beside_one_level_has_no_level_at_its_median() -> None:
 
 
 def test_points_at_levels_of_pressure_have_no_figure_of_ramps() -> None:
-    pressure, contraction = (grid.ravel() for grid in np.meshgrid([1e5, 2e5, 3e5, 4e5], np.linspace(0, 0.1, 6)))
-    columns = {"pressure": pressure, "contraction": contraction, "force": 1e-3 * pressure * (1.0 - 3.0 * contraction)}
-    assert ramp_plot(fit(ContractileSurface.blank(1, max_force=1e3), Recording(columns, "points"))) is None
+    pressure, contraction = (
+        grid.ravel() for grid in np.meshgrid([1e5, 2e5, 3e5, 4e5], np.linspace(0, 0.1, 6))
+    )
+    columns = {
+        "pressure": pressure,
+        "contraction": contraction,
+        "force": 1e-3 * pressure * (1.0 - 3.0 * contraction),
+    }
+    assert (
+        ramp_plot(fit(ContractileSurface.blank(1, max_force=1e3), Recording(columns, "points")))
+        is None
+    )
 
 
-def test_a_title_of_many_file_names_leaves_the_axes_their_place(fitted: Fit, tmp_path: Path) -> None:
+def test_a_title_of_many_file_names_leaves_the_axes_their_place(
+    fitted: Fit, tmp_path: Path
+) -> None:
     title = "Law fitted to " + ", ".join(f"festo10_cut40cm_held38.2cm_test{i}" for i in range(24))
     entry = an_entry(fitted)
     curves = compute_isobars(fitted.model, entry.validity_range)
-    figure = isobar_figure(fitted.model, title, curves, entry.validity_range, measured=fitted.recording)
+    figure = isobar_figure(
+        fitted.model, title, curves, entry.validity_range, measured=fitted.recording
+    )
     save(figure, tmp_path / "isobars.png")
     assert figure.axes[0].get_position().height > 0.6
     assert figure.axes[0].get_position().width > 0.5
@@ -129,14 +163,25 @@ def test_file_names_are_abridged_beyond_three() -> None:
     assert len(list_files(["x" * 300])) <= 61
 
 
-def test_the_muscle_file_of_many_recordings_has_a_short_title_and_note(tmp_path: Path, ramps: list[Recording]) -> None:
+def test_the_muscle_file_of_many_recordings_has_a_short_title_and_note(
+    tmp_path: Path, ramps: list[Recording]
+) -> None:
     paths = []
     for run in ramps:
         paths.append(tmp_path / run.origin)
         rows = zip(run["pressure"], run["contraction"], run["force"], strict=True)
         lines = [f"{p / 1e3},{c},{f}" for p, c, f in rows]
-        paths[-1].write_text("pressure [kPa],contraction [1],force [N]\n" + "\n".join(lines), encoding="utf-8")
-    options = ["--characteristic", "ContractileSurface", "--degree", "2", "--out", str(tmp_path / "fit")]
+        paths[-1].write_text(
+            "pressure [kPa],contraction [1],force [N]\n" + "\n".join(lines), encoding="utf-8"
+        )
+    options = [
+        "--characteristic",
+        "ContractileSurface",
+        "--degree",
+        "2",
+        "--out",
+        str(tmp_path / "fit"),
+    ]
     result = airmuscle("fit", *map(str, paths), *options)
     assert result.exit_code == 0, result.output
     muscle = tomllib.loads((tmp_path / "fit" / "muscle.toml").read_text(encoding="utf-8"))
@@ -146,7 +191,9 @@ def test_the_muscle_file_of_many_recordings_has_a_short_title_and_note(tmp_path:
     assert load(tmp_path / "fit" / "muscle.toml").title == muscle["title"]
 
 
-@pytest.mark.parametrize(("count", "image"), [(MAX_VECTOR_MARKERS // 10, False), (MAX_VECTOR_MARKERS + 1, True)])
+@pytest.mark.parametrize(
+    ("count", "image"), [(MAX_VECTOR_MARKERS // 10, False), (MAX_VECTOR_MARKERS + 1, True)]
+)
 def test_many_markers_are_an_image_and_few_are_vectors(count, image):
     figure, axes = new_figure()
     axes.plot(np.arange(count), np.arange(count) % 7, "o")

@@ -1,5 +1,6 @@
-"""Large binary files are read by pieces: the kept rows are those of the whole file, and what is requested at once is
-bounded, of HDF5 and MDF to a piece of a column, of MAT before version 7.3 to a variable.
+"""Large binary files are read by pieces: the kept rows are those of the whole file, and what is
+requested at once is bounded, of HDF5 and MDF to a piece of a column, of MAT before version 7.3 to a
+variable.
 """
 
 from __future__ import annotations
@@ -24,9 +25,11 @@ FORCE = 100.0 + 50.0 * np.sin(TIME)
 
 def hdf5(path: Path, rows: int = ROWS) -> Path:
     with h5py.File(path, "w") as file:
-        file["time_s"], file["force_N"] = TIME[:rows], FORCE[:rows]
+        file["time_s"] = TIME[:rows]
+        file["force_N"] = FORCE[:rows]
         records = np.zeros(rows, dtype=[("time_s", float), ("force_N", float)])
-        records["time_s"], records["force_N"] = TIME[:rows], FORCE[:rows]
+        records["time_s"] = TIME[:rows]
+        records["force_N"] = FORCE[:rows]
         file["log"] = records
     return path
 
@@ -56,15 +59,21 @@ def mat_7_3(path: Path) -> Path:
 def mat_5(path: Path) -> Path:
     scipy_io = pytest.importorskip("scipy.io")
     run = {"time_s": TIME, "force_N": FORCE}
-    scipy_io.savemat(path, {"run": run, "pressure_kPa": FORCE, "resting_length_mm": 300.0}, do_compression=True)
+    scipy_io.savemat(
+        path, {"run": run, "pressure_kPa": FORCE, "resting_length_mm": 300.0}, do_compression=True
+    )
     return path
 
 
 def mdf(path: Path) -> Path:
     asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed")
     with asammdf.MDF(version="4.10") as file:
-        file.append([asammdf.Signal(FORCE, TIME, name="force", unit="N"),
-                     asammdf.Signal((FORCE > 100.0).astype(int), TIME, name="fill", unit="1")])  # fmt: skip
+        file.append(
+            [
+                asammdf.Signal(FORCE, TIME, name="force", unit="N"),
+                asammdf.Signal((FORCE > 100.0).astype(int), TIME, name="fill", unit="1"),
+            ]
+        )
         file.save(path, overwrite=True)
     return path
 
@@ -85,7 +94,9 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
         return FORCE[first:end]
 
     np.testing.assert_allclose(
-        pieces.Reduction(downsampling(size), ROWS).read(get, ROWS), downsampling().reduce(FORCE, step), rtol=1e-12
+        pieces.Reduction(downsampling(size), ROWS).read(get, ROWS),
+        downsampling().reduce(FORCE, step),
+        rtol=1e-12,
     )
     assert step == 1 or max(requested) <= max(900, step)
 
@@ -93,16 +104,32 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
 @pytest.mark.parametrize(
     ("name", "write", "reader"),
     [
-        ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/log", d)),
+        (
+            "run.h5",
+            hdf5,
+            lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/log", d),
+        ),
         ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/", d)),
-        ("run.mat", mat_7_3, lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d)),
+        (
+            "run.mat",
+            mat_7_3,
+            lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d),
+        ),
         ("run.mat", mat_5, lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d)),
-        ("run.mf4", mdf, lambda path, d: raw_mdf_tdms_ros.read_mdf_tables.__wrapped__(path, None, d)),
+        (
+            "run.mf4",
+            mdf,
+            lambda path, d: raw_mdf_tdms_ros.read_mdf_tables.__wrapped__(path, None, d),
+        ),
     ],
 )
-def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(tmp_path, small_pieces, name, write, reader):
+def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(
+    tmp_path, small_pieces, name, write, reader
+):
     (table,) = reader(write(tmp_path / name), Decimation(1000))
-    columns = dict(zip([heading.partition(" ")[0] for heading in table.headings], table.columns, strict=True))
+    columns = dict(
+        zip([heading.partition(" ")[0] for heading in table.headings], table.columns, strict=True)
+    )
     step = 11
     force = next(values for key, values in columns.items() if key.startswith("force"))
     np.testing.assert_array_equal(force, FORCE[::step])
@@ -114,13 +141,17 @@ def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(tmp_path, smal
 
 
 def test_a_reading_of_the_user_is_reduced_as_well(tmp_path):
-    (recording,) = read(hdf5(tmp_path / "run.h5"), ColumnMapping(group="/log"), downsampling=Decimation(500))
+    (recording,) = read(
+        hdf5(tmp_path / "run.h5"), ColumnMapping(group="/log"), downsampling=Decimation(500)
+    )
     assert len(recording) == 477
     assert recording["force"][1] == FORCE[21]
     assert recording["time"][-1] == TIME[::21][-1]
 
 
-def test_a_matrix_texts_and_constants_and_cells_of_a_large_matlab_file_are_kept(tmp_path, small_pieces):
+def test_a_matrix_texts_and_constants_and_cells_of_a_large_matlab_file_are_kept(
+    tmp_path, small_pieces
+):
     large = read_contents(mat_7_3(tmp_path / "run.mat"), Decimation(1000))
     np.testing.assert_array_equal(large.variables["data"], np.stack([TIME, FORCE]).T[::11])
     assert large.variables["resting_length_mm"] == 300.0
@@ -153,7 +184,8 @@ def test_a_file_of_fewer_rows_is_read_as_a_whole(tmp_path):
 
 def test_lengths_that_the_reduction_would_hide_are_refused(tmp_path):
     with h5py.File(tmp_path / "run.h5", "w") as file:
-        file["time_s"], file["force_N"] = TIME[:10_000], FORCE[:9_999]
+        file["time_s"] = TIME[:10_000]
+        file["force_N"] = FORCE[:9_999]
     with pytest.raises(ColumnError, match=r"different lengths \(9999, 10000 rows\)"):
         raw_columnar.read_hdf5_tables.__wrapped__(tmp_path / "run.h5", None, Decimation(1000))
 
@@ -180,9 +212,10 @@ print(len(table.rows), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - befo
 
 @pytest.mark.slow
 def test_the_memory_for_a_matlab_file_of_320_megabytes_is_that_of_a_piece(tmp_path):
-    """In a process of its own, after a small file, so that the packages are loaded: resident memory grows by less than a
-    quarter of the file."""
-    small, path = mat_7_3(tmp_path / "small.mat"), tmp_path / "large.mat"
+    """In a process of its own, after a small file, so that the packages are loaded: resident memory
+    grows by less than a quarter of the file."""
+    small = mat_7_3(tmp_path / "small.mat")
+    path = tmp_path / "large.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name in ("time_s", "force_N"):
             data = file.create_dataset(name, shape=(1, 20_000_000), dtype=float)
@@ -191,7 +224,9 @@ def test_the_memory_for_a_matlab_file_of_320_megabytes_is_that_of_a_piece(tmp_pa
                 data[0, first : first + 1_000_000] = np.arange(first, first + 1_000_000) * 1e-3
     with path.open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM")
-    done = subprocess.run([sys.executable, "-c", MEASURE, path, small], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE, path, small], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     rows, grown = map(int, done.stdout.split())
     assert rows == 10_000

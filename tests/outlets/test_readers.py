@@ -1,7 +1,7 @@
 """Readers of laboratory files: the same run gives the same Recording in every file format.
 
-A mapping states what a file does not. A file that cannot be read, or that contradicts another file, is rejected with its
-name. Very long files are downsampled in bounded memory, with a note.
+A mapping states what a file does not. A file that cannot be read, or that contradicts another file,
+is rejected with its name. Very long files are downsampled in bounded memory, with a note.
 """
 
 from __future__ import annotations
@@ -28,7 +28,14 @@ from airmuscle.bench.readers import (
     seconds_from_clock,
     separate_process,
 )
-from airmuscle.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
+from airmuscle.errors import (
+    AirmuscleWarning,
+    ColumnError,
+    FileError,
+    InputError,
+    ParameterError,
+    UnitError,
+)
 from airmuscle.recording import Recording
 
 TIME = np.arange(40) * 0.05
@@ -41,7 +48,12 @@ HEADINGS = ("time [s]", "pressure [kPa]", "length [mm]", "force [N]")
 
 def same(recording: Recording, extra: tuple[str, ...] = ()) -> None:
     assert set(recording) == {"time", "pressure", "length", "force", *extra}
-    for name, values in {"time": TIME, "pressure": PRESSURE * 1e3, "length": LENGTH / 1e3, "force": FORCE}.items():
+    for name, values in {
+        "time": TIME,
+        "pressure": PRESSURE * 1e3,
+        "length": LENGTH / 1e3,
+        "force": FORCE,
+    }.items():
         assert recording[name] == pytest.approx(values, rel=1e-12, abs=1e-12), name
 
 
@@ -82,8 +94,14 @@ def test_excel_with_units_in_the_headings(tmp_path: Path):
 
 
 def test_excel_with_a_preamble_a_unit_row_and_a_sheet_of_texts(tmp_path: Path):
-    rows = [["Rig 3, calibrated"], ["resting_length", 310, "mm"], [], ["time", "pressure", "length", "force"],
-            ["s", "kPa", "mm", "N"], *TABLE.tolist()]  # fmt: skip
+    rows = [
+        ["Rig 3, calibrated"],
+        ["resting_length", 310, "mm"],
+        [],
+        ["time", "pressure", "length", "force"],
+        ["s", "kPa", "mm", "N"],
+        *TABLE.tolist(),
+    ]
     path = excel(tmp_path / "run.xlsx", {"Notes": [["by Ada"], ["on Monday"]], "Data": rows})
     recording = only(read(path))
     same(recording)
@@ -157,8 +175,14 @@ def save_v73(path: Path, content: dict[str, object]) -> Path:
 @pytest.mark.parametrize("missing", ["pressure", "length", "force"])
 @pytest.mark.parametrize("rows", [slice(None), slice(3, 9)])
 def test_what_is_missing_in_a_recording_is_no_suspicious_value(missing: str, rows: slice):
-    columns = {"time": TIME, "pressure": 1e3 * PRESSURE, "length": 1e-3 * LENGTH, "force": 1.0 * FORCE}
-    good, gaps = Recording(columns, "good"), columns[missing].copy()
+    columns = {
+        "time": TIME,
+        "pressure": 1e3 * PRESSURE,
+        "length": 1e-3 * LENGTH,
+        "force": 1.0 * FORCE,
+    }
+    good = Recording(columns, "good")
+    gaps = columns[missing].copy()
     gaps[rows] = np.nan
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -168,14 +192,17 @@ def test_what_is_missing_in_a_recording_is_no_suspicious_value(missing: str, row
 
 def test_a_code_next_to_missing_values_is_named():
     force = 1.0 * FORCE
-    force[3:9], force[10] = np.nan, 1e30
+    force[3:9] = np.nan
+    force[10] = 1e30
     with pytest.warns(AirmuscleWarning, match=r"gaps: the force is 1e\+30 in 1 row"):
         check_bench([Recording({"pressure": 1e3 * PRESSURE, "force": force}, "gaps")])
 
 
 @pytest.mark.parametrize("save", [save_v5, save_v73])
 def test_matlab_vectors(tmp_path: Path, save):
-    recording = only(read(save(tmp_path / "run.mat", mat_content()), ColumnMapping(units={"time": "s"})))
+    recording = only(
+        read(save(tmp_path / "run.mat", mat_content()), ColumnMapping(units={"time": "s"}))
+    )
     same(recording)
     assert recording.constants["resting_length"] == pytest.approx(0.31)
 
@@ -215,15 +242,30 @@ def as_cell(values: list) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "written",
-    [as_struct_array, as_cell, lambda runs: {key: as_cell([run[key] for run in runs]) for key in runs[0]}],
+    [
+        as_struct_array,
+        as_cell,
+        lambda runs: {key: as_cell([run[key] for run in runs]) for key in runs[0]},
+    ],
     ids=["struct array", "cell array of structs", "struct of cell arrays"],
 )
 def test_each_struct_of_an_array_of_matlab_is_a_run(tmp_path: Path, written):
-    runs = [{"time_s": TIME[:n], "pressure_kPa": PRESSURE[:n], "length_mm": LENGTH[:n], "force_N": FORCE[:n]}
-            for n in (TIME.size, 9)]  # fmt: skip
+    runs = [
+        {
+            "time_s": TIME[:n],
+            "pressure_kPa": PRESSURE[:n],
+            "length_mm": LENGTH[:n],
+            "force_N": FORCE[:n],
+        }
+        for n in (TIME.size, 9)
+    ]
     first, second = read(save_v5(tmp_path / "bench.mat", {"runs": written(runs), "L0_mm": 310.0}))
     same(first)
-    assert (first.origin, second.origin, len(second)) == ("bench.mat, runs(1)", "bench.mat, runs(2)", 9)
+    assert (first.origin, second.origin, len(second)) == (
+        "bench.mat, runs(1)",
+        "bench.mat, runs(2)",
+        9,
+    )
     assert second.constants["resting_length"] == pytest.approx(0.31)
     assert len(only(read(tmp_path / "bench.mat", ColumnMapping(group="runs(2)")))) == 9
 
@@ -232,7 +274,12 @@ def test_the_struct_array_of_a_file_of_version_7_3_is_a_run_each(tmp_path: Path)
     h5py = pytest.importorskip("h5py")
     path = save_v73(tmp_path / "bench.mat", {"L0_mm": 310.0})
     with h5py.File(path, "r+") as file:
-        for name, values in {"time_s": TIME, "pressure_kPa": PRESSURE, "length_mm": LENGTH, "force_N": FORCE}.items():
+        for name, values in {
+            "time_s": TIME,
+            "pressure_kPa": PRESSURE,
+            "length_mm": LENGTH,
+            "force_N": FORCE,
+        }.items():
             for n in (TIME.size, 9):
                 file[f"#refs#/{name}{n}"] = values[:n].reshape(1, -1)
                 file[f"#refs#/{name}{n}"].attrs["MATLAB_class"] = np.bytes_("double")
@@ -241,11 +288,17 @@ def test_the_struct_array_of_a_file_of_version_7_3_is_a_run_each(tmp_path: Path)
         file["runs"].attrs["MATLAB_class"] = np.bytes_("struct")
     first, second = read(path)
     same(first)
-    assert (first.origin, second.origin, len(second)) == ("bench.mat, runs(1)", "bench.mat, runs(2)", 9)
+    assert (first.origin, second.origin, len(second)) == (
+        "bench.mat, runs(1)",
+        "bench.mat, runs(2)",
+        9,
+    )
 
 
 def test_a_file_of_version_7_3_that_another_program_wrote_is_read(tmp_path: Path):
-    """Classes as texts, a stored type and an array without values, none of which MATLAB writes, do not stop a reader."""
+    """Classes as texts, a stored type and an array without values, none of which MATLAB writes, do
+    not stop a reader.
+    """
     h5py = pytest.importorskip("h5py")
     path = save_v73(tmp_path / "run.mat", mat_content())
     with h5py.File(path, "r+") as file:
@@ -254,7 +307,9 @@ def test_a_file_of_version_7_3_that_another_program_wrote_is_read(tmp_path: Path
         file["kind"] = np.dtype("f8")
         file["none"] = np.zeros((0, TIME.size))
         file["none"].attrs["MATLAB_class"] = "double"
-    (recording,) = read(path, ColumnMapping(units={"time": "s"}), downsampling=Decimation(TIME.size - 1))
+    (recording,) = read(
+        path, ColumnMapping(units={"time": "s"}), downsampling=Decimation(TIME.size - 1)
+    )
     assert len(recording) == -(-TIME.size // 2)
     assert recording.constants["resting_length"] == pytest.approx(0.31)
     assert "Not read: kind, which contains no real numbers." in recording.notes
@@ -264,7 +319,12 @@ def test_a_file_of_version_7_3_that_another_program_wrote_is_read(tmp_path: Path
 def test_a_vector_that_matlab_writes_to_hdf5_has_one_row(tmp_path: Path, shape):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "bench.h5", "w") as file:
-        for name, values in {"time_s": TIME, "pressure_kPa": PRESSURE, "length_mm": LENGTH, "force_N": FORCE}.items():
+        for name, values in {
+            "time_s": TIME,
+            "pressure_kPa": PRESSURE,
+            "length_mm": LENGTH,
+            "force_N": FORCE,
+        }.items():
             file[name] = values.reshape(shape)
         file.attrs["L0_mm"] = 310.0
     same(only(read(tmp_path / "bench.h5")))
@@ -273,11 +333,21 @@ def test_a_vector_that_matlab_writes_to_hdf5_has_one_row(tmp_path: Path, shape):
 
 
 def test_the_function_workspace_of_a_matlab_file_is_no_column(tmp_path: Path):
-    """MATLAB saves it as a matrix of bytes beside the variables of a file that contains an object."""
+    """MATLAB saves it as a matrix of bytes beside the variables of a file that contains an
+    object.
+    """
     path = tmp_path / "bench.mat"
     scipy = pytest.importorskip("scipy.io")
-    scipy.savemat(path, {"time_s": np.linspace(0.0, 1.0, 5), "x_function_workspace__": np.ones((1, 11488), np.uint8)})
-    path.write_bytes(path.read_bytes().replace(b"x_function_workspace__", b"__function_workspace__"))
+    scipy.savemat(
+        path,
+        {
+            "time_s": np.linspace(0.0, 1.0, 5),
+            "x_function_workspace__": np.ones((1, 11488), np.uint8),
+        },
+    )
+    path.write_bytes(
+        path.read_bytes().replace(b"x_function_workspace__", b"__function_workspace__")
+    )
     (recording,) = read(path)
     assert list(recording) == ["time"]
     assert len(recording) == 5
@@ -315,18 +385,25 @@ def test_tdms_channels_without_a_common_time(tmp_path: Path):
     nptdms = pytest.importorskip("nptdms")
     with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
         parts = {"p [kPa]": PRESSURE, "F [N]": FORCE[:7]}
-        file.write_segment([nptdms.ChannelObject("g", name, values) for name, values in parts.items()])
+        file.write_segment(
+            [nptdms.ChannelObject("g", name, values) for name, values in parts.items()]
+        )
     said = refusal(ColumnError, tmp_path / "run.tdms")
     assert (
-        "run.tdms: the channels have different rows (p [kPa] 40, F [N] 7), and no time is stated for p [kPa]." in said
+        "run.tdms: the channels have different rows (p [kPa] 40, F [N] 7), and no time is stated"
+        " for p [kPa]." in said
     )
 
 
 def test_tdms_channels_with_different_start_times_share_their_common_time(tmp_path: Path):
     nptdms = pytest.importorskip("nptdms")
     with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
-        early = nptdms.ChannelObject("g", "p [kPa]", PRESSURE, {"wf_increment": 0.05, "wf_start_offset": 0.0})
-        late = nptdms.ChannelObject("g", "L [mm]", LENGTH[4:], {"wf_increment": 0.05, "wf_start_offset": 0.2})
+        early = nptdms.ChannelObject(
+            "g", "p [kPa]", PRESSURE, {"wf_increment": 0.05, "wf_start_offset": 0.0}
+        )
+        late = nptdms.ChannelObject(
+            "g", "L [mm]", LENGTH[4:], {"wf_increment": 0.05, "wf_start_offset": 0.2}
+        )
         file.write_segment([early, late])
     recording = only(read(tmp_path / "run.tdms"))
     assert recording["time"] == pytest.approx(TIME[:36])
@@ -340,12 +417,17 @@ def test_mdf_groups_with_different_time_vectors_are_resampled_to_common_rows(tmp
     with asammdf.MDF(version="4.10") as file:
         fast = {"pressure": ("kPa", PRESSURE), "F": ("N", FORCE)}
         file.append(
-            [asammdf.Signal(values, TIME, name=name, unit=unit) for name, (unit, values) in fast.items()],
+            [
+                asammdf.Signal(values, TIME, name=name, unit=unit)
+                for name, (unit, values) in fast.items()
+            ],
             acq_name="fast",
         )
         valve = (np.arange(40) > 20).astype(np.uint8)
-        others = [asammdf.Signal(LENGTH[slow], TIME[slow], name="L", unit="mm"),
-                  asammdf.Signal(valve[slow], TIME[slow], name="valve")]  # fmt: skip
+        others = [
+            asammdf.Signal(LENGTH[slow], TIME[slow], name="L", unit="mm"),
+            asammdf.Signal(valve[slow], TIME[slow], name="valve"),
+        ]
         file.append(others, acq_name="slow")
         file.save(tmp_path / "run.mf4")
     recording = only(read(tmp_path / "run.mf4"))
@@ -353,11 +435,13 @@ def test_mdf_groups_with_different_time_vectors_are_resampled_to_common_rows(tmp
     expected = valve[3 * (np.arange(40) // 3)]
     assert np.array_equal(recording["valve"], expected), "integers are resampled by zero-order hold"
     assert (
-        "Channel 'L' has its own time vector: its 14 rows are interpolated to the 40 rows of 'pressure'."
-        in recording.notes
+        "Channel 'L' has its own time vector: its 14 rows are interpolated to the 40 rows of"
+        " 'pressure'." in recording.notes
     )
     assert len(only(read(tmp_path / "run.mf4", ColumnMapping(group="slow")))) == 14
-    assert "no group 'fats'; the groups are fast, slow" in refusal(FileError, tmp_path / "run.mf4", group="fats")
+    assert "no group 'fats'; the groups are fast, slow" in refusal(
+        FileError, tmp_path / "run.mf4", group="fats"
+    )
 
 
 @pytest.mark.parametrize("ending", [".xlsx", ".mat", ".tdms", ".mf4"])
@@ -372,7 +456,9 @@ def test_a_damaged_file_is_one_error_that_names_it(tmp_path: Path, ending: str):
     ("ending", "package"),
     [(".xlsx", "python_calamine"), (".h5", "h5py"), (".tdms", "nptdms"), (".mf4", "asammdf")],
 )
-def test_a_missing_package_is_an_error_with_the_install_command(tmp_path: Path, monkeypatch, ending: str, package: str):
+def test_a_missing_package_is_an_error_with_the_install_command(
+    tmp_path: Path, monkeypatch, ending: str, package: str
+):
     monkeypatch.setitem(sys.modules, package, None)
     said = refusal(FileError, tmp_path / f"run{ending}")
     assert said.endswith(f"needs the package {package}. Install it: pip install airmuscle[lab]")
@@ -381,7 +467,9 @@ def test_a_missing_package_is_an_error_with_the_install_command(tmp_path: Path, 
 
 def test_an_unknown_format(tmp_path: Path):
     (tmp_path / "run.bin").write_bytes(b"\0\1\2")
-    assert "run.bin: the file is a binary file, not a table of text. Export" in refusal(FileError, tmp_path / "run.bin")
+    assert "run.bin: the file is a binary file, not a table of text. Export" in refusal(
+        FileError, tmp_path / "run.bin"
+    )
 
 
 # Several files
@@ -403,9 +491,15 @@ def test_two_files_with_similar_numbers_under_different_units_are_rejected(tmp_p
     csv(tmp_path / "a.csv")
     csv(tmp_path / "b.csv", ("time [s]", "pressure [bar]", "length [mm]", "force [N]"))
     said = refusal(UnitError, tmp_path)
-    assert said.startswith("a.csv states the pressure in kPa and b.csv in bar, but the numbers have the same magnitude")
+    assert said.startswith(
+        "a.csv states the pressure in kPa and b.csv in bar, but the numbers have the same magnitude"
+    )
     assert "units={'pressure': ...}" in said
-    csv(tmp_path / "b.csv", ("time [s]", "pressure [bar]", "length [mm]", "force [N]"), TABLE * [1, 0.01, 1, 1])
+    csv(
+        tmp_path / "b.csv",
+        ("time [s]", "pressure [bar]", "length [mm]", "force [N]"),
+        TABLE * [1, 0.01, 1, 1],
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert read(tmp_path)[1]["pressure"] == pytest.approx(PRESSURE * 1e3)
@@ -414,14 +508,19 @@ def test_two_files_with_similar_numbers_under_different_units_are_rejected(tmp_p
 def test_gauge_stated_in_only_one_file_is_a_warning_that_names_both(tmp_path: Path):
     csv(tmp_path / "a.csv")
     csv(tmp_path / "b.csv", ("time [s]", "pressure [kPa(a)]", "length [mm]", "force [N]"))
-    with pytest.warns(AirmuscleWarning, match=r"a\.csv .* and b\.csv .* only one states whether its pressure is gauge"):
+    with pytest.warns(
+        AirmuscleWarning,
+        match=r"a\.csv .* and b\.csv .* only one states whether its pressure is gauge",
+    ):
         read(tmp_path)
 
 
 def test_very_different_magnitudes_in_one_unit_are_a_warning(tmp_path: Path):
     csv(tmp_path / "a.csv")
     csv(tmp_path / "b.csv", table=TABLE * [1, 0.01, 1, 1])
-    with pytest.warns(AirmuscleWarning, match=r"pressure of b\.csv .* and a\.csv .* differs by a factor of 100"):
+    with pytest.warns(
+        AirmuscleWarning, match=r"pressure of b\.csv .* and a\.csv .* differs by a factor of 100"
+    ):
         read(tmp_path)
 
 
@@ -430,9 +529,9 @@ def test_very_different_magnitudes_in_one_unit_are_a_warning(tmp_path: Path):
 
 def test_a_mapping_file_names_columns_units_and_constants(tmp_path: Path):
     (tmp_path / "rig.toml").write_text(
-        'resting_length = "300 mm"\ndecimal = ","\ndelimiter = ";"\nambient = "100 kPa"\n[columns]\n'
-        '"Channel 1" = "time [s]"\n"Channel 2" = { quantity = "pressure", unit = "kPa(a)" }\n'
-        '"Channel 3" = "length [mm]"\n4 = "force [kg]"\nspare = ""\n'
+        'resting_length = "300 mm"\ndecimal = ","\ndelimiter = ";"\nambient = "100'
+        ' kPa"\n[columns]\n"Channel 1" = "time [s]"\n"Channel 2" = { quantity = "pressure", unit ='
+        ' "kPa(a)" }\n"Channel 3" = "length [mm]"\n4 = "force [kg]"\nspare = ""\n'
     )
     body = "".join(f"{';'.join(f'{v:.17g}' for v in row)};7\n" for row in TABLE).replace(".", ",")
     (tmp_path / "run.csv").write_text("Channel 1;Channel 2;Channel 3;Channel 4;spare\n" + body)
@@ -450,7 +549,9 @@ def test_a_mapping_file_names_columns_units_and_constants(tmp_path: Path):
 
 def test_an_option_overrides_the_mapping_file(tmp_path: Path):
     stated = ColumnMapping(columns={"F": "force [N]"}, constants={"resting_length": "300 mm"})
-    mapping = mapping_of_tables({"columns": {"F": "force [kN]"}, "resting_length": 0.4}, "options", stated)
+    mapping = mapping_of_tables(
+        {"columns": {"F": "force [kN]"}, "resting_length": 0.4}, "options", stated
+    )
     (tmp_path / "run.csv").write_text("F,L [mm]\n1,290\n2,280\n")
     recording = only(read(tmp_path / "run.csv", mapping))
     assert recording["force"] == pytest.approx([1e3, 2e3])
@@ -459,7 +560,9 @@ def test_an_option_overrides_the_mapping_file(tmp_path: Path):
 
 def test_a_mapping_overrides_the_unit_row(tmp_path: Path):
     (tmp_path / "run.csv").write_text("p,F\nbar,N\n1,2\n3,4\n")
-    recording = only(read(tmp_path / "run.csv", ColumnMapping(columns={"p": "pressure [kPa(g)]", "F": "force"})))
+    recording = only(
+        read(tmp_path / "run.csv", ColumnMapping(columns={"p": "pressure [kPa(g)]", "F": "force"}))
+    )
     assert recording["pressure"] == pytest.approx([1e3, 3e3])
     assert recording["force"] == pytest.approx([2.0, 4.0])
     assert recording.units == {"pressure": "kPa(g)", "force": "N"}
@@ -468,12 +571,19 @@ def test_a_mapping_overrides_the_unit_row(tmp_path: Path):
 def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
     np.savetxt(tmp_path / "run.txt", TABLE, delimiter="\t")
     assert (
-        "To map columns by their numbers, use columns={1: 'pressure [kPa]', 2: 'force [N]'} of ColumnMapping."
-        in refusal(ColumnError, tmp_path / "run.txt")
+        "To map columns by their numbers, use columns={1: 'pressure [kPa]', 2: 'force [N]'} of"
+        " ColumnMapping." in refusal(ColumnError, tmp_path / "run.txt")
     )
     same(only(read(tmp_path / "run.txt", ColumnMapping(columns=dict(enumerate(HEADINGS, 1))))))
     np.savetxt(tmp_path / "blanks.txt", TABLE)
-    same(only(read(tmp_path / "blanks.txt", ColumnMapping(columns=dict(enumerate(HEADINGS, 1)), delimiter=" "))))
+    same(
+        only(
+            read(
+                tmp_path / "blanks.txt",
+                ColumnMapping(columns=dict(enumerate(HEADINGS, 1)), delimiter=" "),
+            )
+        )
+    )
     same(only(read(tmp_path / "blanks.txt", ColumnMapping(columns=dict(enumerate(HEADINGS, 1))))))
 
 
@@ -482,21 +592,32 @@ def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):
     assert "To specify the decimal sign, use decimal=',' of ColumnMapping." in refusal(
         ColumnError, tmp_path / "run.csv"
     )
-    assert only(read(tmp_path / "run.csv", ColumnMapping(decimal=",")))["force"] == pytest.approx([1234.5, 2000.0])
+    assert only(read(tmp_path / "run.csv", ColumnMapping(decimal=",")))["force"] == pytest.approx(
+        [1234.5, 2000.0]
+    )
 
 
-def test_points_separate_thousands_next_to_a_given_decimal_comma_also_where_no_comma_occurs(tmp_path: Path):
+def test_points_separate_thousands_next_to_a_given_decimal_comma_also_where_no_comma_occurs(
+    tmp_path: Path,
+):
     (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234;290\n2.000;280\n")
-    assert only(read(tmp_path / "run.csv", ColumnMapping(decimal=",")))["force"] == pytest.approx([1234.0, 2000.0])
+    assert only(read(tmp_path / "run.csv", ColumnMapping(decimal=",")))["force"] == pytest.approx(
+        [1234.0, 2000.0]
+    )
 
 
 @pytest.mark.parametrize(
     ("decimal", "cells"), [(",", "0.5;1,5"), (".", "0,5;1.5"), (",", "12.5;280"), (".", "0,500;2")]
 )
-def test_a_sign_that_cannot_separate_thousands_contradicts_the_given_decimal_sign(tmp_path: Path, decimal, cells):
+def test_a_sign_that_cannot_separate_thousands_contradicts_the_given_decimal_sign(
+    tmp_path: Path, decimal, cells
+):
     (tmp_path / "run.csv").write_text(f"force [N];length [mm]\n{cells}\n")
     said = refusal(ColumnError, tmp_path / "run.csv", decimal=decimal)
-    assert f"line 2: '{cells.partition(';')[0]}' contradicts the decimal sign '{decimal}', which is stated" in said
+    assert (
+        f"line 2: '{cells.partition(';')[0]}' contradicts the decimal sign '{decimal}', which is"
+        " stated" in said
+    )
 
 
 def test_commas_in_quoted_cells_are_ambiguous_next_to_a_decimal_point(tmp_path: Path):
@@ -516,12 +637,18 @@ def test_commas_in_quoted_cells_are_ambiguous_next_to_a_decimal_point(tmp_path: 
         ),
         ({"presure": "pressure [bar]"}, ColumnError, "Did you mean 'pressure [kPa]'?"),
         ({9: "pressure [bar]"}, ColumnError, "the mapping names column '9'"),
-        ({"pressure": "presure [bar]"}, ColumnError, "is not a known quantity; known quantities are time, pressure"),
+        (
+            {"pressure": "presure [bar]"},
+            ColumnError,
+            "is not a known quantity; known quantities are time, pressure",
+        ),
         ({"pressure": "presure [bar]"}, ColumnError, "Did you mean 'pressure'?"),
         ({"pressure": "pressure [mm]"}, UnitError, "unit 'mm' cannot be converted to 'Pa'"),
     ],
 )
-def test_a_mapping_that_does_not_match_the_file_is_an_error(tmp_path: Path, columns, kind, expected: str):
+def test_a_mapping_that_does_not_match_the_file_is_an_error(
+    tmp_path: Path, columns, kind, expected: str
+):
     assert expected in refusal(kind, csv(tmp_path / "run.csv"), columns=columns)
 
 
@@ -536,8 +663,16 @@ def test_a_mapping_that_does_not_match_the_file_is_an_error(tmp_path: Path, colu
         ('delimiter = ","\ndecimal = ","', ParameterError, "are both ','"),
         ('decimal = "x"', ParameterError, "it must be '.' or ','"),
         ('delimiter = "x"', ParameterError, "it must be a comma, semicolon, tab, blank"),
-        ('ambient = "Rodas4"', UnitError, "rig.toml: ambient: 'Rodas4' is not a number with a unit"),
-        ("resting_length = 300", ColumnError, "rig.toml: resting_length is 300 m; allowed range: 0.001 to 20 m"),
+        (
+            'ambient = "Rodas4"',
+            UnitError,
+            "rig.toml: ambient: 'Rodas4' is not a number with a unit",
+        ),
+        (
+            "resting_length = 300",
+            ColumnError,
+            "rig.toml: resting_length is 300 m; allowed range: 0.001 to 20 m",
+        ),
         ('[constants]\nlength = "7 furlong bar"', UnitError, "rig.toml: length: "),
     ],
 )
@@ -556,26 +691,47 @@ def test_the_force_in_the_name_of_a_file_may_be_a_load_in_grams(tmp_path: Path):
 
 
 def test_a_constant_column_states_the_resting_length(tmp_path: Path):
-    path = csv(tmp_path / "a.csv", (*HEADINGS, "rest_length [cm]"), np.column_stack([TABLE, np.full(40, 31.0)]))
+    path = csv(
+        tmp_path / "a.csv",
+        (*HEADINGS, "rest_length [cm]"),
+        np.column_stack([TABLE, np.full(40, 31.0)]),
+    )
     recording = only(read(path))
     same(recording)
     assert recording.constants["resting_length"] == pytest.approx(0.31)
-    assert only(read(path, ColumnMapping(resting_length="32 cm"))).constants["resting_length"] == pytest.approx(0.32)
-    csv(path, (*HEADINGS, "rest_length [cm]"), np.column_stack([TABLE, np.where(TIME < 1, 31.0, 32.0)]))
+    assert only(read(path, ColumnMapping(resting_length="32 cm"))).constants[
+        "resting_length"
+    ] == pytest.approx(0.32)
+    csv(
+        path,
+        (*HEADINGS, "rest_length [cm]"),
+        np.column_stack([TABLE, np.where(TIME < 1, 31.0, 32.0)]),
+    )
     assert "a.csv, line 22: rest_length [cm] changes from 31 to 32" in refusal(ColumnError, path)
 
 
 def test_waveforms_of_tdms_that_start_at_different_times_are_aligned(tmp_path: Path):
     nptdms = pytest.importorskip("nptdms")
-    begin, late = np.datetime64("2024-05-17T12:00:00.000000"), np.timedelta64(250, "ms")
+    begin = np.datetime64("2024-05-17T12:00:00.000000")
+    late = np.timedelta64(250, "ms")
     rows = 0.05 * np.arange(40)
     with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
-        file.write_segment([
-            nptdms.ChannelObject("g", "pressure [bar]", 1.0 + rows, {"wf_increment": 0.05, "wf_start_time": begin}),
-            nptdms.ChannelObject(
-                "g", "force [N]", 10.0 * (rows + 0.25), {"wf_increment": 0.05, "wf_start_time": begin + late}
-            ),
-        ])  # fmt: skip
+        file.write_segment(
+            [
+                nptdms.ChannelObject(
+                    "g",
+                    "pressure [bar]",
+                    1.0 + rows,
+                    {"wf_increment": 0.05, "wf_start_time": begin},
+                ),
+                nptdms.ChannelObject(
+                    "g",
+                    "force [N]",
+                    10.0 * (rows + 0.25),
+                    {"wf_increment": 0.05, "wf_start_time": begin + late},
+                ),
+            ]
+        )
     recording = only(read(tmp_path / "run.tdms"))
     assert len(recording) == 35
     assert recording["force"] == pytest.approx(10.0 * (recording["pressure"] / 1e5 - 1.0))
@@ -599,7 +755,11 @@ def test_the_time_column_may_contain_clock_times(tmp_path: Path, cells: list[str
 
 
 def test_a_change_to_summer_time_is_no_gap_where_the_offset_from_utc_is_stated():
-    cells = ["2024-03-31T01:59:59.5+01:00", "2024-03-31T03:00:00+02:00", "2024-03-31T03:00:01+02:00"]
+    cells = [
+        "2024-03-31T01:59:59.5+01:00",
+        "2024-03-31T03:00:00+02:00",
+        "2024-03-31T03:00:01+02:00",
+    ]
     assert seconds_from_clock(cells) == pytest.approx([0.0, 0.5, 1.5])
 
 
@@ -621,9 +781,9 @@ def test_other_texts_are_not_clock_times():
 def test_time_out_of_order_is_rejected_unless_ordered_is_false(tmp_path: Path):
     path = csv(tmp_path / "run.csv", table=TABLE[[0, 2, 1, 3]])
     assert "is less than the time of the previous row" in refusal(ColumnError, path)
-    assert only(read(path, ColumnMapping(time=RecordedTime(ordered=False))))["time"] == pytest.approx(
-        TIME[[0, 2, 1, 3]]
-    )
+    assert only(read(path, ColumnMapping(time=RecordedTime(ordered=False))))[
+        "time"
+    ] == pytest.approx(TIME[[0, 2, 1, 3]])
 
 
 # Very long files
@@ -657,16 +817,24 @@ def test_decimation_keeps_rows_as_measured(long_file: Path, most: int):
     assert len(recording) <= most
     assert (step == 1) == (recording.notes == ())
     table = raw_csv.read_large_csv(long_file, raw_csv.TextFormat(), Decimation(most))
-    assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "rows have the line numbers of the file"
-    assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
+    assert np.array_equal(table.rows, np.arange(4, 20_004, step)), (
+        "rows have the line numbers of the file"
+    )
+    assert step == 1 or recording.notes[0].startswith(
+        f"The file has 20000 rows; one in {step} is kept as measured"
+    )
 
 
 def test_block_means_of_clock_times_are_those_of_numbers(tmp_path: Path):
     rows = "".join(f"12:00:{i:02};{i};{i * i}\n" for i in range(20))
     (tmp_path / "run.csv").write_text(f"time;pressure [kPa];force [N]\n{rows}")
     recording = only(read(tmp_path / "run.csv", downsampling=BlockMeans(4)))
-    assert recording["time"] == pytest.approx(1e-3 * (recording["pressure"] - recording["pressure"][0]))
-    assert only(read(tmp_path / "run.csv", downsampling=BlockMeans(3)))["time"] == pytest.approx([0.0, 7.0, 13.0])
+    assert recording["time"] == pytest.approx(
+        1e-3 * (recording["pressure"] - recording["pressure"][0])
+    )
+    assert only(read(tmp_path / "run.csv", downsampling=BlockMeans(3)))["time"] == pytest.approx(
+        [0.0, 7.0, 13.0]
+    )
 
 
 @pytest.mark.parametrize("most", [7_000, 13, 1])
@@ -685,7 +853,9 @@ def test_block_means_are_means(long_file: Path, most: int):
 def test_a_bad_cell_in_a_long_file_is_named_with_its_line(long_file: Path):
     text = long_file.read_text().replace("\n15000;7500,0\n", "\n15000;broken\n")
     long_file.write_text(text)
-    assert refusal(ColumnError, long_file).startswith("long.csv, line 15004: force 'broken' is not a number")
+    assert refusal(ColumnError, long_file).startswith(
+        "long.csv, line 15004: force 'broken' is not a number"
+    )
 
 
 def test_progress_increases_to_one_and_an_interrupt_aborts_reading(long_file: Path):
@@ -736,8 +906,12 @@ def test_only_a_regular_file_is_read(tmp_path: Path, ending: str):
     os.mkfifo(tmp_path / f"pipe{ending}")
     (tmp_path / f"device{ending}").symlink_to("/dev/zero")
     (tmp_path / f"empty{ending}").write_bytes(b"")
-    assert "because it is a pipe. Pass a regular file" in refusal(FileError, tmp_path / f"pipe{ending}")
-    assert "because it is a device. Pass a regular file" in refusal(FileError, tmp_path / f"device{ending}")
+    assert "because it is a pipe. Pass a regular file" in refusal(
+        FileError, tmp_path / f"pipe{ending}"
+    )
+    assert "because it is a device. Pass a regular file" in refusal(
+        FileError, tmp_path / f"device{ending}"
+    )
     assert refusal(FileError, tmp_path / f"empty{ending}").endswith("the file is empty.")
     assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
 
@@ -759,7 +933,9 @@ def test_a_mapping_is_read_from_a_regular_file_only(tmp_path: Path):
 )
 def test_a_binary_file_with_the_name_of_a_text_file(tmp_path: Path, content: bytes, kind: str):
     (tmp_path / "run.csv").write_bytes(content)
-    assert refusal(FileError, tmp_path / "run.csv").startswith(f"run.csv: the file is {kind}, not a table of text.")
+    assert refusal(FileError, tmp_path / "run.csv").startswith(
+        f"run.csv: the file is {kind}, not a table of text."
+    )
 
 
 def test_an_error_escapes_the_control_characters_of_a_file(tmp_path: Path):
@@ -770,7 +946,9 @@ def test_an_error_escapes_the_control_characters_of_a_file(tmp_path: Path):
 @pytest.mark.parametrize("save", [save_v5, save_v73])
 def test_a_damaged_matlab_file_does_not_end_the_process(tmp_path: Path, save):
     content = save(tmp_path / "run.mat", mat_content()).read_bytes()
-    unknown_type = content.index(b"t\0\0\0") + 4  # type of the numbers, for which SciPy has a segmentation fault
+    unknown_type = (
+        content.index(b"t\0\0\0") + 4
+    )  # type of the numbers, for which SciPy has a segmentation fault
     for position in (unknown_type, 130, len(content) // 2, len(content) - 100):
         damaged = bytearray(content)
         damaged[position] ^= 64
@@ -784,8 +962,9 @@ def test_a_damaged_matlab_file_does_not_end_the_process(tmp_path: Path, save):
 
 def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, monkeypatch):
     (tmp_path / "bad_reader.py").write_text(
-        "import os, time\ndef end(path): os._exit(1)\ndef wait(path): time.sleep(60)\n"
-        "def loop(path):\n    while True: pass\ndef fill(path): bytearray(10**11)\ndef fail(path): None.get\n"
+        "import os, time\ndef end(path): os._exit(1)\ndef wait(path): time.sleep(60)\ndef"
+        " loop(path):\n    while True: pass\ndef fill(path): bytearray(10**11)\ndef fail(path):"
+        " None.get\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     separate_process.stop()
@@ -800,7 +979,10 @@ def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, m
         ("wait", 1.0, "its reading takes more than 1 s"),
     ):
         monkeypatch.setattr(separate_process, "TIME_LIMIT", limit)
-        with pytest.raises(FileError, match=rf"run.csv: the file is damaged or too large \({cause}\). Copy it again"):
+        with pytest.raises(
+            FileError,
+            match=rf"run.csv: the file is damaged or too large \({cause}\). Copy it again",
+        ):
             call_in_separate_process("bad_reader", function, path)
 
 
@@ -814,7 +996,10 @@ def test_a_value_that_no_measurement_has(tmp_path: Path):
 @pytest.mark.parametrize("cell", ["x" * 3000, "ab " * 1000, "pressure [" + "k" * 3000 + "]"])
 @pytest.mark.parametrize("place", ["cell", "column", "headings"])
 def test_a_message_quotes_little_of_hostile_text(tmp_path, cell, place):
-    rows = [["time [s]", "pressure [kPa]", "force [N]"], *([f"{i}", "100", f"{100 + i}"] for i in range(30))]
+    rows = [
+        ["time [s]", "pressure [kPa]", "force [N]"],
+        *([f"{i}", "100", f"{100 + i}"] for i in range(30)),
+    ]
     for row in {"cell": [5], "column": range(3, 25), "headings": []}[place]:
         rows[row][1] = cell
     if place == "headings":

@@ -1,4 +1,6 @@
-"""Limits of the checks of files, each from both sides: units, vacuum, suspicious values, uniform time, constants."""
+"""Limits of the checks of files, each from both sides: units, vacuum, suspicious values, uniform
+time, constants.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,13 @@ from airmuscle.recording import Recording
 UP = np.linspace(0.0, 1.0, 60)
 
 
-def run(origin: str = "a.csv", units: dict[str, str] | None = None, **columns: np.ndarray) -> Recording:
+def run(
+    origin: str = "a.csv", units: dict[str, str] | None = None, **columns: np.ndarray
+) -> Recording:
     usual = {"pressure": "kPa", "force": "N"}
-    return Recording(columns, origin, units=units or {name: usual[name] for name in columns if name in usual})
+    return Recording(
+        columns, origin, units=units or {name: usual[name] for name in columns if name in usual}
+    )
 
 
 def warned(*recordings: Recording) -> str:
@@ -30,7 +36,11 @@ def warned(*recordings: Recording) -> str:
 
 def isometric(lowest: float = 0.0, highest: float = 5e5, **changed: np.ndarray) -> Recording:
     """A ramp of the pressure [Pa] at a held length, with a force in proportion to its rise."""
-    columns = {"pressure": lowest + (highest - lowest) * UP, "contraction": np.full(60, 0.1), "force": 500.0 * UP}
+    columns = {
+        "pressure": lowest + (highest - lowest) * UP,
+        "contraction": np.full(60, 0.1),
+        "force": 500.0 * UP,
+    }
     return run(**(columns | changed))
 
 
@@ -65,7 +75,9 @@ def test_units_contradict_each_other_from_a_factor_of_five_on(unit: str, refused
 
 
 @pytest.mark.parametrize(("ratio", "named"), [(48.0, False), (52.0, True)])
-def test_pressures_in_one_unit_that_differ_by_a_factor_of_fifty_are_named(ratio: float, named: bool):
+def test_pressures_in_one_unit_that_differ_by_a_factor_of_fifty_are_named(
+    ratio: float, named: bool
+):
     files = (isometric(), run("b.csv", pressure=5e5 * UP / ratio))
     assert ("differs by a factor of" in warned(*files)) == named
 
@@ -75,14 +87,23 @@ def test_pressures_in_one_unit_that_differ_by_a_factor_of_fifty_are_named(ratio:
 
 @pytest.mark.parametrize(
     ("lowest", "named"),
-    [(94.9e3, False), (95.1e3, True), (105.9e3, True), (106.1e3, False), (1e5 + 15.0, False), (1e5 + 25.0, True)],
+    [
+        (94.9e3, False),
+        (95.1e3, True),
+        (105.9e3, True),
+        (106.1e3, False),
+        (1e5 + 15.0, False),
+        (1e5 + 25.0, True),
+    ],
 )
 def test_a_lowest_pressure_as_that_of_the_atmosphere_may_be_absolute(lowest: float, named: bool):
     assert ("may be absolute" in warned(isometric(lowest))) == named
 
 
 @pytest.mark.parametrize(("pull", "named"), [(13.0, True), (17.0, False)])
-def test_a_muscle_that_pulls_at_the_lowest_pressure_is_not_at_the_atmosphere(pull: float, named: bool):
+def test_a_muscle_that_pulls_at_the_lowest_pressure_is_not_at_the_atmosphere(
+    pull: float, named: bool
+):
     recording = isometric(101e3, force=np.maximum(500.0 * UP, pull))
     assert ("may be absolute" in warned(recording)) == named
 
@@ -101,7 +122,9 @@ def test_a_muscle_that_pushes_by_more_than_five_per_cent_has_an_offset(offset: f
 
 
 @pytest.mark.parametrize(("positive", "named"), [(150.0, True), (190.0, False)])
-def test_a_force_that_is_three_times_as_negative_as_positive_is_reversed(positive: float, named: bool):
+def test_a_force_that_is_three_times_as_negative_as_positive_is_reversed(
+    positive: float, named: bool
+):
     force = np.concatenate([np.full(30, -500.0), np.full(30, positive)])
     assert ("multiply the column by -1" in warned(run(pressure=5e5 * UP, force=force))) == named
 
@@ -113,8 +136,12 @@ def test_an_elongation_of_more_than_five_per_cent_is_reversed(stretch: float, na
 
 
 @pytest.mark.parametrize(("highest", "named"), [(0.0095, True), (0.0105, False)])
-def test_a_contraction_of_less_than_a_hundredth_of_a_per_cent_range_may_be_a_ratio(highest: float, named: bool):
-    recording = run(units={"contraction": "%"}, contraction=np.clip(highest * (1.02 * UP - 0.01), 0.0, highest))
+def test_a_contraction_of_less_than_a_hundredth_of_a_per_cent_range_may_be_a_ratio(
+    highest: float, named: bool
+):
+    recording = run(
+        units={"contraction": "%"}, contraction=np.clip(highest * (1.02 * UP - 0.01), 0.0, highest)
+    )
     assert ("state the unit '1'" in warned(recording)) == named
 
 
@@ -129,17 +156,23 @@ def test_a_held_absolute_pressure_counts_from_the_stated_ambient_pressure(tmp_pa
 
 
 @pytest.mark.parametrize(("kilopascals", "refused"), [(-94.0, False), (-96.0, True)])
-def test_vacuum_is_that_of_the_stated_ambient_pressure(tmp_path: Path, kilopascals: float, refused: bool):
+def test_vacuum_is_that_of_the_stated_ambient_pressure(
+    tmp_path: Path, kilopascals: float, refused: bool
+):
     (tmp_path / "run.csv").write_text(f"pressure [kPag],force [N]\n100,2\n{kilopascals},1\n")
     if refused:
         with pytest.raises(ColumnError, match=r"not above absolute vacuum \(-95 kPa gauge\)"):
             read(tmp_path / "run.csv", ColumnMapping(ambient="95 kPa"))
     else:
-        assert read(tmp_path / "run.csv", ColumnMapping(ambient="95 kPa"))[0]["pressure"][1] == pytest.approx(-94e3)
+        assert read(tmp_path / "run.csv", ColumnMapping(ambient="95 kPa"))[0]["pressure"][
+            1
+        ] == pytest.approx(-94e3)
 
 
 def test_a_resting_length_that_changes_between_rows_is_no_constant(tmp_path: Path):
-    (tmp_path / "run.csv").write_text("force [N],length [mm],resting_length [mm]\n1,290,300\n2,280,300.01\n")
+    (tmp_path / "run.csv").write_text(
+        "force [N],length [mm],resting_length [mm]\n1,290,300\n2,280,300.01\n"
+    )
     with pytest.raises(ColumnError, match=r"changes from 300 to 300\.01, but must be constant"):
         read(tmp_path / "run.csv")
 
@@ -154,7 +187,9 @@ def test_rounded_stamps_deviate_by_at_most_their_rounding_and_five_sample_times(
     tmp_path: Path, sample_time: float, refused: bool
 ):
     time = np.arange(101) * sample_time
-    stamps = np.floor(time) + np.where((time > 5.0) & (time < 12.0), 2.0, 0.0)  # 2 s late, rounded to 1 s
+    stamps = np.floor(time) + np.where(
+        (time > 5.0) & (time < 12.0), 2.0, 0.0
+    )  # 2 s late, rounded to 1 s
     stamps = np.append(np.maximum.accumulate(stamps)[:-1], time[-1])
     rows = "".join(f"{t!r},1\n" for t in stamps.tolist())
     (tmp_path / "run.csv").write_text(f"time [s],force [N]\n{rows}")

@@ -1,4 +1,6 @@
-"""What the README and the page of commands show is what runs; the files that the README points to are there."""
+"""What the README and the page of commands show is what runs; the files that the README points to
+are there.
+"""
 
 from __future__ import annotations
 
@@ -24,16 +26,24 @@ def blocks(language, text=README):
 
 def test_the_python_runs_and_is_ten_lines(tmp_path):
     (block,) = blocks("python")
-    statements = [line for line in block.splitlines() if line and not line.startswith(("import", "from"))]
+    statements = [
+        line for line in block.splitlines() if line and not line.startswith(("import", "from"))
+    ]
     assert len(statements) <= 10
-    done = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     assert "rms error" in done.stdout
     assert "ISO 6358" in done.stdout
 
 
 def commands():
-    lines = [line.partition("#")[0].strip() for block in blocks("sh", COMMANDS) for line in block.splitlines()]
+    lines = [
+        line.partition("#")[0].strip()
+        for block in blocks("sh", COMMANDS)
+        for line in block.splitlines()
+    ]
     served = "./run airmuscle studio"  # a server, which the tests of the studio start
     return [line for line in lines if line.startswith("./run airmuscle") and line != served]
 

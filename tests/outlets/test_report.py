@@ -1,7 +1,8 @@
 """A report is complete, self-contained and reproducible.
 
-It appears completely or not at all. Its page loads nothing from elsewhere, and formulas are MathML. Every verdict is
-computed and stated in words. The same chapters give the same bytes, and JSON contains neither NaN nor infinity.
+It appears completely or not at all. Its page loads nothing from elsewhere, and formulas are MathML.
+Every verdict is computed and stated in words. The same chapters give the same bytes, and JSON
+contains neither NaN nor infinity.
 """
 
 from __future__ import annotations
@@ -59,9 +60,20 @@ from airmuscle.units import display
 pytestmark = pytest.mark.drawn
 DATE = datetime.date(2024, 5, 17)
 KEYS = {
-    "paper", "kind", "claim", "statement", "case", "place", "published", "expected", "reproduced", "unit", "tolerance", "verdict",
+    "paper",
+    "kind",
+    "claim",
+    "statement",
+    "case",
+    "place",
+    "published",
+    "expected",
+    "reproduced",
+    "unit",
+    "tolerance",
+    "verdict",
     "note",
-}  # fmt: skip
+}
 
 
 def a_plot(name: str, points: int = 20) -> Plot:
@@ -87,11 +99,17 @@ def a_chapter(paper: str = "Saga 2007", fibres: float = 48.0) -> Chapter:
             Claim(paper, "stress", AtLeast(0.3, 0.1), None, "Pa"),
         ),
         tables=(
-            Table(f"{paper} outline", "Outline", {"x [mm]": [0.1, math.nan], "closure": ["circle", "a,b"]}),
+            Table(
+                f"{paper} outline",
+                "Outline",
+                {"x [mm]": [0.1, math.nan], "closure": ["circle", "a,b"]},
+            ),
             Table(f"{paper} series", "Series", {"time [s]": np.array([0.1, 1 / 3])}, shown=False),
         ),
         plots=(a_plot(f"{paper} isobars"),),
-        references=(Reference("s", "Saga, N.", "Muscle", "J. Robotics", 2007, "10.1000/x", note="eq. (1)"),),
+        references=(
+            Reference("s", "Saga, N.", "Muscle", "J. Robotics", 2007, "10.1000/x", note="eq. (1)"),
+        ),
         chosen=(("modulus of the fibres", "70 GPa", "chosen"),),
     )
 
@@ -121,17 +139,33 @@ class Links(HTMLParser):
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    return write_report([a_chapter(), a_chapter("Borzikova", fibres=40.0)], folder, title="Papers", date=DATE)
+    return write_report(
+        [a_chapter(), a_chapter("Borzikova", fibres=40.0)], folder, title="Papers", date=DATE
+    )
 
 
 def test_a_result_of_two_chapters_is_written_once_in_the_brief_view():
-    first, second, other = (Chapter(name, name, (result, "More."))
-                            for name, result in (("a", "One law."), ("b", "One law."), ("c", "Another law.")))  # fmt: skip
-    assert as_text([first, second, other], 80).split("\n") == ["a", "One law.", "", "b", "", "c", "Another law."]
+    first, second, other = (
+        Chapter(name, name, (result, "More."))
+        for name, result in (("a", "One law."), ("b", "One law."), ("c", "Another law."))
+    )
+    assert as_text([first, second, other], 80).split("\n") == [
+        "a",
+        "One law.",
+        "",
+        "b",
+        "",
+        "c",
+        "Another law.",
+    ]
 
 
 def test_the_folder_holds_page_claims_figures_and_data(report: Path):
-    found = {path.relative_to(report.parent).as_posix() for path in report.parent.rglob("*") if path.is_file()}
+    found = {
+        path.relative_to(report.parent).as_posix()
+        for path in report.parent.rglob("*")
+        if path.is_file()
+    }
     papers = ("Saga 2007", "Borzikova")
     wanted = {f"figures/{paper} isobars.{kind}" for paper in papers for kind in ("svg", "png")}
     wanted |= {f"data/{paper} {table}.csv" for paper in papers for table in ("outline", "series")}
@@ -164,14 +198,23 @@ def test_what_is_not_finite_is_null_in_json_and_empty_in_csv(report: Path):
     text = (report.parent / "claims.json").read_text(encoding="utf-8")
     assert not re.search(r"\b(NaN|Infinity)\b", text)
     assert json.loads(text)[3]["reproduced"] is None
-    plain = as_json({"a": [math.inf, np.float32(0.5), np.int64(3), np.array([1.0, math.nan])], "b": (True, "NaN")})
+    plain = as_json(
+        {
+            "a": [math.inf, np.float32(0.5), np.int64(3), np.array([1.0, math.nan])],
+            "b": (True, "NaN"),
+        }
+    )
     assert json.loads(plain) == {"a": [None, 0.5, 3, [1.0, None]], "b": [True, "NaN"]}
-    with (report.parent / "data" / "Saga 2007 outline.csv").open(encoding="utf-8", newline="") as file:
+    with (report.parent / "data" / "Saga 2007 outline.csv").open(
+        encoding="utf-8", newline=""
+    ) as file:
         assert list(csv.reader(file)) == [["x [mm]", "closure"], ["0.1", "circle"], ["", "a,b"]]
 
 
 def test_data_keep_every_digit(report: Path):
-    lines = (report.parent / "data" / "Saga 2007 series.csv").read_text(encoding="utf-8").splitlines()
+    lines = (
+        (report.parent / "data" / "Saga 2007 series.csv").read_text(encoding="utf-8").splitlines()
+    )
     assert lines[0] == "time [s]"
     assert [float(line) for line in lines[1:]] == [0.1, 1 / 3]
 
@@ -192,7 +235,15 @@ def test_the_page_words_every_verdict_and_names_its_pedigree(report: Path):
     text = re.sub(r"data:[^\"]*", "", report.read_text(encoding="utf-8"))
     for verdict, count in (("✓ holds", 3), ("✗ differs", 1), ("– not printed", 6)):
         assert text.count(f">{verdict}</span>") == count + 1, "and once in the overview"
-    for word in ("2024-05-17", "numpy", np.__version__, "Python", "modulus of the fibres", "70 GPa", "Saga, N."):
+    for word in (
+        "2024-05-17",
+        "numpy",
+        np.__version__,
+        "Python",
+        "modulus of the fibres",
+        "70 GPa",
+        "Saga, N.",
+    ):
         assert word in text
     assert "straight fibres &lt;in rubber&gt;" in text
     assert "480 ± 1" in text
@@ -201,7 +252,9 @@ def test_the_page_words_every_verdict_and_names_its_pedigree(report: Path):
 
 
 def test_two_runs_give_the_same_bytes(tmp_path: Path):
-    first, second = (write_report([a_chapter()], tmp_path / name, date=DATE).parent for name in "ab")
+    first, second = (
+        write_report([a_chapter()], tmp_path / name, date=DATE).parent for name in "ab"
+    )
     files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
     assert len(files) == 6
     for file in files:
@@ -211,7 +264,9 @@ def test_two_runs_give_the_same_bytes(tmp_path: Path):
 def test_a_dense_figure_enters_the_page_as_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("airmuscle.report.write.MAX_SVG_BYTES", limit := MAX_SVG_BYTES // 10)
     figure, axes = plotting.new_figure()
-    axes.plot(*np.random.default_rng(0).normal(size=(2, 4000)))  # a line: many markers are an image in any case
+    axes.plot(
+        *np.random.default_rng(0).normal(size=(2, 4000))
+    )  # a line: many markers are an image in any case
     chapter = Chapter("p", "t", "s", plots=(Plot("dense", "Dense", figure),))
     page = write_report([chapter], tmp_path, date=DATE)
     assert (tmp_path / "figures" / "dense.svg").stat().st_size > limit
@@ -219,7 +274,9 @@ def test_a_dense_figure_enters_the_page_as_pixels(tmp_path: Path, monkeypatch: p
 
 
 def test_two_figures_of_one_name_are_refused(tmp_path: Path):
-    with pytest.raises(ValueError, match=r"plots: names must be unique and valid file names; check Saga 2007 iso"):
+    with pytest.raises(
+        ValueError, match=r"plots: names must be unique and valid file names; check Saga 2007 iso"
+    ):
         write_report([a_chapter(), a_chapter()], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -260,7 +317,9 @@ def blocked_by_a_folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("blocked", [blocked_by_a_file, blocked_by_permission, blocked_by_a_folder])
-def test_a_folder_that_cannot_be_written_is_named_and_left_alone(tmp_path: Path, blocked: Callable[[Path], Path]):
+def test_a_folder_that_cannot_be_written_is_named_and_left_alone(
+    tmp_path: Path, blocked: Callable[[Path], Path]
+):
     folder = blocked(tmp_path)
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(FileError) as caught:
@@ -355,9 +414,13 @@ def test_a_symbol_of_a_table_is_mathml():
 def test_formulas_are_mathml_on_the_page_and_plain_in_the_files(tmp_path: Path):
     formula = r"\(k = k_\text{max}\,(1 - \text{e}^{v})\)"
     plot = dataclasses.replace(a_plot("p"), caption=f"Curve {formula}.")
-    table = Table("t", f"Table {formula}", {r"\(k_\text{max}\) [%]": [40.0], "law": [r"\(w = 2\), line A"]})
+    table = Table(
+        "t", f"Table {formula}", {r"\(k_\text{max}\) [%]": [40.0], "law": [r"\(w = 2\), line A"]}
+    )
     claim = Claim("p", f"claim {formula} <b>", Equal(1.0), 1.0, "1", note=r"with \(k_\text{max}\)")
-    chapter = Chapter("p", "t", f"Summary {formula}.", claims=(claim,), tables=(table,), plots=(plot,))
+    chapter = Chapter(
+        "p", "t", f"Summary {formula}.", claims=(claim,), tables=(table,), plots=(plot,)
+    )
     page = write_report([chapter], tmp_path, date=DATE).read_text(encoding="utf-8")
     assert page.count("<math") == 7
     assert "\\(" not in page
@@ -420,22 +483,32 @@ def papers_in(folder: Path) -> list[str]:
 @pytest.mark.usefixtures("two_papers")
 @pytest.mark.parametrize(
     ("asked", "found"),
-    [(None, ["Saga 2007", "Borzikova"]), (["b"], ["Borzikova"]), (["b", "saga2007", "s"], ["Saga 2007", "Borzikova"])],
+    [
+        (None, ["Saga 2007", "Borzikova"]),
+        (["b"], ["Borzikova"]),
+        (["b", "saga2007", "s"], ["Saga 2007", "Borzikova"]),
+    ],
 )
-def test_papers_are_named_by_a_unique_beginning(tmp_path: Path, asked: list[str] | None, found: list[str]):
+def test_papers_are_named_by_a_unique_beginning(
+    tmp_path: Path, asked: list[str] | None, found: list[str]
+):
     assert run.reproduce(asked, tmp_path) == tmp_path / "report.html"
     assert papers_in(tmp_path) == found
 
 
 @pytest.mark.usefixtures("two_papers")
 def test_an_unknown_paper_is_refused_before_any_work(tmp_path: Path):
-    with pytest.raises(UnknownNameError, match=r"no paper 'saga2008'; there are saga2007, borzikova.*'saga2007'\?"):
+    with pytest.raises(
+        UnknownNameError, match=r"no paper 'saga2008'; there are saga2007, borzikova.*'saga2007'\?"
+    ):
         run.reproduce(["saga2008"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.usefixtures("two_papers")
-def test_an_unwritable_folder_is_refused_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_unwritable_folder_is_refused_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     add_paper(monkeypatch, "saga2007", lambda: pytest.fail("the work began"))
     with pytest.raises(FileError, match="taken"):
         run.reproduce(None, blocked_by_a_file(tmp_path))
@@ -473,7 +546,9 @@ def chapter():
 def write_papers(folder: Path, monkeypatch: pytest.MonkeyPatch, seconds: dict[str, float]) -> None:
     """Modules of papers that other processes can import too."""
     for name, duration in seconds.items():
-        (folder / f"paper_{name}.py").write_text(PAPER_MODULE.format(name=name, seconds=duration), encoding="utf-8")
+        (folder / f"paper_{name}.py").write_text(
+            PAPER_MODULE.format(name=name, seconds=duration), encoding="utf-8"
+        )
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setattr(run, "PAPERS", {name: f"paper_{name}" for name in seconds})
 
@@ -483,10 +558,14 @@ def test_processes_write_the_same_report_as_one(tmp_path: Path, monkeypatch: pyt
     run.reproduce(None, tmp_path / "one", workers=1)
     run.reproduce(None, tmp_path / "two", workers=2)
     for file in ("claims.json", "figures/first.svg", "figures/first.png", "figures/second.svg"):
-        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), (
+            file
+        )
 
 
-def test_an_interruption_does_not_wait_for_the_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_interruption_does_not_wait_for_the_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     write_papers(tmp_path, monkeypatch, {"long": 300.0, "short": 0.0})
 
     def interrupt(name: str, chapter: Chapter, seconds: float) -> None:
@@ -550,10 +629,14 @@ def test_a_statement_with_several_cases_counts_once(claims: tuple[Claim, ...], v
 
 def test_a_note_that_all_cases_share_stands_once(tmp_path: Path):
     same = tuple(dataclasses.replace(case, note="Note of all.") for case in cases(2.0, 0.5))
-    page = write_report([Chapter("paper", "t", "s", same)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    page = write_report([Chapter("paper", "t", "s", same)], tmp_path, date=DATE).read_text(
+        encoding="utf-8"
+    )
     assert page.count("Note of all.") == 1
     other = (dataclasses.replace(same[0], note="Another note."), same[1])
-    page = write_report([Chapter("paper", "t", "s", other)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    page = write_report([Chapter("paper", "t", "s", other)], tmp_path, date=DATE).read_text(
+        encoding="utf-8"
+    )
     assert (page.count("Note of all."), page.count("Another note.")) == (1, 1)
 
 
@@ -561,32 +644,48 @@ def test_checks_and_comparisons_are_listed_and_counted_apart(tmp_path: Path):
     claims = (*cases(2.0, 0.5), *cases(1.0, kind=Kind.CHECK), *cases(0.0, kind=Kind.FINDING))
     assert [sum(count_verdicts(claims, kind).values()) for kind in Kind] == [1, 1, 1]
     assert count_verdicts(claims, Kind.CHECK)["holds"] == 1
-    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(
+        encoding="utf-8"
+    )
     headings = re.findall(r"<h3>(.*?)</h3>", page)
     assert headings == [
-        "Overview of the claims", "Claims of the paper", "Comparisons of this report, which the paper does not make",
+        "Overview of the claims",
+        "Claims of the paper",
+        "Comparisons of this report, which the paper does not make",
         "Checks of the computation",
-    ]  # fmt: skip
-    assert ">± depends</span>" in page.partition("Claims of the paper")[2].partition("Comparisons of this")[0]
-    kinds = [record["kind"] for record in json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))]
+    ]
+    assert (
+        ">± depends</span>"
+        in page.partition("Claims of the paper")[2].partition("Comparisons of this")[0]
+    )
+    kinds = [
+        record["kind"]
+        for record in json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))
+    ]
     assert kinds == ["claim", "claim", "check", "comparison"]
 
 
 def test_the_readings_of_a_claim_are_folded_beneath_it_and_counted(tmp_path: Path):
     claims = (*cases(2.0, 3.0, 0.5), Claim("paper", "single", AtLeast(1.0), 2.0, "1"))
-    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(
+        encoding="utf-8"
+    )
     assert "<summary>3 readings: 2 hold, 1 differs</summary>" in page
     assert page.count("<details") == 1
     assert page.count(">strong") == 1, "the claim stands once"
 
 
-def test_the_range_of_the_readings_and_the_place_of_a_claim_are_seen_without_unfolding(tmp_path: Path):
+def test_the_range_of_the_readings_and_the_place_of_a_claim_are_seen_without_unfolding(
+    tmp_path: Path,
+):
     """The range contains the readings with the criterion and the unit of the first one."""
     share = Claim("paper", "strong", AtLeast(100.0), 87.0, "%", case="all chosen values")
     claims = (*(dataclasses.replace(case, place="Fig. 8") for case in cases(2.0, None, 0.5)), share)
     (statement,) = statements(claims)
     assert format_reproduced(statement) == "0.5 to 2"
-    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(
+        encoding="utf-8"
+    )
     unfolded = page.partition("<details")[0]
     assert ">≥ 1<" in unfolded
     assert ">0.5 to 2<" in unfolded
@@ -596,20 +695,36 @@ def test_the_range_of_the_readings_and_the_place_of_a_claim_are_seen_without_unf
     assert format_reproduced(statements(cases(None))[0]) == "–"
 
 
-def test_answers_terms_and_commands_stand_before_the_claims_and_a_folded_table_after_its_title(tmp_path: Path):
+def test_answers_terms_and_commands_stand_before_the_claims_and_a_folded_table_after_its_title(
+    tmp_path: Path,
+):
     chapter = Chapter(
-        "paper", "t", "Summary.", cases(2.0), (Table("long", "A long table", {"x [1]": [1.0]}, folded=True),),
-        answers=(("May I use it?", "Yes & no."),), terms=((r"\(w\)", "A factor."),), commands=(("airmuscle list", "Names."),),
-    )  # fmt: skip
+        "paper",
+        "t",
+        "Summary.",
+        cases(2.0),
+        (Table("long", "A long table", {"x [1]": [1.0]}, folded=True),),
+        answers=(("May I use it?", "Yes & no."),),
+        terms=((r"\(w\)", "A factor."),),
+        commands=(("airmuscle list", "Names."),),
+    )
     page = write_report([chapter], tmp_path, date=DATE).read_text(encoding="utf-8")
-    order = ["<dt>May I use it?</dt><dd>Yes &amp; no.</dd>", "Summary.", "A factor.", "<code>airmuscle list</code>",
-             "Claims of the paper", '<details class="table"><summary']  # fmt: skip
+    order = [
+        "<dt>May I use it?</dt><dd>Yes &amp; no.</dd>",
+        "Summary.",
+        "A factor.",
+        "<code>airmuscle list</code>",
+        "Claims of the paper",
+        '<details class="table"><summary',
+    ]
     assert sorted(order, key=page.index) == order
 
 
 def test_the_page_explains_each_verdict_and_counts_each_kind_first(tmp_path: Path):
     claims = (*cases(2.0, 0.5), *cases(1.0, kind=Kind.CHECK), *cases(0.0, kind=Kind.FINDING))
-    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(
+        encoding="utf-8"
+    )
     overview = page.partition("Overview of the claims")[2].partition("</section>")[0]
     for verdict, meaning in MEANINGS.items():
         assert f"{MARKS[verdict]} {verdict}</span></dt><dd>{meaning}</dd>" in overview

@@ -72,9 +72,14 @@ def test_a_choice_of_a_sizing_is_in_millimetres_bar_per_cent_and_litres():
     lift = LiftRequirement(force=300.0, stroke=0.03)
     conditions = SizingConditions(supply=6e5, max_count=1)
     result = size_muscles(lift, conditions, (am.load("dmsp-20-300"),))
-    choice, chapter = result.best, result.chapter()
-    row = {name: column[0] for name, column in (table_of(chapter, "choices") | table_of(chapter, "air")).items()}
-    first, last = choice.design.extended, choice.design.contracted
+    choice = result.best
+    chapter = result.chapter()
+    row = {
+        name: column[0]
+        for name, column in (table_of(chapter, "choices") | table_of(chapter, "air")).items()
+    }
+    first = choice.design.extended
+    last = choice.design.contracted
     assert row["nominal length [mm]"] == pytest.approx(1e3 * choice.length)
     ends = [row["pressure, long [bar]"], row["pressure, short [bar]"]]
     assert ends == pytest.approx([first.pressure / 1e5, last.pressure / 1e5])
@@ -82,26 +87,39 @@ def test_a_choice_of_a_sizing_is_in_millimetres_bar_per_cent_and_litres():
     assert row["contraction, short [%]"] == pytest.approx(100 * last.contraction)
     assert row["force, short [N]"] == pytest.approx(last.force)
     assert row["air a cycle [l (ANR)]"] == pytest.approx(1e3 * choice.reference_volume)
-    assert row["air a minute [l (ANR)]"] == pytest.approx(60e3 * choice.reference_volume / conditions.cycle_time)
+    assert row["air a minute [l (ANR)]"] == pytest.approx(
+        60e3 * choice.reference_volume / conditions.cycle_time
+    )
     assert row["efficiency [%]"] == pytest.approx(100 * choice.efficiency)
     assert row["diameter [mm]"] == pytest.approx(1e3 * choice.diameter)
     assert 1.0 < row["diameter [mm]"] < 100.0
     fill, _ = scenario_valves(choice)
     litres_per_second_and_bar = fill.conductance * 1e3 * 1e5
-    assert float(_valve_settings(choice)[0][1].split()[0]) == pytest.approx(litres_per_second_and_bar, rel=1e-3)
+    assert float(_valve_settings(choice)[0][1].split()[0]) == pytest.approx(
+        litres_per_second_and_bar, rel=1e-3
+    )
 
 
 def test_a_dynamic_fit_has_two_standard_errors_and_residuals_as_model_minus_measured():
     valve = Valve(3e-9, 0.35)
-    plant = Plant(Muscle.ideal(BRAID), FillDischarge(Supply(6e5), valve, valve), Isometric(0.05), Polytropic(1.2))
+    plant = Plant(
+        Muscle.ideal(BRAID),
+        FillDischarge(Supply(6e5), valve, valve),
+        Isometric(0.05),
+        Polytropic(1.2),
+    )
     command = Schedule({"fill": ((0.0, 1.0),)})
-    run = am.simulate(plant, command, duration=1.0, initial_state=plant.state_at(pressure=0.0), output_times=0.01)
+    run = am.simulate(
+        plant, command, duration=1.0, initial_state=plant.state_at(pressure=0.0), output_times=0.01
+    )
     noisy = run["pressure"] + 500.0 * np.random.default_rng(2).standard_normal(len(run))
     record = Recording({"time": run["time"], "pressure": noisy}, "fill.csv")
     found = fit_dynamic(
-        plant, [Experiment(record, command, InitialConditions.at_coordinates(plant, 0.0))],
-        free=("circuit.fill.conductance",), observed={"pressure": 500.0},
-    )  # fmt: skip
+        plant,
+        [Experiment(record, command, InitialConditions.at_coordinates(plant, 0.0))],
+        free=("circuit.fill.conductance",),
+        observed={"pressure": 500.0},
+    )
     (estimate,) = found.estimates
     chapter, record = dynamic_chapters(found, "Fill")
     table = table_of(chapter, "estimates")
@@ -111,10 +129,16 @@ def test_a_dynamic_fit_has_two_standard_errors_and_residuals_as_model_minus_meas
     (values,) = record.tables
     assert values.columns["measured pressure"].unit == "Pa"
     assert values.columns["measured pressure"].values == noisy.tolist()
-    assert values.columns["residual of pressure"].values == pytest.approx(found.modelled()["pressure"] - noisy)
+    assert values.columns["residual of pressure"].values == pytest.approx(
+        found.modelled()["pressure"] - noisy
+    )
     worse = dataclasses.replace(found.optima[0], cost=4.0 * found.optima[0].cost)
-    chapter, _ = dynamic_chapters(dataclasses.replace(found, optima=(found.optima[0], worse)), "Fill")
-    assert table_of(chapter, "optima")["rms residual relative to the lowest"] == pytest.approx([1.0, 2.0])
+    chapter, _ = dynamic_chapters(
+        dataclasses.replace(found, optima=(found.optima[0], worse)), "Fill"
+    )
+    assert table_of(chapter, "optima")["rms residual relative to the lowest"] == pytest.approx(
+        [1.0, 2.0]
+    )
 
 
 def test_a_volume_is_in_cubic_centimetres_and_its_criterion_counts_from_the_best():
@@ -139,23 +163,37 @@ def isobaric(level: float, coulomb: float) -> Recording:
     turns = (0.02, 0.16, 0.02, 0.16)
     contraction = np.concatenate([np.linspace(a, b, 100) for a, b in itertools.pairwise(turns)])
     noise = np.random.default_rng(int(level)).standard_normal(300)
-    force = 900.0 - 4000.0 * contraction - coulomb * SLIP.force_along(contraction * LENGTH) + 0.5 * noise
-    columns = {"time": 0.2 * np.arange(300), "pressure": np.full(300, level), "contraction": contraction}
+    force = (
+        900.0
+        - 4000.0 * contraction
+        - coulomb * SLIP.force_along(contraction * LENGTH)
+        + 0.5 * noise
+    )
+    columns = {
+        "time": 0.2 * np.arange(300),
+        "pressure": np.full(300, level),
+        "contraction": contraction,
+    }
     return Recording({**columns, "force": force}, f"{level:g}", {"resting_length": LENGTH})
 
 
 def test_the_friction_of_loops_is_in_newtons_and_deviations_in_per_cent():
     loops = find_loops([isobaric(1e5, 1.0), isobaric(3e5, 1.5)], degree=2)
     fits = [
-        LoopFit(each, (fit_hysteresis(SLIP, each.recording, static_curve=each.static_curve),), {}) for each in loops
+        LoopFit(each, (fit_hysteresis(SLIP, each.recording, static_curve=each.static_curve),), {})
+        for each in loops
     ]
-    chapter, one = fits[0].chapter(), fits[0].fits[0]
+    chapter = fits[0].chapter()
+    one = fits[0].fits[0]
     columns = table_of(chapter, "laws")
     names = ("rmse_without_friction", "rmse", "gap", "residual_gap", "aicc_reduction")
     headings = (
-        "rms error without friction [N]", "rms error [N]", "branch gap without friction [N]",
-        "remaining branch gap [N]", "reduction of AICc",
-    )  # fmt: skip
+        "rms error without friction [N]",
+        "rms error [N]",
+        "branch gap without friction [N]",
+        "remaining branch gap [N]",
+        "reduction of AICc",
+    )
     assert [columns[heading] for heading in headings] == [[getattr(one, name)] for name in names]
     rows = loops[0].fitted_rows
     path = loops[0].recording["contraction"]
@@ -164,19 +202,22 @@ def test_the_friction_of_loops_is_in_newtons_and_deviations_in_per_cent():
     assert int(sentence.split()[0]) == pytest.approx(rising, abs=4)
     assert rising > 1.5 * (rows.sum() - rising)
     (joint,) = fit_jointly(fits)
-    table, runs = table_of(joint_friction_chapter([joint]), "joint-runs"), joint.agreement
+    table = table_of(joint_friction_chapter([joint]), "joint-runs")
+    runs = joint.agreement
     assert table["from this run [N]"] == [run.amplitude for run in runs]
     assert table["from all runs [N]"] == [run.joint_amplitude for run in runs]
     assert table["rms deviation [%]"] == pytest.approx([100 * run.deviation for run in runs])
 
 
 def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_units():
-    measured, predicted = np.array([1e5, 2e5, 3e5, 4e5]), np.array([1.01e5, 2.0e5, 2.95e5, 4e5])
+    measured = np.array([1e5, 2e5, 3e5, 4e5])
+    predicted = np.array([1.01e5, 2.0e5, 2.95e5, 4e5])
     compared = np.array([True, True, True, False])
     quantity = QuantityPrediction("pressure", measured, predicted, np.full(4, 2e3), compared)
     record = RecordPrediction(Recording({"pressure": measured}, "a.csv"), (quantity,))
     chapter, of_record = prediction_chapters("plant.toml", VirtualWork(BRAID), [record])
-    columns, rms = table_of(chapter, "predictions"), np.sqrt((1e3**2 + 5e3**2) / 3)
+    columns = table_of(chapter, "predictions")
+    rms = np.sqrt((1e3**2 + 5e3**2) / 3)
     assert columns["rms error"] == pytest.approx([rms / 1e3])
     assert columns["maximum error"] == [-5.0]
     assert columns["unit"] == ["kPa"]
@@ -192,22 +233,36 @@ def test_a_ranking_has_each_error_under_its_heading_and_the_criterion_from_the_l
     def model(name: str, inside: float, outside: float, aicc: float) -> types.SimpleNamespace:
         candidate = types.SimpleNamespace(name=name)
         return types.SimpleNamespace(
-            candidate=candidate, parameter_count=3, in_sample_rmse=inside, cross_validated_rmse=outside, aicc=aicc,
+            candidate=candidate,
+            parameter_count=3,
+            in_sample_rmse=inside,
+            cross_validated_rmse=outside,
+            aicc=aicc,
             slack=types.SimpleNamespace(rows=0, pulling=0),
-        )  # fmt: skip
+        )
 
     ranking = (model("a", 1.0, 2.0, -90.0), model("b", 0.5, 3.0, -100.0))
-    columns = cells(Comparison._ranking_table(types.SimpleNamespace(ranking=ranking, recommended=ranking[0])))
+    columns = cells(
+        Comparison._ranking_table(types.SimpleNamespace(ranking=ranking, recommended=ranking[0]))
+    )
     assert columns["in-sample rms error [N]"] == [1.0, 0.5]
     assert columns["cross-validation rms error [N]"] == [2.0, 3.0]
     assert columns["AICc above the lowest"] == [10.0, 0.0]
 
 
 def test_the_intervals_of_a_fit_are_those_of_its_standard_errors_and_of_its_bootstrap():
-    law, contraction = VirtualWork(BRAID), np.linspace(0.0, 0.2, 20)
+    law = VirtualWork(BRAID)
+    contraction = np.linspace(0.0, 0.2, 20)
     noise = np.random.default_rng(3).standard_normal(20)
-    data = Recording({"pressure": np.full(20, 3e5), "contraction": contraction,
-                      "force": np.asarray(law.force(3e5, contraction)) + noise}, "a", {"resting_length": LENGTH})  # fmt: skip
+    data = Recording(
+        {
+            "pressure": np.full(20, 3e5),
+            "contraction": contraction,
+            "force": np.asarray(law.force(3e5, contraction)) + noise,
+        },
+        "a",
+        {"resting_length": LENGTH},
+    )
     found = fit(law, data)
     draws = Bootstrap(found, found.values * np.linspace(0.9, 1.2, 101)[:, None], 5, 0)
     chapter = draws.chapter()
@@ -221,7 +276,9 @@ def test_the_intervals_of_a_fit_are_those_of_its_standard_errors_and_of_its_boot
     assert "Bootstrap: 101 refits" in str(pickle.loads(pickle.dumps(draws)))
     assert "<table" in draws._repr_html_()
     rows = _rows(found).columns
-    assert np.array(rows["residual"]) == pytest.approx(np.array(rows["modelled force"]) - data["force"])
+    assert np.array(rows["residual"]) == pytest.approx(
+        np.array(rows["modelled force"]) - data["force"]
+    )
 
 
 def test_tables_of_a_campaign_have_shares_in_per_cent_and_runs_in_kilopascals():

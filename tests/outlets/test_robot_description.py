@@ -1,4 +1,6 @@
-"""Robot descriptions: MuJoCo computes from MJCF and URDF the accelerations and the motion of the library."""
+"""Robot descriptions: MuJoCo computes from MJCF and URDF the accelerations and the motion of the
+library.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,10 @@ ROUTES = (
     MuscleRoute((2,), (-0.025,), 0.08),
 )
 PLANAR = PlanarArm(
-    (ArmLink(0.3, 1.2, 0.14, 0.01, 0.2), ArmLink(0.25, 0.8, 0.1, 0.006, 0.1)), ROUTES, payload=0.5, gravity=9.0
+    (ArmLink(0.3, 1.2, 0.14, 0.01, 0.2), ArmLink(0.25, 0.8, 0.1, 0.006, 0.1)),
+    ROUTES,
+    payload=0.5,
+    gravity=9.0,
 )
 SERIAL = SerialArm(
     (
@@ -59,9 +64,15 @@ MECHANISMS = {"joint": JOINT, "planar arm": PLANAR, "serial arm": SERIAL}
 
 
 def plant_of(mechanism) -> Plant:
-    muscles = tuple(dataclasses.replace(MUSCLE, name=f"m{k}") for k in range(mechanism.muscle_count or 1))
+    muscles = tuple(
+        dataclasses.replace(MUSCLE, name=f"m{k}") for k in range(mechanism.muscle_count or 1)
+    )
     several = len(muscles) > 1
-    return Plant(muscles if several else muscles[0], (CIRCUIT,) * len(muscles) if several else CIRCUIT, mechanism)
+    return Plant(
+        muscles if several else muscles[0],
+        (CIRCUIT,) * len(muscles) if several else CIRCUIT,
+        mechanism,
+    )
 
 
 @pytest.fixture
@@ -79,7 +90,9 @@ def unbuilt(monkeypatch):
 @pytest.mark.parametrize("writer", [write_mjcf, write_urdf])
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_accelerations_are_those_of_the_library(name, writer, tmp_path, monkeypatch):
-    """At 20 random positions, speeds and torques: inertia, gravity, centrifugal torques and damping are all there."""
+    """At 20 random positions, speeds and torques: inertia, gravity, centrifugal torques and damping
+    are all there.
+    """
     mujoco = pytest.importorskip("mujoco")
     mechanism = MECHANISMS[name]
     written = writer(plant_of(mechanism), tmp_path, name="robot")
@@ -92,17 +105,22 @@ def test_accelerations_are_those_of_the_library(name, writer, tmp_path, monkeypa
     model = mujoco.MjModel.from_xml_string(text)
     if writer is write_urdf:
         model.opt.gravity[2] = -getattr(mechanism, "gravity", 9.80665)
-    data, random = mujoco.MjData(model), np.random.default_rng(1)
+    data = mujoco.MjData(model)
+    random = np.random.default_rng(1)
     coordinates = mechanism.coordinates
     assert [model.joint(c.name).qposadr[0] for c in coordinates] == list(range(len(coordinates)))
     for _ in range(20):
         angles, speeds, torques = random.uniform(-1.5, 1.5, (3, len(coordinates)))
-        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = angles, speeds, torques
+        data.qpos[:] = angles
+        data.qvel[:] = speeds
+        data.qfrc_applied[:] = torques
         mujoco.mj_forward(model, data)
         q = dict(zip((c.name for c in coordinates), angles, strict=True))
         v = dict(zip((c.speed for c in coordinates), speeds, strict=True))
         found = mechanism.acceleration(q, v, dict(zip(q, torques, strict=True)), {})
-        np.testing.assert_allclose(data.qacc, [found[c.name] for c in coordinates], rtol=1e-7, atol=1e-7)
+        np.testing.assert_allclose(
+            data.qacc, [found[c.name] for c in coordinates], rtol=1e-7, atol=1e-7
+        )
 
 
 @pytest.mark.tool
@@ -138,14 +156,17 @@ def test_a_joint_from_its_mjcf_moves_as_in_the_library(tmp_path):
     data.qpos[0] = state["angle"]
     for plugin, muscle in zip(written.plugins, plant.muscles, strict=True):
         plugin.initialise(model, data, muscle.name, pressure=2e5)
-    step, found = model.opt.timestep, []
+    step = model.opt.timestep
+    found = []
     for k in range(round(0.5 / step)):
         data.ctrl[0] = 1.0 if 0.1 <= k * step + 1e-9 < 0.3 else 0.0
         mujoco.mj_step(model, data)
         if (k + 1) % round(0.02 / step) == 0:
             found.append(data.qpos[0])
     schedule = Schedule({"m0.fill": ((0.0, 0.0), (0.1, 1.0), (0.3, 0.0))})
-    right = solve(Problem(plant, schedule, 0.5, state, integrator=Rodas4(1e-10), output_times=2e-2)).recording["angle"]
+    right = solve(
+        Problem(plant, schedule, 0.5, state, integrator=Rodas4(1e-10), output_times=2e-2)
+    ).recording["angle"]
     assert np.ptp(right) > 0.05
     assert np.abs(np.array(found) - right[1:]).max() * JOINT.radius <= 1e-5
 
@@ -163,8 +184,13 @@ def test_urdf_states_links_joints_and_the_muscles_in_a_comment(tmp_path):
 
 
 @pytest.mark.parametrize("writer", [write_mjcf, write_urdf])
-def test_of_stick_slip_the_constant_friction_is_written_and_the_rest_is_named(writer, tmp_path, unbuilt):
-    elements = (StickSlip(0.4, static_excess=0.5), StickSlip(0.7, (1e-3,) * 4, bearing_arms=(0.02,)))
+def test_of_stick_slip_the_constant_friction_is_written_and_the_rest_is_named(
+    writer, tmp_path, unbuilt
+):
+    elements = (
+        StickSlip(0.4, static_excess=0.5),
+        StickSlip(0.7, (1e-3,) * 4, bearing_arms=(0.02,)),
+    )
     written = writer(plant_of(WithStickSlip(SERIAL, elements)), tmp_path, name="sticking")
     root = ET.parse(written.path).getroot()
     if writer is write_mjcf:
@@ -173,7 +199,9 @@ def test_of_stick_slip_the_constant_friction_is_written_and_the_rest_is_named(wr
         frictions = [each.get("friction") for each in root.iter("dynamics")]
     assert list(map(float, frictions)) == [0.4, 0.7]
     assert [text.split()[-1] for text in written.left_out] == ["muscles", "bearing", "sliding"]
-    assert all(f"left out: {text}" in written.path.read_text(encoding="utf-8") for text in written.left_out)
+    assert all(
+        f"left out: {text}" in written.path.read_text(encoding="utf-8") for text in written.left_out
+    )
 
 
 def test_urdf_names_a_rotor_inertia_beyond_the_first_joint(tmp_path):
@@ -186,7 +214,11 @@ def test_urdf_names_a_rotor_inertia_beyond_the_first_joint(tmp_path):
     ("mechanism", "writer", "message"),
     [
         (HangingMass(1.0), write_urdf, "HangingMass has no robot description"),
-        (dataclasses.replace(JOINT, profile=PolynomialProfile((0.1,))), write_urdf, "is not circular"),
+        (
+            dataclasses.replace(JOINT, profile=PolynomialProfile((0.1,))),
+            write_urdf,
+            "is not circular",
+        ),
     ],
 )
 def test_what_a_description_cannot_state_is_refused(mechanism, writer, message, tmp_path):
@@ -205,8 +237,12 @@ def test_the_command_writes_both(tmp_path, unbuilt):
     root = ET.parse(next(tmp_path.glob("*.xml"))).getroot()
     plugins = [each.get("plugin") for each in root.iter("plugin") if each.get("tendon")]
     assert len(set(plugins)) == 2
-    assert {f"{each.removeprefix('airmuscle.')}_plugin.c" for each in plugins} <= {p.name for p in tmp_path.iterdir()}
-    assert airmuscle("export", "joint-dmsp-20-matrix", "--to", "urdf", "--tunable", "x").exit_code == 2
+    assert {f"{each.removeprefix('airmuscle.')}_plugin.c" for each in plugins} <= {
+        p.name for p in tmp_path.iterdir()
+    }
+    assert (
+        airmuscle("export", "joint-dmsp-20-matrix", "--to", "urdf", "--tunable", "x").exit_code == 2
+    )
 
 
 @pytest.mark.tool
@@ -214,5 +250,7 @@ def test_the_wrist_of_the_examples_drums_with_its_beat():
     """160 beats a minute are 10.7 in 4 s; the stick rebounds once at most."""
     pytest.importorskip("mujoco")
     example = Path(__file__).parents[2] / "examples" / "drumming_wrist.py"
-    said = subprocess.run([sys.executable, example], capture_output=True, text=True, check=True).stdout
+    said = subprocess.run(
+        [sys.executable, example], capture_output=True, text=True, check=True
+    ).stdout
     assert 10 <= int(said.split()[0]) <= 12

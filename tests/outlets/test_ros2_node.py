@@ -1,4 +1,6 @@
-"""The ROS 2 node of the examples, against a stand-in of rclpy: commands move the joint as the library does."""
+"""The ROS 2 node of the examples, against a stand-in of rclpy: commands move the joint as the
+library does.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,11 @@ class Node:
     """The calls of rclpy.node.Node that the example makes; what is published and logged is kept."""
 
     def __init__(self, name):
-        self.name, self.published, self.said, self.timers, self.topics = name, {}, [], [], {}
+        self.name = name
+        self.published = {}
+        self.said = []
+        self.timers = []
+        self.topics = {}
 
     def create_publisher(self, kind, topic, depth):
         self.published[topic] = []
@@ -38,19 +44,26 @@ class Node:
         self.timers.append((period, callback))
 
     def get_logger(self):
-        return types.SimpleNamespace(info=self.said.append, warning=self.said.append, error=self.said.append)
+        return types.SimpleNamespace(
+            info=self.said.append, warning=self.said.append, error=self.said.append
+        )
 
     def get_clock(self):
-        return types.SimpleNamespace(now=lambda: types.SimpleNamespace(to_msg=lambda: len(self.published)))
+        return types.SimpleNamespace(
+            now=lambda: types.SimpleNamespace(to_msg=lambda: len(self.published))
+        )
 
 
 @pytest.fixture
 def node(monkeypatch):
     parts = {
-        "rclpy": types.ModuleType("rclpy"), "rclpy.node": types.SimpleNamespace(Node=Node),
-        "sensor_msgs": types.ModuleType("sensor_msgs"), "sensor_msgs.msg": types.SimpleNamespace(JointState=Message),
-        "std_msgs": types.ModuleType("std_msgs"), "std_msgs.msg": types.SimpleNamespace(Float64MultiArray=Message),
-    }  # fmt: skip
+        "rclpy": types.ModuleType("rclpy"),
+        "rclpy.node": types.SimpleNamespace(Node=Node),
+        "sensor_msgs": types.ModuleType("sensor_msgs"),
+        "sensor_msgs.msg": types.SimpleNamespace(JointState=Message),
+        "std_msgs": types.ModuleType("std_msgs"),
+        "std_msgs.msg": types.SimpleNamespace(Float64MultiArray=Message),
+    }
     for name, part in parts.items():
         monkeypatch.setitem(sys.modules, name, part)
     spec = importlib.util.spec_from_file_location("ros2_joint_node", EXAMPLE)

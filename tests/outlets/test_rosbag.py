@@ -21,7 +21,8 @@ def bag(tmp_path):
     typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     of = store.types
-    number, state = of["std_msgs/msg/Float64"], of["sensor_msgs/msg/JointState"]
+    number = of["std_msgs/msg/Float64"]
+    state = of["sensor_msgs/msg/JointState"]
     header = of["std_msgs/msg/Header"](of["builtin_interfaces/msg/Time"](1, 0), "")
     folder = tmp_path / "bag"
     with rosbag2.Writer(folder, version=9) as writer:
@@ -29,7 +30,9 @@ def bag(tmp_path):
         joints = writer.add_connection("/arm/joints", state.__msgtype__, typestore=store)
         for k in range(21):
             stamp = 5 * 10**9 + k * 10**7
-            writer.write(pressure, stamp, store.serialize_cdr(number(1000.0 * k), number.__msgtype__))
+            writer.write(
+                pressure, stamp, store.serialize_cdr(number(1000.0 * k), number.__msgtype__)
+            )
             if k % 2 == 0:
                 angles = np.array([0.01 * k, -0.02 * k])
                 message = state(header, ["elbow", "wrist"], angles, np.array([]), np.array([]))
@@ -49,10 +52,13 @@ def test_a_valve_of_a_slower_topic_switches_between_two_values(tmp_path, kind):
     rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
     typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    force, valve = store.types["std_msgs/msg/Float64"], store.types[f"std_msgs/msg/{kind}"]
+    force = store.types["std_msgs/msg/Float64"]
+    valve = store.types[f"std_msgs/msg/{kind}"]
     with rosbag2.Writer(tmp_path / "bag", version=9) as writer:
         names = ("/force", force), ("/valve", valve)
-        forces, valves = (writer.add_connection(name, of.__msgtype__, typestore=store) for name, of in names)
+        forces, valves = (
+            writer.add_connection(name, of.__msgtype__, typestore=store) for name, of in names
+        )
         for k in range(21):
             stamp = 5 * 10**9 + k * 10**7
             writer.write(forces, stamp, store.serialize_cdr(force(1.0 * k), force.__msgtype__))
@@ -64,13 +70,17 @@ def test_a_valve_of_a_slower_topic_switches_between_two_values(tmp_path, kind):
 
 @pytest.fixture
 def standard_messages(tmp_path):
-    """A bag with a vector, a wrench, an inertial sensor, a pose, joints with awkward names, a pressure, a temperature."""
+    """A bag with a vector, a wrench, an inertial sensor, a pose, joints with awkward names, a
+    pressure, a temperature.
+    """
     rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
     typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     of = store.types
-    vector, point = of["geometry_msgs/msg/Vector3"](1.0, 2.0, 3.0), of["geometry_msgs/msg/Point"](1.0, 2.0, 3.0)
-    turn, nine = of["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0), np.zeros(9)
+    vector = of["geometry_msgs/msg/Vector3"](1.0, 2.0, 3.0)
+    point = of["geometry_msgs/msg/Point"](1.0, 2.0, 3.0)
+    turn = of["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    nine = np.zeros(9)
     header = of["std_msgs/msg/Header"](of["builtin_interfaces/msg/Time"](1, 0), "")
     of_joints = np.array([0.1, 0.2])
     messages = {
@@ -78,7 +88,9 @@ def standard_messages(tmp_path):
         "ft": of["geometry_msgs/msg/Wrench"](vector, vector),
         "imu": of["sensor_msgs/msg/Imu"](header, turn, nine, vector, nine, vector, nine),
         "pose": of["geometry_msgs/msg/Pose"](point, turn),
-        "joints": of["sensor_msgs/msg/JointState"](header, ["y", "wrist"], of_joints, of_joints, of_joints),
+        "joints": of["sensor_msgs/msg/JointState"](
+            header, ["y", "wrist"], of_joints, of_joints, of_joints
+        ),
         "line": of["sensor_msgs/msg/FluidPressure"](header, 301325.0, 0.0),
         "air": of["sensor_msgs/msg/Temperature"](header, 20.0, 0.0),
     }
@@ -86,13 +98,21 @@ def standard_messages(tmp_path):
         for topic, message in messages.items():
             connection = writer.add_connection(f"/{topic}", message.__msgtype__, typestore=store)
             for k in range(5):
-                writer.write(connection, 10**9 + k * 10**7, store.serialize_cdr(message, message.__msgtype__))
+                writer.write(
+                    connection, 10**9 + k * 10**7, store.serialize_cdr(message, message.__msgtype__)
+                )
     return tmp_path / "bag"
 
 
 def test_fields_of_standard_messages_are_no_quantities(standard_messages):
     (run,) = read(standard_messages)
-    for name in ("acc.y", "ft.force.y", "ft.torque.y", "imu.linear_acceleration.y", "pose.position.y"):
+    for name in (
+        "acc.y",
+        "ft.force.y",
+        "ft.torque.y",
+        "imu.linear_acceleration.y",
+        "pose.position.y",
+    ):
         assert run[name].tolist() == [2.0] * 5
     assert run["joints.effort.y"].tolist() == [0.1] * 5
     assert run["joints.position.wrist"].tolist() == [0.2] * 5
@@ -106,7 +126,8 @@ def test_a_note_proposes_the_mapping_of_a_field_with_the_unit_of_its_message(sta
     assert "Column 'ft.force.y' in N is a field of a message" in text
     assert "[columns] 'joints.effort.y' = 'torque [N m]' maps it" in text
     (mapped,) = read(
-        standard_messages, ColumnMapping(columns={"joints.effort.y": "torque", "joints.position.y": "angle [deg]"})
+        standard_messages,
+        ColumnMapping(columns={"joints.effort.y": "torque", "joints.position.y": "angle [deg]"}),
     )
     assert mapped["torque"].tolist() == [0.1] * 5
     assert mapped["angle"] == pytest.approx(np.radians(np.full(5, 0.1)))
@@ -128,11 +149,13 @@ def test_one_topic_can_be_chosen(bag):
 
 def test_the_command_converts_a_bag(bag, tmp_path):
     """As the guide states, here to CSV: the same columns, rows and numbers."""
-    target, mapping = tmp_path / "run.csv", tmp_path / "rig.toml"
+    target = tmp_path / "run.csv"
+    mapping = tmp_path / "rig.toml"
     mapping.write_text('[columns]\n"pressure" = "pressure [Pa]"\n')
     done = airmuscle("convert", bag, target, "--mapping", mapping)
     assert done.exit_code == 0, done.output
-    (run,), (written,) = read(bag, mapping=mapping), read(target)
+    (run,) = read(bag, mapping=mapping)
+    (written,) = read(target)
     assert list(written) == list(run)
     for name in run:
         assert written[name].tolist() == run[name].tolist()
@@ -163,5 +186,7 @@ def test_without_rosbags_the_extra_is_named(tmp_path, monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "rosbags", None)
     (tmp_path / "run.bag").write_bytes(b"#ROSBAG V2.0")
-    with pytest.raises(FileError, match=r"needs the package rosbags.highlevel.*pip install airmuscle\[ros\]"):
+    with pytest.raises(
+        FileError, match=r"needs the package rosbags.highlevel.*pip install airmuscle\[ros\]"
+    ):
         read(tmp_path / "run.bag")

@@ -1,4 +1,6 @@
-"""A muscle, a characteristic, a fit and a library entry are written to muscle files that load reads back."""
+"""A muscle, a characteristic, a fit and a library entry are written to muscle files that load reads
+back.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,11 @@ ENTRY = am.load("dmsp-20-300")
 MUSCLES = {
     "plain": ENTRY.muscle,
     "own elements": am.Muscle(
-        ENTRY.characteristic, ENTRY.geometry, am.LinearSpring(10.0), am.LinearDamper(200.0), Dahl(3e4, 12.0)
+        ENTRY.characteristic,
+        ENTRY.geometry,
+        am.LinearSpring(10.0),
+        am.LinearDamper(200.0),
+        Dahl(3e4, 12.0),
     ),
 }
 

@@ -1,7 +1,8 @@
-"""The schemas are the program's own models: what the files of docs, examples and library hold passes, what is broken
-does not, and nothing that a schema refuses is read by the program.
+"""The schemas are the program's own models: what the files of docs, examples and library hold
+passes, what is broken does not, and nothing that a schema refuses is read by the program.
 
-A validator of the few keywords that the schemas use stands in this file; jsonschema judges too, where it is installed.
+A validator of the few keywords that the schemas use stands in this file; jsonschema judges too,
+where it is installed.
 """
 
 from __future__ import annotations
@@ -32,11 +33,23 @@ from airmuscle.files.scenario import TABLES
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "src" / "airmuscle" / "files" / "library").glob("*.toml"))
-EXAMPLES = [p for p in sorted((ROOT / "examples").glob("*.toml")) if "[vary]" not in p.read_text(encoding="utf-8")]
+EXAMPLES = [
+    p
+    for p in sorted((ROOT / "examples").glob("*.toml"))
+    if "[vary]" not in p.read_text(encoding="utf-8")
+]
 """Scenarios; a study of many runs has a grammar of its own."""
-SCENARIO, MUSCLE = scenario_schema(), muscle_schema()
+SCENARIO = scenario_schema()
+MUSCLE = muscle_schema()
 ABOUT = {"$schema", "$defs", "title", "description", "default"}
-TYPES = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+TYPES = {
+    "object": dict,
+    "array": list,
+    "string": str,
+    "boolean": bool,
+    "integer": int,
+    "number": (int, float),
+}
 
 
 def blocks(page: str) -> list[str]:
@@ -49,14 +62,20 @@ def is_type(value: Any, kind: str) -> bool:
 
 
 def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str = "") -> list[str]:
-    """What a value has against a schema. A keyword that is not judged here is an error of the test."""
+    """What a value has against a schema. A keyword that is not judged here is an error of the
+    test.
+    """
     found: list[str] = []
     for keyword, given in schema.items():
         match keyword:
             case "$ref":
                 found += faults(value, root["$defs"][given.removeprefix("#/$defs/")], root, where)
             case "anyOf":
-                found += [f"{where}: none of {len(given)}"] if all(faults(value, s, root) for s in given) else []
+                found += (
+                    [f"{where}: none of {len(given)}"]
+                    if all(faults(value, s, root) for s in given)
+                    else []
+                )
             case "type":
                 found += [] if is_type(value, given) else [f"{where}: no {given}"]
             case "enum":
@@ -64,27 +83,55 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str 
             case "const":
                 found += [] if value == given else [f"{where}: not {given}"]
             case "minimum" | "maximum" if is_type(value, "number"):
-                found += [] if (value >= given if keyword == "minimum" else value <= given) else [f"{where}: {keyword}"]
+                found += (
+                    []
+                    if (value >= given if keyword == "minimum" else value <= given)
+                    else [f"{where}: {keyword}"]
+                )
             case "pattern" if isinstance(value, str):
                 found += [] if re.search(given, value) else [f"{where}: no number with a unit"]
             case "minItems" | "maxItems" if isinstance(value, list):
-                found += [] if (len(value) >= given if keyword == "minItems" else len(value) <= given) else [where]
+                found += (
+                    []
+                    if (len(value) >= given if keyword == "minItems" else len(value) <= given)
+                    else [where]
+                )
             case "prefixItems" if isinstance(value, list):
                 pairs = zip(value, given, strict=False)
-                found += [f for i, (item, s) in enumerate(pairs) for f in faults(item, s, root, f"{where}[{i}]")]
+                found += [
+                    f
+                    for i, (item, s) in enumerate(pairs)
+                    for f in faults(item, s, root, f"{where}[{i}]")
+                ]
             case "items" if isinstance(value, list):
-                found += [f for i, item in enumerate(value) for f in faults(item, given, root, f"{where}[{i}]")]
+                found += [
+                    f
+                    for i, item in enumerate(value)
+                    for f in faults(item, given, root, f"{where}[{i}]")
+                ]
             case "required" if isinstance(value, dict):
                 found += [f"{where}: lacks {key}" for key in given if key not in value]
             case "properties" if isinstance(value, dict):
                 here = [key for key in given if key in value]
-                found += [f for key in here for f in faults(value[key], given[key], root, f"{where}.{key}")]
+                found += [
+                    f
+                    for key in here
+                    for f in faults(value[key], given[key], root, f"{where}.{key}")
+                ]
             case "additionalProperties" if isinstance(value, dict):
-                rest = {key: item for key, item in value.items() if key not in schema.get("properties", {})}
+                rest = {
+                    key: item
+                    for key, item in value.items()
+                    if key not in schema.get("properties", {})
+                }
                 if given is False:
                     found += [f"{where}: {key} is not known" for key in rest]
                 else:
-                    found += [f for key, item in rest.items() for f in faults(item, given, root, f"{where}.{key}")]
+                    found += [
+                        f
+                        for key, item in rest.items()
+                        for f in faults(item, given, root, f"{where}.{key}")
+                    ]
             case _ if keyword in ABOUT or keyword in JUDGED:
                 continue
             case _:
@@ -93,9 +140,17 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str 
 
 
 JUDGED = {
-    "minimum", "maximum", "pattern", "minItems", "maxItems", "prefixItems", "items", "required", "properties",
+    "minimum",
+    "maximum",
+    "pattern",
+    "minItems",
+    "maxItems",
+    "prefixItems",
+    "items",
+    "required",
+    "properties",
     "additionalProperties",
-}  # fmt: skip
+}
 
 
 def judged(value: Any, schema: dict[str, Any]) -> list[str]:
@@ -179,7 +234,11 @@ BROKEN = [
     ('fill = [["5 s", 1], ["15 s", 0]]', 'fill = [["5 s"], ["15 s", 0]]', ".input.fill[0]"),
     ('fill = [["5 s", 1], ["15 s", 0]]', "fill = 1", ".input.fill: no array"),
     ('fill = [["5 s", 1], ["15 s", 0]]', "fill = [[0, true]]", ".input.fill[0][1]: none of"),
-    ("[input]", '[input]\nmodel = "Shedule"', ".input.model: none of ['Schedule', 'SampledSignal']"),
+    (
+        "[input]",
+        '[input]\nmodel = "Shedule"',
+        ".input.model: none of ['Schedule', 'SampledSignal']",
+    ),
     ("[input]", '[input]\ndrivers = { fill = "OnOf" }', ".input.drivers.fill: none of"),
     ("[input]", '[input]\ndrivers = { fill = { model = "PWM" } }', ".input.drivers.fill: none of"),
     ("[input]", "[input]\nfile = 3", ".input.file: no string"),
@@ -214,7 +273,9 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
         ("max_contraction", "max_contractoin", ".validity_range: max_contractoin is not known"),
     ],
 )
-def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: str, becomes: str, fault: str):
+def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(
+    was: str, becomes: str, fault: str
+):
     (text,) = blocks("muscle-file.md")
     tables = tomllib.loads(text.replace(was, becomes, 1))
     found = judged(tables, MUSCLE)
@@ -250,9 +311,13 @@ def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
     assert "--out must be a file name" in nameless.stderr
 
 
-@pytest.mark.parametrize("name", ["my_laws:Zone", "lab.laws:Zone", "my_laws", "my laws:Zone", "PIDD"])
+@pytest.mark.parametrize(
+    "name", ["my_laws:Zone", "lab.laws:Zone", "my_laws", "my laws:Zone", "PIDD"]
+)
 def test_a_class_of_a_user_passes_with_permission_alone(name):
-    """In place of a controller, and of the law within one, with any parameters; a loop still needs its own keys."""
+    """In place of a controller, and of the law within one, with any parameters; a loop still needs
+    its own keys.
+    """
     with allow_code():
         permitted = scenario_schema()
     loop = tomllib.loads((ROOT / "examples" / "pressure_loop.toml").read_text(encoding="utf-8"))
@@ -261,7 +326,9 @@ def test_a_class_of_a_user_passes_with_permission_alone(name):
     laws = [own | keys, {"model": "Multirate", "law": own, "every": 2} | keys]
     for law in laws:
         changed = {**loop, "input": {**loop["input"], "controller": law}}
-        assert (not faults(changed, permitted, permitted)) is (name.count(":") == 1 and " " not in name)
+        assert (not faults(changed, permitted, permitted)) is (
+            name.count(":") == 1 and " " not in name
+        )
         assert faults(changed, SCENARIO, SCENARIO)
     alone = {**loop, "input": {**loop["input"], "controller": own}}
     assert faults(alone, permitted, permitted)

@@ -1,4 +1,6 @@
-"""Processes that share only a folder compute each task once, to the bits of one process alone, also if some are killed."""
+"""Processes that share only a folder compute each task once, to the bits of one process alone, also
+if some are killed.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,9 @@ def folder(tmp_path: Path) -> Path:
 def started(folder: Path, out: str) -> subprocess.Popen:
     options = ("--out", str(folder / out), "--join", str(folder / "shared"), "--workers", "1")
     command = [sys.executable, "-m", "airmuscle", "study", str(folder / "study.toml"), *options]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    return subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
 
 
 def shares(said: str) -> list[int]:
@@ -54,28 +58,42 @@ def results(folder: Path) -> list[Path]:
 
 
 def test_two_processes_with_one_command_share_a_study(folder: Path):
-    """Each chunk is computed once; the process that comes second to the output folder writes nothing there."""
-    alone = airmuscle("study", str(folder / "study.toml"), "--out", str(folder / "alone"), "--workers", "1")
+    """Each chunk is computed once; the process that comes second to the output folder writes
+    nothing there.
+    """
+    alone = airmuscle(
+        "study", str(folder / "study.toml"), "--out", str(folder / "alone"), "--workers", "1"
+    )
     assert alone.exit_code == 0
     both = [started(folder, "out") for _ in range(2)]
     said = [process.communicate(timeout=240)[1] for process in both]
     assert [process.returncode for process in both] == [0, 0], said
     assert [sum(shares(each)) for each in said] == [12, 12]
     assert len(results(folder)) == 12
-    assert (folder / "out" / "results.csv").read_bytes() == (folder / "alone" / "results.csv").read_bytes()
+    assert (folder / "out" / "results.csv").read_bytes() == (
+        folder / "alone" / "results.csv"
+    ).read_bytes()
     assert not list((folder / "shared").glob("*.claim*"))
     assert not (folder / "out" / "chunks").exists()  # the results are saved once
-    assert "Tasks of the shared folder: " in (folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert "Tasks of the shared folder: " in (folder / "out" / "report.html").read_text(
+        encoding="utf-8"
+    )
 
 
 def killed_at_random(folder: Path, kills: int) -> None:
-    """Kill one of two processes `kills` times, at random moments, and compare the result with that of one process."""
+    """Kill one of two processes `kills` times, at random moments, and compare the result with that
+    of one process.
+    """
     moments = random.Random(1)
-    assert airmuscle("study", str(folder / "study.toml"), "--out", str(folder / "alone")).exit_code == 0
+    assert (
+        airmuscle("study", str(folder / "study.toml"), "--out", str(folder / "alone")).exit_code
+        == 0
+    )
     for attempt in range(kills):
         shutil.rmtree(folder / "shared", ignore_errors=True)
         shutil.rmtree(folder / f"out{attempt}", ignore_errors=True)
-        victim, survivor = started(folder, "victim"), started(folder, f"out{attempt}")
+        victim = started(folder, "victim")
+        survivor = started(folder, f"out{attempt}")
         end = time.monotonic() + 60
         while not results(folder) and survivor.poll() is None and time.monotonic() < end:
             time.sleep(0.01)
@@ -96,7 +114,9 @@ def test_thirty_kills_do_not_change_the_result(folder: Path):
 
 @pytest.fixture
 def three_times_as_fast(monkeypatch: pytest.MonkeyPatch) -> float:
-    """Claims are renewed and expire in a third of the time; the time of expiry [s] of the program."""
+    """Claims are renewed and expire in a third of the time; the time of expiry [s] of the
+    program.
+    """
     distribution = importlib.import_module("airmuscle.engine.distribution")
     expiry = distribution.EXPIRY
     monkeypatch.setattr(distribution, "EXPIRY", expiry / 3)
@@ -104,7 +124,9 @@ def three_times_as_fast(monkeypatch: pytest.MonkeyPatch) -> float:
     return expiry
 
 
-def test_the_claim_of_a_process_that_has_ended_is_taken_over_within_10_s(tmp_path: Path, three_times_as_fast: float):
+def test_the_claim_of_a_process_that_has_ended_is_taken_over_within_10_s(
+    tmp_path: Path, three_times_as_fast: float
+):
     with shared_folder(tmp_path, 1) as executor:
         executor.submit(math.factorial, 20).result()
     (result,) = tmp_path.glob("*.result")
@@ -132,7 +154,8 @@ def test_a_renewed_claim_is_respected_and_its_result_read(tmp_path: Path):
         kept.rename(result)
         claim.unlink()
 
-    process, begin = threading.Thread(target=other), time.monotonic()
+    process = threading.Thread(target=other)
+    begin = time.monotonic()
     process.start()
     with shared_folder(tmp_path, 1) as executor:
         assert executor.submit(math.factorial, 20).result() == math.factorial(20)
@@ -183,7 +206,10 @@ def test_the_result_of_another_user_is_refused(tmp_path: Path, monkeypatch: pyte
     with shared_folder(tmp_path, 1) as executor:
         executor.submit(math.factorial, 5).result()
     monkeypatch.setattr(os, "getuid", lambda: 4711)
-    with pytest.raises(FileError, match="belongs to another user"), shared_folder(tmp_path, 1) as executor:
+    with (
+        pytest.raises(FileError, match="belongs to another user"),
+        shared_folder(tmp_path, 1) as executor,
+    ):
         executor.submit(math.factorial, 5).result()
 
 
@@ -192,25 +218,53 @@ def test_a_comparison_of_laws_is_shared(tmp_path: Path):
     data = write(load_data("dmsp-20-300"), tmp_path / "bench.csv")
     command = ("fit", str(data), "--compare", "--json", "--workers", "1")
     alone = airmuscle(*command, "--out", str(tmp_path / "alone"))
-    joined = [airmuscle(*command, "--out", str(tmp_path / name), "--join", str(tmp_path / "s")) for name in ("a", "b")]
+    joined = [
+        airmuscle(*command, "--out", str(tmp_path / name), "--join", str(tmp_path / "s"))
+        for name in ("a", "b")
+    ]
     assert [each.exit_code for each in (alone, *joined)] == [0, 0, 0]
     expected, *found = ({**json.loads(each.stdout), "files": None} for each in (alone, *joined))
     assert found == [expected] * 2
-    assert shares(joined[0].stderr) == shares(joined[1].stderr) == [len(list((tmp_path / "s").glob("*.result")))]
+    assert (
+        shares(joined[0].stderr)
+        == shares(joined[1].stderr)
+        == [len(list((tmp_path / "s").glob("*.result")))]
+    )
 
 
 def test_options_that_exclude_each_other_are_refused(folder: Path):
     study = ("study", str(folder / "study.toml"), "--dask", "tcp://127.0.0.1:1")
-    assert "--join and --dask exclude each other" in airmuscle(*study, "--join", str(folder / "shared")).stderr
+    assert (
+        "--join and --dask exclude each other"
+        in airmuscle(*study, "--join", str(folder / "shared")).stderr
+    )
     assert "--workers and --dask exclude each other" in airmuscle(*study, "--workers", "2").stderr
-    single = airmuscle("fit", str(folder / "x.csv"), "--characteristic", "Sarosi2012", "--join", str(folder / "shared"))
+    single = airmuscle(
+        "fit",
+        str(folder / "x.csv"),
+        "--characteristic",
+        "Sarosi2012",
+        "--join",
+        str(folder / "shared"),
+    )
     assert "distribute the candidates of --compare" in single.stderr
 
 
 def test_a_tuning_is_shared_by_its_generations(folder: Path):
-    """The second process reads all metrics and writes its own files; both have the gains of one process alone."""
+    """The second process reads all metrics and writes its own files; both have the gains of one
+    process alone.
+    """
     (folder / "loop.toml").write_text(PRESSURE_LOOP, encoding="utf-8")
-    command = ("tune", str(folder / "loop.toml"), "--budget", "64", "--draws", "1", "--workers", "1")
+    command = (
+        "tune",
+        str(folder / "loop.toml"),
+        "--budget",
+        "64",
+        "--draws",
+        "1",
+        "--workers",
+        "1",
+    )
     assert airmuscle(*command, "--out", str(folder / "alone")).exit_code == 0
     join = ("--join", str(folder / "shared"))
     joined = [airmuscle(*command, "--out", str(folder / name), *join) for name in ("a", "b")]
@@ -221,11 +275,22 @@ def test_a_tuning_is_shared_by_its_generations(folder: Path):
 
 
 def test_the_process_that_does_not_write_names_the_files_of_the_other(folder: Path):
-    """Of two processes of a command one holds the folder of the output; the other draws no figure."""
+    """Of two processes of a command one holds the folder of the output; the other draws no
+    figure.
+    """
     data = write(load_data("dmsp-20-300"), folder / "bench.csv")
     join = ("--join", str(folder / "shared"), "--workers", "1")
     commands = [
-        ("fit", str(data), "--compare", "--characteristic", "Sarosi2012", *join, "--out", str(folder / "out")),
+        (
+            "fit",
+            str(data),
+            "--compare",
+            "--characteristic",
+            "Sarosi2012",
+            *join,
+            "--out",
+            str(folder / "out"),
+        ),
         ("study", str(folder / "study.toml"), "--json", *join, "--out", str(folder / "out")),
     ]
     with exclusive_folders():
@@ -239,10 +304,21 @@ def test_the_process_that_does_not_write_names_the_files_of_the_other(folder: Pa
     assert not (folder / "out").exists()
 
 
-def test_the_output_of_a_process_that_has_ended_is_written_by_the_other(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """At the start another process holds the folder of the output; at the end it is free, and without a report."""
+def test_the_output_of_a_process_that_has_ended_is_written_by_the_other(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """At the start another process holds the folder of the output; at the end it is free, and
+    without a report.
+    """
     monkeypatch.setattr("airmuscle.outlets.cli.delivery.Execution.writes", lambda self, out: False)
-    command = ("study", str(folder / "study.toml"), "--join", str(folder / "shared"), "--workers", "1")
+    command = (
+        "study",
+        str(folder / "study.toml"),
+        "--join",
+        str(folder / "shared"),
+        "--workers",
+        "1",
+    )
     done = airmuscle(*command, "--out", str(folder / "out"))
     assert done.exit_code == 0, done.stderr
     assert (folder / "out" / "report.html").is_file()
@@ -258,7 +334,10 @@ def test_a_shared_folder_stays_for_the_processes_that_start_at_once(tmp_path: Pa
 
 def test_invalid_folders_and_numbers_of_workers_are_errors(tmp_path: Path):
     (tmp_path / "file").touch()
-    with pytest.raises(AirmuscleError, match="cannot be written to"), shared_folder(tmp_path / "file"):
+    with (
+        pytest.raises(AirmuscleError, match="cannot be written to"),
+        shared_folder(tmp_path / "file"),
+    ):
         pass
     with pytest.raises(InputError, match="workers is 0"), shared_folder(tmp_path, 0):
         pass

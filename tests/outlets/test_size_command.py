@@ -1,4 +1,6 @@
-"""`airmuscle size`: table, JSON, report and a scenario that `airmuscle simulate` runs and that reaches both ends."""
+"""`airmuscle size`: table, JSON, report and a scenario that `airmuscle simulate` runs and that
+reaches both ends.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,13 @@ from command_line import airmuscle
 from widths import widened
 
 import airmuscle as am
-from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
+from airmuscle.design import (
+    JointRequirement,
+    LiftRequirement,
+    SizingConditions,
+    choose,
+    scenario_text,
+)
 from airmuscle.design.sizing import MOVING, RESTING, air_path
 from airmuscle.files import load_scenario
 
@@ -40,16 +48,23 @@ def simulate(text: str, folder: Path) -> am.Recording:
         (LiftRequirement(stroke=0.03, force=150.0), 1, "dmsp-20-300"),
     ],
 )
-def test_the_lift_of_the_scenario_reaches_both_ends_of_the_stroke(requirement, count, name, tmp_path):
+def test_the_lift_of_the_scenario_reaches_both_ends_of_the_stroke(
+    requirement, count, name, tmp_path
+):
     choice = choose(am.load(name), requirement, CONDITIONS, count)
     run = simulate(scenario_text(choice), tmp_path)
-    cycle, position = CONDITIONS.cycle_time, run["position"] - choice.design.extended.contraction * choice.length
+    cycle = CONDITIONS.cycle_time
+    position = run["position"] - choice.design.extended.contraction * choice.length
     end_of_rest = np.interp((2 * RESTING + MOVING) * cycle, run["time"], position)
     assert end_of_rest == pytest.approx(requirement.stroke, rel=0.02)
-    assert np.interp(RESTING * cycle, run["time"], position) == pytest.approx(0.0, abs=1e-6 * requirement.stroke)
+    assert np.interp(RESTING * cycle, run["time"], position) == pytest.approx(
+        0.0, abs=1e-6 * requirement.stroke
+    )
     assert position[-1] == pytest.approx(0.0, abs=0.02 * requirement.stroke)
     assert position.max() < 1.02 * requirement.stroke
-    warm = simulate(scenario_text(choice).replace("Isothermal", "WallHeatTransfer"), tmp_path)["position"]
+    warm = simulate(scenario_text(choice).replace("Isothermal", "WallHeatTransfer"), tmp_path)[
+        "position"
+    ]
     further = (warm.max() - choice.design.extended.contraction * choice.length) / requirement.stroke
     assert 1.03 < further < 1.06, "as the scenario states of the default gas"
 
@@ -57,7 +72,10 @@ def test_the_lift_of_the_scenario_reaches_both_ends_of_the_stroke(requirement, c
 def test_a_fill_through_the_sized_valve_takes_its_part_of_the_cycle(tmp_path):
     choice = choose(am.load("dmsp-20-300"), LiftRequirement(stroke=0.04, mass=20.0), CONDITIONS)
     run = simulate(scenario_text(choice), tmp_path)
-    filled = np.interp((RESTING + MOVING) * CONDITIONS.cycle_time, run["time"], run["air_mass"]) - run["air_mass"][0]
+    filled = (
+        np.interp((RESTING + MOVING) * CONDITIONS.cycle_time, run["time"], run["air_mass"])
+        - run["air_mass"][0]
+    )
     assert filled == pytest.approx(choice.air, rel=0.02)
 
 
@@ -65,12 +83,17 @@ def test_the_joint_of_the_scenario_reaches_both_ends_of_the_angle(tmp_path):
     requirement = JointRequirement(angle=math.radians(60.0), torque=5.0, inertia=0.05)
     run = simulate(scenario_text(choose(am.load("dmsp-20-300"), requirement, CONDITIONS)), tmp_path)
     cycle = CONDITIONS.cycle_time
-    at = [np.interp(part * cycle, run["time"], run["angle"]) for part in (0.99 * (1 - MOVING), 1 + MOVING)]
+    at = [
+        np.interp(part * cycle, run["time"], run["angle"])
+        for part in (0.99 * (1 - MOVING), 1 + MOVING)
+    ]
     assert at == pytest.approx([requirement.angle / 2, -requirement.angle / 2], rel=0.01)
 
 
 def test_a_scenario_states_what_is_chosen():
-    text = scenario_text(choose(am.load("dmsp-20-300"), LiftRequirement(stroke=0.03, force=150.0), CONDITIONS))
+    text = scenario_text(
+        choose(am.load("dmsp-20-300"), LiftRequirement(stroke=0.03, force=150.0), CONDITIONS)
+    )
     comments = " ".join(line for line in text.splitlines() if line.startswith("#"))
     for chosen in ("critical pressure ratio", "isothermal air", "damper", "moving mass"):
         assert chosen in comments
@@ -84,7 +107,12 @@ def test_the_command_writes_a_report_and_a_scenario_that_runs(tmp_path):
     result = airmuscle(*LIFT, *ONE, "--out", folder)
     assert result.exit_code == 0, result.output
     written = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
-    assert {"report.html", "scenario.toml", "data/choices.csv", "figures/working_points.png"} <= written
+    assert {
+        "report.html",
+        "scenario.toml",
+        "data/choices.csv",
+        "figures/working_points.png",
+    } <= written
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Force of one dmsp-20-300" in page
     assert "scenario.toml" in page
@@ -104,9 +132,13 @@ def test_json_contains_the_choices_in_si_units():
 
 
 def test_the_table_names_choices_and_reasons():
-    result = airmuscle(*LIFT, "--muscle", "dmsp-20-300", "--muscle", "festo-tool-dmsp-10", "--max-length", "300 mm")
+    result = airmuscle(
+        *LIFT, "--muscle", "dmsp-20-300", "--muscle", "festo-tool-dmsp-10", "--max-length", "300 mm"
+    )
     assert re.search(r"festo-dmsp-20 +1 +220\.6 .* 1\.22 to 5\.13", result.output), result.output
-    assert re.search(r"festo-tool-dmsp-10 .*with 300 mm, the stroke needs a contraction of", result.output)
+    assert re.search(
+        r"festo-tool-dmsp-10 .*with 300 mm, the stroke needs a contraction of", result.output
+    )
 
 
 def test_the_number_of_muscles_can_be_given():
@@ -123,7 +155,10 @@ def test_a_joint_is_sized_with_its_radius():
 def test_a_law_without_geometry_gives_a_report_without_a_scenario(tmp_path):
     result = airmuscle(*LIFT, "--muscle", "festo-tool-dmsp-20", "--out", tmp_path)
     assert result.exit_code == 0
-    assert "No scenario is written: festo-tool-dmsp-20: the enclosed volume is not known" in result.output
+    assert (
+        "No scenario is written: festo-tool-dmsp-20: the enclosed volume is not known"
+        in result.output
+    )
     assert (tmp_path / "report.html").exists()
     assert not (tmp_path / "scenario.toml").exists()
 
@@ -131,28 +166,70 @@ def test_a_law_without_geometry_gives_a_report_without_a_scenario(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--load", "-20 kg", "--stroke", "40 mm", "--supply", "6 bar"), r"mass .* is -20 kg; allowed range: 0 to"),
+        (
+            ("--load", "-20 kg", "--stroke", "40 mm", "--supply", "6 bar"),
+            r"mass .* is -20 kg; allowed range: 0 to",
+        ),
         (
             ("--load", "20 kg", "--stroke", "0 mm", "--supply", "6 bar"),
             r"stroke\) is 0 m; allowed range: 0\.0001 to 10",
         ),
-        (("--load", "nan kg", "--stroke", "40 mm", "--supply", "6 bar"), "--load: 'nan kg' is not a number"),
-        (("--load", "20 mm", "--stroke", "40 mm", "--supply", "6 bar"), "A load is a mass or a force: '20 kg' or"),
+        (
+            ("--load", "nan kg", "--stroke", "40 mm", "--supply", "6 bar"),
+            "--load: 'nan kg' is not a number",
+        ),
+        (
+            ("--load", "20 mm", "--stroke", "40 mm", "--supply", "6 bar"),
+            "A load is a mass or a force: '20 kg' or",
+        ),
         (("--load", "20", "--stroke", "40 mm", "--supply", "6 bar"), "has no unit"),
         (("--load", "20 kg", "--stroke", "40 kg", "--supply", "6 bar"), "--stroke"),
         (("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 mm"), "--supply"),
-        (("--load", "20 kg", "--stroke", "40 mm", "--supply", "9 bar", *ONE), "exceeds the permitted 6 bar; reduce it"),
+        (
+            ("--load", "20 kg", "--stroke", "40 mm", "--supply", "9 bar", *ONE),
+            "exceeds the permitted 6 bar; reduce it",
+        ),
         (
             ("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--safety", "nan"),
             "--safety: 'nan' is not a number",
         ),
-        (("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--safety", "0.5"), "allowed range: 1.05 to 20"),
-        (("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--max-count", "0"), "max_count is 0"),
-        (("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--muscle", "dmsp-30"), "no muscle or law"),
-        (("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--muscle", "festo-dmsp-20"), "is a product"),
-        (("--load", "900 kg", "--stroke", "40 mm", "--supply", "6 bar", *ONE), "Reachable: .* over 40 mm"),
-        (("--torque", "0 N m", "--angle", "60 deg", "--supply", "6 bar"), "torque of the load is 0 N m"),
-        (("--torque", "5 N m", "--angle", "600 deg", "--supply", "6 bar"), "allowed range: 0.001 to 6"),
+        (
+            ("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--safety", "0.5"),
+            "allowed range: 1.05 to 20",
+        ),
+        (
+            ("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--max-count", "0"),
+            "max_count is 0",
+        ),
+        (
+            ("--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--muscle", "dmsp-30"),
+            "no muscle or law",
+        ),
+        (
+            (
+                "--load",
+                "20 kg",
+                "--stroke",
+                "40 mm",
+                "--supply",
+                "6 bar",
+                "--muscle",
+                "festo-dmsp-20",
+            ),
+            "is a product",
+        ),
+        (
+            ("--load", "900 kg", "--stroke", "40 mm", "--supply", "6 bar", *ONE),
+            "Reachable: .* over 40 mm",
+        ),
+        (
+            ("--torque", "0 N m", "--angle", "60 deg", "--supply", "6 bar"),
+            "torque of the load is 0 N m",
+        ),
+        (
+            ("--torque", "5 N m", "--angle", "600 deg", "--supply", "6 bar"),
+            "allowed range: 0.001 to 6",
+        ),
         (("--torque", "5 N", "--angle", "60 deg", "--supply", "6 bar"), "--torque"),
     ],
 )
@@ -171,7 +248,18 @@ def test_a_request_that_cannot_be_met_is_one_line_and_writes_nothing(arguments, 
         ("--supply", "6 bar"),
         ("--load", "20 kg", "--supply", "6 bar"),
         ("--load", "20 kg", "--stroke", "40 mm"),
-        ("--load", "20 kg", "--stroke", "40 mm", "--torque", "5 N m", "--angle", "60 deg", "--supply", "6 bar"),
+        (
+            "--load",
+            "20 kg",
+            "--stroke",
+            "40 mm",
+            "--torque",
+            "5 N m",
+            "--angle",
+            "60 deg",
+            "--supply",
+            "6 bar",
+        ),
         ("--stiffness", "2 N/mm", "--torque", "5 N m", "--angle", "60 deg", "--supply", "6 bar"),
         (*LIFT[1:], "--sort", "price"),
     ],
@@ -183,7 +271,17 @@ def test_wrong_usage_is_exit_code_2(arguments):
 
 
 def test_an_equal_force_at_both_ends_is_one_number():
-    arguments = ["size", "--load", "40 kg", "--stroke", "60 mm", "--supply", "6 bar", "--muscle", "dmsp-20-300"]
+    arguments = [
+        "size",
+        "--load",
+        "40 kg",
+        "--stroke",
+        "60 mm",
+        "--supply",
+        "6 bar",
+        "--muscle",
+        "dmsp-20-300",
+    ]
     result = airmuscle(*arguments, width=200)
     assert result.exit_code == 0, result.output
     assert "392" in result.stdout
@@ -191,29 +289,43 @@ def test_an_equal_force_at_both_ends_is_one_number():
 
 
 def test_the_laws_of_one_product_are_one_product_with_the_spread_of_its_models():
-    """Several laws of one muscle are no choice between muscles; their lengths differ by the error of the models."""
-    found = json.loads(airmuscle(*LIFT, "--max-count", "1", "--max-length", "400 mm", "--json").stdout)["sizing"]
+    """Several laws of one muscle are no choice between muscles; their lengths differ by the error
+    of the models.
+    """
+    found = json.loads(
+        airmuscle(*LIFT, "--max-count", "1", "--max-length", "400 mm", "--json").stdout
+    )["sizing"]
     laws = {row["muscle"]: row["product"] for row in found["choices"]}
     several = [product for product in set(laws.values()) if list(laws.values()).count(product) > 1]
     assert "festo-dmsp-20" in several
     rows = {row["product"]: row for row in found["products"]}
     assert len(rows) == len(found["products"]) == len(set(laws.values()))
     for product, row in rows.items():
-        lengths = [choice["nominal_length"] for choice in found["choices"] if choice["product"] == product]
+        lengths = [
+            choice["nominal_length"] for choice in found["choices"] if choice["product"] == product
+        ]
         assert row["nominal_length"] == lengths[0]
         assert row["length_by_all_laws"] == [min(lengths), max(lengths)]
     assert "the spread is the uncertainty of the models" in found["summary"][0]
     cycles = {row["muscle"]: (row["air_a_cycle"], row["air_a_minute"]) for row in found["air"]}
-    assert cycles["dmsp-20-300"][1] == pytest.approx(30 * cycles["dmsp-20-300"][0])  # two seconds a cycle
+    assert cycles["dmsp-20-300"][1] == pytest.approx(
+        30 * cycles["dmsp-20-300"][0]
+    )  # two seconds a cycle
 
 
 def test_a_valve_of_the_library_reaches_the_cycle_time_if_it_fills_and_discharges_in_it():
-    """The time of a fill is that of a simulated one; a valve that is too small is not among the suitable ones."""
+    """The time of a fill is that of a simulated one; a valve that is too small is not among the
+    suitable ones.
+    """
     fast, slow = (
-        json.loads(airmuscle(*LIFT, *ONE, "--cycle-time", time, "--json").stdout)["sizing"]["valves"]
+        json.loads(airmuscle(*LIFT, *ONE, "--cycle-time", time, "--json").stdout)["sizing"][
+            "valves"
+        ]
         for time in ("0.6 s", "4 s")
     )
-    reaching = [{row["valve"] for row in rows if row["reaches_the_cycle_time"]} for rows in (fast, slow)]
+    reaching = [
+        {row["valve"] for row in rows if row["reaches_the_cycle_time"]} for rows in (fast, slow)
+    ]
     assert reaching[0] < reaching[1]
     row = next(row for row in slow if row["valve"] == "matrix-821")
     choice = choose(am.load("dmsp-20-300"), LiftRequirement(stroke=0.04, mass=20.0), CONDITIONS)
@@ -225,7 +337,17 @@ def test_a_valve_of_the_library_reaches_the_cycle_time_if_it_fills_and_discharge
 
 @pytest.mark.parametrize("width", widened([90, 100], lambda width: width == 90))
 def test_no_heading_and_no_number_of_the_table_is_broken(width):
-    words = ["size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--max-length", "400 mm"]
+    words = [
+        "size",
+        "--load",
+        "20 kg",
+        "--stroke",
+        "40 mm",
+        "--supply",
+        "6 bar",
+        "--max-length",
+        "400 mm",
+    ]
     lines = airmuscle(*words, width=width).stdout.splitlines()
     start = lines.index("Products, best first") + 1
     table = lines[start : lines.index("", start)]

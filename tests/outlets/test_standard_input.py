@@ -1,5 +1,6 @@
-"""A table of text on the standard input, such as that of a pipe, is read to its end within a bounded memory: the rows that
-are kept are those of the file, and where there are too many, one in 2, 4, 8, ... of them.
+"""A table of text on the standard input, such as that of a pipe, is read to its end within a
+bounded memory: the rows that are kept are those of the file, and where there are too many, one in
+2, 4, 8, ... of them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,10 @@ def text(rows: int = ROWS, comment: bool = True) -> str:
     """A table with a constant, and a comment between its rows."""
     lines = [f"{i * 0.001:.3f},{100 + i % 7},{i}" for i in range(rows)]
     lines.insert(rows // 2, "# a comment" if comment else "")
-    return "\n".join(["# resting_length [mm] = 300", "time [s],pressure [kPa],force [N]", *lines]) + "\n"
+    return (
+        "\n".join(["# resting_length [mm] = 300", "time [s],pressure [kPa],force [N]", *lines])
+        + "\n"
+    )
 
 
 class Pipe:
@@ -33,8 +37,12 @@ class Pipe:
         self.buffer = io.BufferedReader(io.BytesIO(content), 4096)  # type: ignore[arg-type]
 
 
-def piped(monkeypatch: pytest.MonkeyPatch, content: str | bytes, *arguments: object, **options: object) -> Recording:
-    monkeypatch.setattr("sys.stdin", Pipe(content if isinstance(content, bytes) else content.encode()))
+def piped(
+    monkeypatch: pytest.MonkeyPatch, content: str | bytes, *arguments: object, **options: object
+) -> Recording:
+    monkeypatch.setattr(
+        "sys.stdin", Pipe(content if isinstance(content, bytes) else content.encode())
+    )
     return read("-", *arguments, **options)[0]  # type: ignore[arg-type]
 
 
@@ -45,7 +53,8 @@ def test_a_pipe_contains_what_the_file_contains(
 ):
     content = text(rows).replace("\n", "\r\n").encode(encoding)
     (tmp_path / "run.csv").write_bytes(content)
-    recording, (expected,) = piped(monkeypatch, content), read(tmp_path / "run.csv")
+    recording = piped(monkeypatch, content)
+    (expected,) = read(tmp_path / "run.csv")
     assert recording.origin == "standard input"
     assert recording.constants == expected.constants
     for name in ("time", "pressure", "force"):
@@ -62,12 +71,22 @@ def test_of_too_many_rows_every_second_one_is_kept_until_they_are_few(
     step = 2 ** int(np.ceil(np.log2(ROWS / most)))
     assert np.array_equal(recording["force"], np.arange(0, ROWS, step))
     noted = [note for note in recording.notes if "rows; one in" in note]
-    assert noted == ([f"The file has {ROWS} rows; one in {step} is kept as measured, {len(recording)} in total (max_rows)."] if step > 1 else [])  # fmt: skip
+    assert noted == (
+        [
+            f"The file has {ROWS} rows; one in {step} is kept as measured, {len(recording)} in"
+            " total (max_rows)."
+        ]
+        if step > 1
+        else []
+    )
 
 
-def test_means_of_blocks_and_a_mapping_are_those_of_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_means_of_blocks_and_a_mapping_are_those_of_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     (tmp_path / "run.csv").write_text(text(), encoding="utf-8")
-    mapping, means = ColumnMapping(columns={"force": ""}, resting_length="200 mm"), BlockMeans(1000)
+    mapping = ColumnMapping(columns={"force": ""}, resting_length="200 mm")
+    means = BlockMeans(1000)
     (expected,) = read(tmp_path / "run.csv", mapping, downsampling=means)
     recording = piped(monkeypatch, text(), mapping, downsampling=means)
     assert list(recording) == ["time", "pressure"]

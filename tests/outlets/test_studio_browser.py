@@ -1,4 +1,6 @@
-"""Page of the studio in a browser: each tab as a user works with it, by mouse, by keyboard and without a network."""
+"""Page of the studio in a browser: each tab as a user works with it, by mouse, by keyboard and
+without a network.
+"""
 
 from __future__ import annotations
 
@@ -51,13 +53,17 @@ def test_two_of_three_quantities_give_the_third(muscle):
     law = am.load("dmsp-20-300").characteristic
     muscle.get_by_label("Pressure [bar]").fill("2.5")
     muscle.get_by_label("Force [N]").fill("150")
-    assert number(muscle, "Contraction [%]") == pytest.approx(100 * law.contraction(2.5e5, 150.0), rel=1e-5)
+    assert number(muscle, "Contraction [%]") == pytest.approx(
+        100 * law.contraction(2.5e5, 150.0), rel=1e-5
+    )
     muscle.get_by_label("Solve for force").check()
     muscle.get_by_label("Contraction [%]").fill("10")
     assert number(muscle, "Force [N]") == pytest.approx(law.force(2.5e5, 0.10), rel=1e-5)
     muscle.get_by_label("Solve for pressure").check()
     muscle.get_by_label("Force [N]").fill("300")
-    assert number(muscle, "Pressure [bar]") == pytest.approx(law.pressure(0.10, 300.0) / 1e5, rel=1e-5)
+    assert number(muscle, "Pressure [bar]") == pytest.approx(
+        law.pressure(0.10, 300.0) / 1e5, rel=1e-5
+    )
     muscle.get_by_label("Contraction [%]").fill("abc")
     assert muscle.get_by_label("Contraction [%]").get_attribute("aria-invalid") == "true"
 
@@ -71,20 +77,27 @@ def test_the_working_point_is_dragged_and_moved_by_keys(muscle):
     muscle.mouse.up()
     muscle.wait_for_timeout(100)
     law = am.load("dmsp-20-300").characteristic
-    contraction, force = number(muscle, "Contraction [%]") / 100, number(muscle, "Force [N]")
+    contraction = number(muscle, "Contraction [%]") / 100
+    force = number(muscle, "Force [N]")
     assert 0.05 < contraction < 0.15
-    assert number(muscle, "Pressure [bar]") == pytest.approx(law.pressure(contraction, force) / 1e5, rel=1e-4)
+    assert number(muscle, "Pressure [bar]") == pytest.approx(
+        law.pressure(contraction, force) / 1e5, rel=1e-4
+    )
     muscle.locator("#panel-muscle .chart").press("ArrowRight")
     assert number(muscle, "Contraction [%]") == pytest.approx(100 * contraction + 0.1, abs=2e-4)
 
 
 def test_the_isobars_of_the_file_are_those_of_the_library(muscle, tmp_path):
     law = am.load("dmsp-20-300").characteristic
-    rows = np.genfromtxt(downloaded(muscle, "muscle", "CSV", tmp_path), delimiter=",", skip_header=1)
+    rows = np.genfromtxt(
+        downloaded(muscle, "muscle", "CSV", tmp_path), delimiter=",", skip_header=1
+    )
     assert rows.shape == (1000, 7)
     for pressure, column in zip((1e5, 2e5, 3e5, 4e5, 5e5, 6e5), rows.T[1:], strict=True):
         inside = np.isfinite(column)
-        np.testing.assert_allclose(column[inside], law.force(pressure, rows[inside, 0]), atol=1e-12 * 2000)
+        np.testing.assert_allclose(
+            column[inside], law.force(pressure, rows[inside, 0]), atol=1e-12 * 2000
+        )
         assert inside.mean() > 0.95
 
 
@@ -109,7 +122,12 @@ def test_a_changed_parameter_reaches_chart_address_and_file(browser, address, mu
     muscle.wait_for_selector("html[data-ready]", timeout=WAIT)
     assert muscle.locator("#panel-muscle .parameter input[type=text]").first.input_value() == "12"
     muscle.locator("#panel-muscle .parameter input[type=text]").first.fill("-1")
-    assert muscle.locator("#panel-muscle .parameter input[type=text]").first.get_attribute("aria-invalid") == "true"
+    assert (
+        muscle.locator("#panel-muscle .parameter input[type=text]").first.get_attribute(
+            "aria-invalid"
+        )
+        == "true"
+    )
 
 
 def test_muscles_are_compared_and_own_files_are_read(muscle, tmp_path):
@@ -132,18 +150,23 @@ def test_muscles_are_compared_and_own_files_are_read(muscle, tmp_path):
     assert chosen.get_attribute("value") == "chou-hannaford"
 
 
-def test_a_plant_runs_by_schedule_and_by_hand_and_is_simulated_from_its_file(browser, address, tmp_path):
+def test_a_plant_runs_by_schedule_and_by_hand_and_is_simulated_from_its_file(
+    browser, address, tmp_path
+):
     with opened(browser, address) as page:
         page.get_by_role("tab", name="Muscle").press("ArrowRight")
         page.get_by_role("tab", name="Fit").press("ArrowRight")
         wait_for(page, "plant", "lift-dmsp-20")
         assert "steps" in page.locator("#panel-plant").inner_text()
-        page.locator("#panel-plant .parameter", has_text="fill").first.get_by_role("button", name="1").click()
+        page.locator("#panel-plant .parameter", has_text="fill").first.get_by_role(
+            "button", name="1"
+        ).click()
         page.wait_for_timeout(1500)
         page.get_by_role("button", name="Run the schedule").click()
         rows = np.genfromtxt(downloaded(page, "plant", "CSV", tmp_path), delimiter=",", names=True)
         text = downloaded(page, "plant", "TOML", tmp_path).read_text(encoding="utf-8")
-        plants, panel = page.get_by_label("Plant of the library"), page.locator("#panel-plant")
+        plants = page.get_by_label("Plant of the library")
+        panel = page.locator("#panel-plant")
         count = plants.locator("option").count()
         panel.get_by_text("Own scenario", exact=True).click()
         panel.get_by_label("Scenario (TOML)", exact=True).fill(text)
@@ -180,14 +203,17 @@ def test_a_saved_page_works_without_a_network(browser, address, tmp_path):
 def test_a_cold_page_shows_that_it_loads_and_obeys_the_first_click(browser, address):
     """The library arrives after the click; nothing takes the chosen tab back."""
     with browser.new_context() as context:
-        page, held = context.new_page(), []
+        page = context.new_page()
+        held = []
 
         def hold(route):
             held.append(route)
 
         page.route("**/api/library*", hold)
         page.goto(address)
-        shown = page.locator("#panel-muscle").evaluate("(panel) => getComputedStyle(panel, '::before').content")
+        shown = page.locator("#panel-muscle").evaluate(
+            "(panel) => getComputedStyle(panel, '::before').content"
+        )
         assert shown == '"Loading …"'
         assert not page.get_by_label("Muscle or law of the library").is_visible()
         page.get_by_role("tab", name="Plant").click()
@@ -215,9 +241,12 @@ def test_the_button_back_leads_to_the_tab_before_and_keeps_the_numbers(muscle):
     assert muscle.get_by_role("tab", selected=True).inner_text() == "Size"
 
 
-@pytest.mark.parametrize(("text", "sentence"), [("4.5 bar", "“4.5 bar” is no number"), ("", "The field is empty")])
+@pytest.mark.parametrize(
+    ("text", "sentence"), [("4.5 bar", "“4.5 bar” is no number"), ("", "The field is empty")]
+)
 def test_a_wrong_number_has_a_sentence_and_no_results(muscle, text, sentence):
-    panel, before = muscle.locator("#panel-muscle"), number(muscle, "Contraction [%]")
+    panel = muscle.locator("#panel-muscle")
+    before = number(muscle, "Contraction [%]")
     muscle.get_by_label("Pressure [bar]").fill(text)
     said = panel.get_by_role("status").inner_text()
     assert said.startswith(f"Pressure: {sentence}")
@@ -233,7 +262,10 @@ def test_a_wrong_number_has_a_sentence_and_no_results(muscle, text, sentence):
 
 def test_a_wrong_parameter_has_a_sentence_that_says_what_is_shown(muscle):
     row = muscle.locator("#panel-muscle .parameter").first
-    for text, sentence in (("-1", "-1 is out of bounds, allowed: 0.1 to 200 mm."), ("1 cm", "“1 cm” is no number")):
+    for text, sentence in (
+        ("-1", "-1 is out of bounds, allowed: 0.1 to 200 mm."),
+        ("1 cm", "“1 cm” is no number"),
+    ):
         row.locator("input[type=text]").fill(text)
         assert row.get_by_role("alert").inner_text().startswith(sentence)
         assert row.get_by_role("alert").inner_text().endswith("What is shown belongs to 10 mm.")
@@ -245,7 +277,8 @@ def test_print_is_dark_on_white_in_dark_mode(browser, address):
     with opened(browser, address, scheme="dark") as page:
         wait_for(page, "muscle", "dmsp-20-300")
         page.evaluate(
-            "addEventListener('beforeprint', () => { window.printed = document.documentElement.dataset.theme; })"
+            "addEventListener('beforeprint', () => { window.printed ="
+            " document.documentElement.dataset.theme; })"
         )
         page.pdf()
         assert page.evaluate("window.printed") == "light"

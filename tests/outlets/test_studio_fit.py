@@ -1,4 +1,6 @@
-"""Tab Fit of the studio, its server: it reads files of users within limits, and fits as the library does."""
+"""Tab Fit of the studio, its server: it reads files of users within limits, and fits as the library
+does.
+"""
 
 from __future__ import annotations
 
@@ -48,18 +50,30 @@ from airmuscle.outlets.studio import (
 from airmuscle.report import Chapter, Plot, Table
 
 LAW = am.load("dmsp-20-300").characteristic
-COLUMNS = {"Zeit": {"quantity": "time", "unit": "s"}, "Druck": {"quantity": "pressure", "unit": "bar"}}
+COLUMNS = {
+    "Zeit": {"quantity": "time", "unit": "s"},
+    "Druck": {"quantity": "pressure", "unit": "bar"},
+}
 HEADINGS = {"Zeit": "time [s]", "Druck": "pressure [bar]"}
 
 
 def german_table(levels=(1.0, 2.5, 4.0), rows=9, step=7.0):
-    """A CSV file of a German logger: two units are not stated; the branches differ by twice `step` [N]."""
-    lines, time_ = ["Zeit;Druck;Kontraktion (%);Kraft (N);Kommentar"], 0.0
+    """A CSV file of a German logger: two units are not stated; the branches differ by twice `step`
+    [N].
+    """
+    lines = ["Zeit;Druck;Kontraktion (%);Kraft (N);Kommentar"]
+    time_ = 0.0
     there = np.linspace(0.0, 0.16, rows)
     for level in levels:
         for sign, contraction in [(1, c) for c in there] + [(-1, c) for c in there[::-1]]:
-            force = max(float(LAW.force(level * 1e5, contraction)), 0.0) - sign * step + 0.5 * np.sin(37 * time_)
-            lines.append(f"{time_:.1f};{level:.3f};{100 * contraction:.3f};{force:.2f};ok".replace(".", ","))
+            force = (
+                max(float(LAW.force(level * 1e5, contraction)), 0.0)
+                - sign * step
+                + 0.5 * np.sin(37 * time_)
+            )
+            lines.append(
+                f"{time_:.1f};{level:.3f};{100 * contraction:.3f};{force:.2f};ok".replace(".", ",")
+            )
             time_ += 0.5
     return "\n".join(lines).encode("latin-1")
 
@@ -72,7 +86,9 @@ def app(tmp_path):
 
 def make_app(folder, task=run_fit, **options):
     queue = FitQueue(task, make_worker=WorkerHere, **options)
-    return create_app(pool=InThisProcess(), fits=FitService(InThisProcess(), UploadStore(folder), queue))
+    return create_app(
+        pool=InThisProcess(), fits=FitService(InThisProcess(), UploadStore(folder), queue)
+    )
 
 
 def upload(app, name, content, known=""):
@@ -109,33 +125,65 @@ def test_columns_with_units_are_recognised_and_the_others_are_asked_for(app):
     sheet = post(app, "read", set=name, settings={"columns": COLUMNS}).json()
     (columns,) = (file["columns"] for file in sheet["files"])
     assert [(c["quantity"], c["unit"]) for c in columns] == [
-        ("time", "s"), ("pressure", "bar"), ("contraction", "%"), ("force", "N"), ("", ""),
-    ]  # fmt: skip
+        ("time", "s"),
+        ("pressure", "bar"),
+        ("contraction", "%"),
+        ("force", "N"),
+        ("", ""),
+    ]
     (recording,) = sheet["recordings"]
     assert sheet["ready"]
     assert [(run["kind"], run["level"]) for run in recording["runs"]] == [
-        ("isobaric", "pressure 100 kPa"), ("isobaric", "pressure 250 kPa"), ("isobaric", "pressure 400 kPa"),
-    ]  # fmt: skip
+        ("isobaric", "pressure 100 kPa"),
+        ("isobaric", "pressure 250 kPa"),
+        ("isobaric", "pressure 400 kPa"),
+    ]
     assert recording["branches"] == 6
     assert recording["points"]["pressure"][0] == 1e5
 
 
 WRONG = (
-    ({"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "barr"}}}, "column:Druck", "barr"),
-    ({"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "mm"}}}, "column:Druck", "mm"),
-    ({"columns": {**COLUMNS, "Zeit": {"quantity": "force", "unit": "N"}}}, "column:Zeit", "both read as force"),
+    (
+        {"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "barr"}}},
+        "column:Druck",
+        "barr",
+    ),
+    (
+        {"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "mm"}}},
+        "column:Druck",
+        "mm",
+    ),
+    (
+        {"columns": {**COLUMNS, "Zeit": {"quantity": "force", "unit": "N"}}},
+        "column:Zeit",
+        "both read as force",
+    ),
     ({"columns": {**COLUMNS, "Kraft (N)": {"quantity": ""}}}, "columns", "no column is a force"),
-    ({"columns": COLUMNS, "sheet": "x", "rules": [{"ranges": {"pressure": [0, 1]}, "keep": True}]}, "rules", "no row"),
+    (
+        {
+            "columns": COLUMNS,
+            "sheet": "x",
+            "rules": [{"ranges": {"pressure": [0, 1]}, "keep": True}],
+        },
+        "rules",
+        "no row",
+    ),
     ({"columns": COLUMNS, "rules": [{"ranges": {"volume": [0, 1]}}]}, "rules", "volume"),
     ({"columns": COLUMNS, "file_name": "run{nonsense}"}, "file_name", "nonsense"),
 )
 
 
-@pytest.mark.parametrize(("settings", "field", "text"), WRONG, ids=[row[1] + row[2] for row in WRONG])
+@pytest.mark.parametrize(
+    ("settings", "field", "text"), WRONG, ids=[row[1] + row[2] for row in WRONG]
+)
 def test_a_problem_names_its_field(app, settings, field, text):
     name = upload(app, "Messung.csv", german_table()).json()["set"]
     answer = post(app, "read", set=name, settings=settings)
-    found = problems(answer) if answer.status == 200 else {answer.json()["field"]: answer.json()["error"]}
+    found = (
+        problems(answer)
+        if answer.status == 200
+        else {answer.json()["field"]: answer.json()["error"]}
+    )
     assert text in found[field]
 
 
@@ -143,7 +191,10 @@ def test_a_length_needs_the_resting_length_and_a_pressure_is_gauge_unless_stated
     table = "p [bar];Länge [mm];F [N]\n1,0;300;50\n1,0;290;40\n2,0;300;90\n2,0;290;80\n"
     name = upload(app, "a.csv", table.encode()).json()["set"]
     assert "such as 300 mm" in problems(post(app, "read", set=name, settings={}))["resting_length"]
-    for settings in ({"resting_length": "300 mm"}, {"files": {"a.csv": {"resting_length": "30 cm"}}}):
+    for settings in (
+        {"resting_length": "300 mm"},
+        {"files": {"a.csv": {"resting_length": "30 cm"}}},
+    ):
         (recording,) = post(app, "read", set=name, settings=settings).json()["recordings"]
         assert recording["constants"] == {"resting_length": "300 mm"}
         assert recording["points"]["contraction"] == pytest.approx([0, 1 / 30, 0, 1 / 30], rel=1e-6)
@@ -152,7 +203,9 @@ def test_a_length_needs_the_resting_length_and_a_pressure_is_gauge_unless_stated
 
 def test_each_delimiter_that_the_form_offers_is_taken_as_it_is(app):
     """Also a tab and a blank, which are no texts."""
-    form = {field["name"]: field for field in request(app, "GET", "/api/library").json()["forms"]["fit"]}
+    form = {
+        field["name"]: field for field in request(app, "GET", "/api/library").json()["forms"]["fit"]
+    }
     offered = [value for value, _ in form["delimiter"]["offered"] if value]
     assert {"\t", " "} < set(offered)
     rows = [("pressure_bar", "contraction", "force_N"), (1.5, 0.1, 50.5), (2.5, 0.1, 90.5)]
@@ -167,9 +220,15 @@ def test_each_delimiter_that_the_form_offers_is_taken_as_it_is(app):
 
 def test_a_column_may_state_the_resting_length(app):
     """By its heading, or because the user selects it."""
-    table = "p [bar],L [mm],F [N],rest_length [cm],note [mm]\n1,300,50,30,310\n2,290,40,30,310\n3,280,40,30,310\n"
+    table = (
+        "p [bar],L [mm],F [N],rest_length [cm],note"
+        " [mm]\n1,300,50,30,310\n2,290,40,30,310\n3,280,40,30,310\n"
+    )
     name = upload(app, "a.csv", table.encode()).json()["set"]
-    constant = {"note [mm]": {"quantity": "resting_length", "unit": "mm"}, "rest_length [cm]": {"quantity": ""}}
+    constant = {
+        "note [mm]": {"quantity": "resting_length", "unit": "mm"},
+        "rest_length [cm]": {"quantity": ""},
+    }
     for settings, length, column in (({}, "300 mm", 3), ({"columns": constant}, "310 mm", 4)):
         sheet = post(app, "read", set=name, settings=settings).json()
         assert sheet["recordings"][0]["constants"]["resting_length"] == length
@@ -178,21 +237,38 @@ def test_a_column_may_state_the_resting_length(app):
 
 
 REFUSED = (
-    ({"resting_length": "300"}, "resting_length"), ({"resting_length": "-3 mm"}, "resting_length"),
-    ({"resting_length": "3 kg"}, "resting_length"), ({"resting_length": "nan m"}, "resting_length"),
-    ({"resting_length": "x" * 300}, "resting_length"), ({"resting_length": 3}, "resting_length"),
-    ({"braid_radius": "10", "braid_angle": "24 deg"}, "braid_radius"), ({"braid_radius": "10 mm"}, "braid_angle"),
-    ({"braid_radius": "10 mm", "braid_angle": "24 mm"}, "braid_angle"), ({"ambient": "0 bar"}, "ambient"), ({"entry": "../../etc/passwd"}, "entry"), ({"leave_out": "rows"}, "leave_out"),
-    ({"decimal": ";"}, "decimal"), ({"delimiter": "x"}, "delimiter"), ({"time": "yesterday"}, "time"),
-    ({"columns": []}, "columns"), ({"columns": {"p": "bar"}}, "column:p"),
+    ({"resting_length": "300"}, "resting_length"),
+    ({"resting_length": "-3 mm"}, "resting_length"),
+    ({"resting_length": "3 kg"}, "resting_length"),
+    ({"resting_length": "nan m"}, "resting_length"),
+    ({"resting_length": "x" * 300}, "resting_length"),
+    ({"resting_length": 3}, "resting_length"),
+    ({"braid_radius": "10", "braid_angle": "24 deg"}, "braid_radius"),
+    ({"braid_radius": "10 mm"}, "braid_angle"),
+    ({"braid_radius": "10 mm", "braid_angle": "24 mm"}, "braid_angle"),
+    ({"ambient": "0 bar"}, "ambient"),
+    ({"entry": "../../etc/passwd"}, "entry"),
+    ({"leave_out": "rows"}, "leave_out"),
+    ({"decimal": ";"}, "decimal"),
+    ({"delimiter": "x"}, "delimiter"),
+    ({"time": "yesterday"}, "time"),
+    ({"columns": []}, "columns"),
+    ({"columns": {"p": "bar"}}, "column:p"),
     ({"columns": {"p": {"quantity": "os.system"}}}, "column:p"),
     ({"columns": {"p": {"quantity": "force", "unit": "N" * 50}}}, "column:p"),
-    ({"files": {"a.csv": {"length": "3"}}}, "file:a.csv"), ({"files": {"a.csv": {"owner": "x"}}}, "file:a.csv"),
-    ({"files": {"a.csv": 1}}, "file:a.csv"), ({"rules": {}}, "rules"), ({"rules": [1]}, "rules"), ({"rules": [{}]}, "rules"),
-    ({"rules": [{"rows": [-1, 2]}]}, "rules"), ({"rules": [{"rows": [0.5, 2]}]}, "rules"),
-    ({"rules": [{"ranges": {"force": [2, 1]}}]}, "rules"), ({"rules": [{"ranges": {"force": ["a", 1]}}]}, "rules"),
-    ({"rules": [{"rows": [0, 1]}] * 201}, "rules"), ({"rules": [{"recordings": [1], "rows": [0, 1]}]}, "rules"),
-)  # fmt: skip
+    ({"files": {"a.csv": {"length": "3"}}}, "file:a.csv"),
+    ({"files": {"a.csv": {"owner": "x"}}}, "file:a.csv"),
+    ({"files": {"a.csv": 1}}, "file:a.csv"),
+    ({"rules": {}}, "rules"),
+    ({"rules": [1]}, "rules"),
+    ({"rules": [{}]}, "rules"),
+    ({"rules": [{"rows": [-1, 2]}]}, "rules"),
+    ({"rules": [{"rows": [0.5, 2]}]}, "rules"),
+    ({"rules": [{"ranges": {"force": [2, 1]}}]}, "rules"),
+    ({"rules": [{"ranges": {"force": ["a", 1]}}]}, "rules"),
+    ({"rules": [{"rows": [0, 1]}] * 201}, "rules"),
+    ({"rules": [{"recordings": [1], "rows": [0, 1]}]}, "rules"),
+)
 
 
 def test_settings_that_are_not_possible_are_refused_with_their_field(app):
@@ -220,10 +296,16 @@ def test_a_quantity_is_refused_in_the_words_of_the_command(app, tmp_path):
     """Both are built from one declaration of the request."""
     name = upload(app, "Messung.csv", german_table()).json()["set"]
     (tmp_path / "Messung.csv").write_bytes(german_table())
-    for field, text in (("resting_length", "0 mm"), ("ambient", "-5 kPa"), ("displacement_zero", "3 s")):
+    for field, text in (
+        ("resting_length", "0 mm"),
+        ("ambient", "-5 kPa"),
+        ("displacement_zero", "3 s"),
+    ):
         refused = post(app, "read", set=name, settings={field: text}).json()["error"]
         assert (
-            airmuscle("inspect", tmp_path / "Messung.csv", f"--{field.replace('_', '-')}", text).stderr
+            airmuscle(
+                "inspect", tmp_path / "Messung.csv", f"--{field.replace('_', '-')}", text
+            ).stderr
             == f"error: {refused}\n"
         )
 
@@ -231,9 +313,25 @@ def test_a_quantity_is_refused_in_the_words_of_the_command(app, tmp_path):
 # Uploads
 
 NAMES = (
-    "", "a", "a.exe", "../a.csv", "/etc/passwd.csv", "..\\a.csv", "a/b.csv", ".a.csv", "a\0.csv", "a\n.csv", " a.csv",
-    "C:a.csv", "a.csv/..", "\u202ea.csv", "a*.csv", "<script>.csv", "a" * 130 + ".csv", "\ud800.csv",
-)  # fmt: skip
+    "",
+    "a",
+    "a.exe",
+    "../a.csv",
+    "/etc/passwd.csv",
+    "..\\a.csv",
+    "a/b.csv",
+    ".a.csv",
+    "a\0.csv",
+    "a\n.csv",
+    " a.csv",
+    "C:a.csv",
+    "a.csv/..",
+    "\u202ea.csv",
+    "a*.csv",
+    "<script>.csv",
+    "a" * 130 + ".csv",
+    "\ud800.csv",
+)
 
 
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
@@ -249,16 +347,27 @@ def test_names_of_laboratories_are_accepted():
 
 
 BAD_FILES = (
-    ("a.csv", b"", 400), ("a.csv", b"\x00\x01\x02" * 99, 200), ("a.csv", b"PK\x03\x04xxxx", 200), ("a.csv", b"1,2\n", 200),
-    ("a.csv", b"p,F\n1,2\n", 200), ("a.csv", b"p [bar],F [N]\n1,x\n", 200), ("a.csv", b"p [bar],F [N]\n1\n", 200),
-    ("a.csv", b"p [bar],F [N]\nnan,inf\n", 200), ("a.csv", b"\xff\xfe\x00", 200), ("a.csv", b"," * 5000 + b"\n1\n", 200),
-    ("a.xlsx", b"PK\x03\x04" + b"x" * 99, 200), ("a.tdms", b"TDSm" + b"\xff" * 99, 200), ("a.parquet", b"PAR1xxPAR1", 200),
+    ("a.csv", b"", 400),
+    ("a.csv", b"\x00\x01\x02" * 99, 200),
+    ("a.csv", b"PK\x03\x04xxxx", 200),
+    ("a.csv", b"1,2\n", 200),
+    ("a.csv", b"p,F\n1,2\n", 200),
+    ("a.csv", b"p [bar],F [N]\n1,x\n", 200),
+    ("a.csv", b"p [bar],F [N]\n1\n", 200),
+    ("a.csv", b"p [bar],F [N]\nnan,inf\n", 200),
+    ("a.csv", b"\xff\xfe\x00", 200),
+    ("a.csv", b"," * 5000 + b"\n1\n", 200),
+    ("a.xlsx", b"PK\x03\x04" + b"x" * 99, 200),
+    ("a.tdms", b"TDSm" + b"\xff" * 99, 200),
+    ("a.parquet", b"PAR1xxPAR1", 200),
     ("a.csv", b"t [s],p [bar],eps [%],F [N]\n0,1,1,1\n", 200),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize(("file", "content", "status"), BAD_FILES, ids=range(len(BAD_FILES)))
-def test_a_file_that_is_no_measurement_is_named_with_the_reason(app, tmp_path, file, content, status):
+def test_a_file_that_is_no_measurement_is_named_with_the_reason(
+    app, tmp_path, file, content, status
+):
     answer = upload(app, file, content)
     assert answer.status == status
     if status != 200:
@@ -286,7 +395,11 @@ def test_large_and_many_files_are_refused_and_leave_nothing(app, tmp_path, monke
     assert upload(app, "b.csv", b"x" * 100, name).status == 200
     assert upload(app, "d.csv", b"x" * 100, name).status == 200
     assert "at most 3 files" in upload(app, "e.csv", b"x", name).json()["error"]
-    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"b.csv", "c.csv", "d.csv"}
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {
+        "b.csv",
+        "c.csv",
+        "d.csv",
+    }
 
 
 def test_the_number_of_sets_is_bounded_and_those_in_use_are_kept(tmp_path, monkeypatch):
@@ -317,7 +430,8 @@ def test_refused_uploads_and_removed_files_occupy_no_set(app, tmp_path, monkeypa
 def test_the_files_of_a_killed_server_are_removed_by_the_next_one(tmp_path):
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
-    abandoned, other = tmp_path / f"airmuscle-studio-{ended.pid}-x", tmp_path / f"airmuscle-studio-{os.getpid()}-x"
+    abandoned = tmp_path / f"airmuscle-studio-{ended.pid}-x"
+    other = tmp_path / f"airmuscle-studio-{os.getpid()}-x"
     for folder in (abandoned, other):
         (folder / "files").mkdir(parents=True)
     store = UploadStore(tmp_path)
@@ -336,7 +450,10 @@ def test_values_in_another_file_are_not_read(app, tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("force", (64,), dtype="f8", external=[(str(secret), 0, 512)])
     name = upload(app, "a.h5", (tmp_path / "a.h5").read_bytes()).json()["set"]
-    assert "values of a dataset are in another file" in problems(post(app, "read", set=name, settings={}))["file:a.h5"]
+    assert (
+        "values of a dataset are in another file"
+        in problems(post(app, "read", set=name, settings={}))["file:a.h5"]
+    )
 
 
 # Fits
@@ -344,16 +461,23 @@ def test_values_in_another_file_are_not_read(app, tmp_path):
 
 @pytest.fixture(scope="module")
 def result(tmp_path_factory):
-    """A fit of the page, its task, and the comparison of the library on the same file; of three laws, to be short."""
+    """A fit of the page, its task, and the comparison of the library on the same file; of three
+    laws, to be short.
+    """
     folder = tmp_path_factory.mktemp("studio")
     app = make_app(folder)
-    rules = [{"recordings": ["Messung.csv"], "rows": [0, 2]}, {"ranges": {"contraction": [0.159, 0.2]}}]
+    rules = [
+        {"recordings": ["Messung.csv"], "rows": [0, 2]},
+        {"ranges": {"contraction": [0.159, 0.2]}},
+    ]
     settings = {"columns": COLUMNS, "rules": rules, "leave_out": "contraction"}
     (folder / "Messung.csv").write_bytes(german_table())
     (recording,) = read(folder / "Messung.csv", ColumnMapping(columns=HEADINGS))
     kept = (np.arange(len(recording)) >= 2) & (recording["contraction"] < 0.159)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:4], ()))
+        patch.setattr(
+            model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:4], ())
+        )
         task = fit_of(app, settings)
         return app, task, compare(recording.rows(kept), leave_out=LevelSplit("contraction"))
 
@@ -374,25 +498,32 @@ def fetched(result, name):
 
 def column_texts(table):
     """The texts of a table of the page by its headings."""
-    return {each["text"]: [row[i] for row in table["rows"]] for i, each in enumerate(table["headings"])}
+    return {
+        each["text"]: [row[i] for row in table["rows"]] for i, each in enumerate(table["headings"])
+    }
 
 
 def numbers(texts):
     """Numbers of the page, with their typographic signs."""
     return [
-        float(re.sub(r" × 10", "e", text).translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789"))) for text in texts
+        float(re.sub(r" × 10", "e", text).translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789")))
+        for text in texts
     ]
 
 
 def test_the_numbers_are_those_of_the_library(result):
-    shown, comparison = fetched(result, "result.json").json(), result[2]
+    shown = fetched(result, "result.json").json()
+    comparison = result[2]
     tables = shown["comparisons"][0]["tables"]
     ranking = column_texts(tables["ranking"])
     assert ranking["law"] == [m.candidate.name for m in comparison.ranking]
     for heading, attribute in {
-        "in-sample rms error [N]": "in_sample_rmse", "cross-validation rms error [N]": "cross_validated_rmse",
-    }.items():  # fmt: skip
-        assert numbers(ranking[heading]) == pytest.approx([getattr(m, attribute) for m in comparison.ranking], rel=5e-4)
+        "in-sample rms error [N]": "in_sample_rmse",
+        "cross-validation rms error [N]": "cross_validated_rmse",
+    }.items():
+        assert numbers(ranking[heading]) == pytest.approx(
+            [getattr(m, attribute) for m in comparison.ranking], rel=5e-4
+        )
     best = comparison.recommended.fit
     assert shown["recommended"] == comparison.recommended.candidate.name
     assert shown["reason"] == comparison.reason
@@ -408,8 +539,12 @@ def test_the_numbers_are_those_of_the_library(result):
 def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
     text = "Specimen c does not follow the others."
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:3], ()))
-        patch.setattr("airmuscle.outlets.requests.fitting.odd_specimen_notes", lambda errors: [text])
+        patch.setattr(
+            model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:3], ())
+        )
+        patch.setattr(
+            "airmuscle.outlets.requests.fitting.odd_specimen_notes", lambda errors: [text]
+        )
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]
@@ -425,11 +560,15 @@ def test_the_muscle_has_the_braid_of_the_page_unless_its_law_has_one(tmp_path, l
     with pytest.MonkeyPatch.context() as patch:
         chosen = [Candidate("own", LAW, fixed)] if laws.start == 0 else None
         patch.setattr(
-            model_selection, "started_candidates", lambda runs: (chosen or standard_candidates(runs)[laws], ())
+            model_selection,
+            "started_candidates",
+            lambda runs: (chosen or standard_candidates(runs)[laws], ()),
         )
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm", **BRAID})
-    (tmp_path / "muscle.toml").write_bytes(request(app, "GET", f"/api/fit/task/{task}/muscle.toml").body)
+    (tmp_path / "muscle.toml").write_bytes(
+        request(app, "GET", f"/api/fit/task/{task}/muscle.toml").body
+    )
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]
     muscle = am.load(tmp_path / "muscle.toml")
     if chosen:
@@ -451,7 +590,9 @@ def test_a_braid_needs_one_resting_length(tmp_path):
 def test_bands_and_equation_are_shown(result):
     shown = fetched(result, "result.json").json()
     curve = shown["bands"]["curves"][0]
-    assert all(a <= b <= c for a, b, c in zip(curve["low"], curve["value"], curve["high"], strict=True))
+    assert all(
+        a <= b <= c for a, b, c in zip(curve["low"], curve["value"], curve["high"], strict=True)
+    )
     assert all(a <= b for a, b in zip(curve["prediction_low"], curve["low"], strict=True))
     assert shown["equations"][0]["lines"][0].startswith("<math")
     assert "Excel" in " ".join(shown["equations"][0]["sources"])
@@ -464,13 +605,17 @@ def test_report_and_muscle_are_downloaded(result, tmp_path):
     assert "Fitted to Messung.csv" in muscle.note
     report = fetched(result, "report.html")
     assert "attachment" in report.headers["content-disposition"]
-    assert "Messung.csv: 8 of 54 rows are left out, as specified by the user." in " ".join(report.text.split())
+    assert "Messung.csv: 8 of 54 rows are left out, as specified by the user." in " ".join(
+        report.text.split()
+    )
     names = zipfile.ZipFile(BytesIO(fetched(result, "report.zip").body)).namelist()
     assert {"muscle.toml", "report.html", "data/ranking.csv"} <= set(names)
     assert not [name for name in names if name.startswith(("/", ".."))]
 
 
-@pytest.mark.parametrize("name", ["..", "../result.json", "data/ranking.csv", "x", "report.html/..", "settings"])
+@pytest.mark.parametrize(
+    "name", ["..", "../result.json", "data/ranking.csv", "x", "report.html/..", "settings"]
+)
 def test_a_result_has_no_other_files(result, name):
     assert fetched(result, name).status == 404
 
@@ -479,12 +624,16 @@ def test_a_result_has_no_other_files(result, name):
 def test_a_complete_fit_is_that_of_the_command_line(tmp_path):
     """All laws and the friction, with the same texts; the command fits in processes of its own."""
     app = make_app(tmp_path)
-    task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm", "hysteresis": True}, rows=25)
+    task = fit_of(
+        app, {"columns": COLUMNS, "resting_length": "300 mm", "hysteresis": True}, rows=25
+    )
     shown = request(app, "GET", f"/api/fit/task/{task}/result.json").json()
     (tmp_path / "Messung.csv").write_bytes(german_table(rows=25))
     options = [f"--column={key}={text}" for key, text in HEADINGS.items()]
     command = ["fit", "Messung.csv", "--compare", "--json", "--resting-length", "300 mm", *options]
-    done = subprocess.run([sys.executable, "-m", "airmuscle", *command], capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "airmuscle", *command], capture_output=True, text=True, cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     printed = json.loads(done.stdout)["comparison"]["ranking"]
     ranking = column_texts(shown["comparisons"][0]["tables"]["ranking"])
@@ -507,20 +656,42 @@ def test_a_task_is_known_to_its_page_only(result):
     """There is no list of tasks or files, and an identifier cannot be guessed."""
     app, task, _ = result
     assert len(task) == 22
-    for other in ("", "x", task[:-1], task[:-1] + ("A" if task[-1] != "A" else "B"), f"../{task}", "*"):
+    for other in (
+        "",
+        "x",
+        task[:-1],
+        task[:-1] + ("A" if task[-1] != "A" else "B"),
+        f"../{task}",
+        "*",
+    ):
         for address in (f"/api/fit/task/{other}", f"/api/fit/task/{other}/result.json"):
             assert request(app, "GET", address).status == 404
         assert request(app, "POST", f"/api/fit/task/{other}/cancel").status == 404
-    for address in ("/api/fit", "/api/fit/task", "/api/fit/task/", "/api/fit/file", "/api/fit/read", "/api/fit/start"):
+    for address in (
+        "/api/fit",
+        "/api/fit/task",
+        "/api/fit/task/",
+        "/api/fit/file",
+        "/api/fit/read",
+        "/api/fit/start",
+    ):
         assert request(app, "GET", address).status in (404, 405)
-    mine, theirs = (upload(app, "a.csv", text).json() for text in (b"p [bar]\n1\n", b"p [bar]\n2\n"))
+    mine, theirs = (
+        upload(app, "a.csv", text).json() for text in (b"p [bar]\n1\n", b"p [bar]\n2\n")
+    )
     assert mine["set"] != theirs["set"]
-    assert post(app, "read", set=mine["set"], settings={}).json()["recordings"][0]["ranges"]["pressure"] == [100, 100]
+    assert post(app, "read", set=mine["set"], settings={}).json()["recordings"][0]["ranges"][
+        "pressure"
+    ] == [100, 100]
 
 
 def test_other_pages_cannot_upload_or_start(app):
     for address in ("file", "read", "start", "remove", "task/x/cancel"):
-        for headers in ({"x-airmuscle": None}, {"origin": "http://evil.example"}, {"sec-fetch-site": "cross-site"}):
+        for headers in (
+            {"x-airmuscle": None},
+            {"origin": "http://evil.example"},
+            {"sec-fetch-site": "cross-site"},
+        ):
             assert request(app, "POST", f"/api/fit/{address}", b"", headers=headers).status == 403
 
 
@@ -538,7 +709,9 @@ def test_a_fit_without_enough_data_fails_with_a_reason_in_words_of_the_page(app)
 
 
 def test_ten_users_are_served_in_turn_and_further_ones_are_refused(tmp_path):
-    running, most, order = [], [], []
+    running = []
+    most = []
+    order = []
 
     def task(folder, out, user, report):
         running.append(user)
@@ -610,21 +783,25 @@ def test_an_error_of_a_task_keeps_its_field(tmp_path):
 def test_a_worker_ends_with_its_server(tmp_path):
     """Also during a task, so that a killed server leaves no process and no result."""
     script = (
-        "import sys, pathlib, time\n"
-        "from airmuscle.outlets.studio.fit_routes import FitQueue; from studio_tasks import write_slowly\n"
-        "if __name__ == '__main__':\n"
-        "    queue = FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]), 600.0)\n"
-        "    while queue.status(task)['fraction'] != 0.5: time.sleep(0.01)\n"
-        "    print([worker._worker._process.pid for worker in queue._running.values()][0], flush=True); input()\n"
+        "import sys, pathlib, time\nfrom airmuscle.outlets.studio.fit_routes import FitQueue; from"
+        " studio_tasks import write_slowly\nif __name__ == '__main__':\n    queue ="
+        " FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]),"
+        " 600.0)\n    while queue.status(task)['fraction'] != 0.5: time.sleep(0.01)\n   "
+        " print([worker._worker._process.pid for worker in queue._running.values()][0],"
+        " flush=True); input()\n"
     )
     (tmp_path / "server.py").write_text(script, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, str(tmp_path / "server.py"), str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, env=environment, text=True) as server:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, env=environment, text=True
+    ) as server:
         worker = int(server.stdout.readline())
         server.kill()
     wait_until(lambda: not is_alive(worker))
-    assert [path for path in tmp_path.rglob("result.json") if ".unfinished" not in str(path.parent)] == []
+    assert [
+        path for path in tmp_path.rglob("result.json") if ".unfinished" not in str(path.parent)
+    ] == []
 
 
 def is_alive(process):
@@ -632,7 +809,9 @@ def is_alive(process):
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    state = subprocess.run(["ps", "-o", "stat=", "-p", str(process)], capture_output=True, text=True).stdout.strip()
+    state = subprocess.run(
+        ["ps", "-o", "stat=", "-p", str(process)], capture_output=True, text=True
+    ).stdout.strip()
     return bool(state) and not state.startswith("Z")
 
 
@@ -661,9 +840,15 @@ def test_a_saved_page_contains_no_fit():
 
 
 def logged(outliers=()):
-    """A table below a preamble, with a displacement, codes of missing values, and outliers in some rows."""
-    rows = [[f"{0.1 * i:.1f}", "100", f"{12 + 0.1 * i:.1f}", f"{90 - 0.9 * i + 0.1 * (i % 3):.2f}"] for i in range(80)]
-    rows[5][3], rows[9][3] = "-999", "OL"
+    """A table below a preamble, with a displacement, codes of missing values, and outliers in some
+    rows.
+    """
+    rows = [
+        [f"{0.1 * i:.1f}", "100", f"{12 + 0.1 * i:.1f}", f"{90 - 0.9 * i + 0.1 * (i % 3):.2f}"]
+        for i in range(80)
+    ]
+    rows[5][3] = "-999"
+    rows[9][3] = "OL"
     for row in outliers:
         rows[row][3] = "400"
     head = ["Bench 3,Monday,,", "time [s],pressure [kPa],displacement [mm],force [N]"]
@@ -671,18 +856,31 @@ def logged(outliers=()):
 
 
 LOGGED = {
-    "resting_length": "300 mm", "displacement_zero": "12 mm", "missing": "drop", "missing_code": "-999; OL",
+    "resting_length": "300 mm",
+    "displacement_zero": "12 mm",
+    "missing": "drop",
+    "missing_code": "-999; OL",
     "skip_rows": "1",
-}  # fmt: skip
+}
 
 
 def test_the_page_has_the_reading_settings_of_the_command_line(app, tmp_path):
-    """Lines above the headings, codes of missing values, and the zero of a displacement give the same columns."""
+    """Lines above the headings, codes of missing values, and the zero of a displacement give the
+    same columns.
+    """
     content = logged()
     name = upload(app, "a.csv", content).json()["set"]
     (recording,) = post(app, "read", set=name, settings=LOGGED).json()["recordings"]
     (tmp_path / "a.csv").write_bytes(content)
-    (expected,) = read(tmp_path / "a.csv", ColumnMapping(resting_length="300 mm", displacement_zero="12 mm", skip_rows=1, missing=am.bench.DropMissing((-999.0, "OL"))))  # fmt: skip
+    (expected,) = read(
+        tmp_path / "a.csv",
+        ColumnMapping(
+            resting_length="300 mm",
+            displacement_zero="12 mm",
+            skip_rows=1,
+            missing=am.bench.DropMissing((-999.0, "OL")),
+        ),
+    )
     assert recording["rows"] == len(expected) == 78
     assert recording["points"]["contraction"] == pytest.approx(expected["contraction"], abs=1e-8)
     assert recording["points"]["contraction"][0] == 0
@@ -690,9 +888,15 @@ def test_the_page_has_the_reading_settings_of_the_command_line(app, tmp_path):
 
 @pytest.mark.parametrize(
     ("setting", "value"),
-    [("missing", "zero"), ("skip_rows", "-1"), ("skip_rows", "two"), ("outliers", "mend"), ("displacement_zero", "nan mm"),
-     ("displacement_zero", "12")],
-)  # fmt: skip
+    [
+        ("missing", "zero"),
+        ("skip_rows", "-1"),
+        ("skip_rows", "two"),
+        ("outliers", "mend"),
+        ("displacement_zero", "nan mm"),
+        ("displacement_zero", "12"),
+    ],
+)
 def test_reading_settings_that_are_not_possible_name_their_field(app, setting, value):
     name = upload(app, "a.csv", logged()).json()["set"]
     answer = post(app, "read", set=name, settings={**LOGGED, setting: value})
@@ -701,23 +905,29 @@ def test_reading_settings_that_are_not_possible_name_their_field(app, setting, v
 
 def test_missing_values_name_the_field_that_treats_them(app):
     name = upload(app, "a.csv", logged()).json()["set"]
-    found = problems(post(app, "read", set=name, settings={**LOGGED, "missing": "", "missing_code": "-999, OL"}))
+    found = problems(
+        post(app, "read", set=name, settings={**LOGGED, "missing": "", "missing_code": "-999, OL"})
+    )
     assert "select 'leave out the rows' in the field 'Missing values'" in found["missing"]
 
 
 def test_outliers_are_left_out_as_by_the_command_line(app, tmp_path):
-    """More outliers than are listed are found by the function of `drop_outliers`; rules keep the rows of the file."""
+    """More outliers than are listed are found by the function of `drop_outliers`; rules keep the
+    rows of the file.
+    """
     content = logged(range(12, 80, 8))
     name = upload(app, "a.csv", content).json()["set"]
     rule = {"recordings": ["a.csv"], "rows": [70, 78], "keep": False}
-    (recording,) = post(app, "read", set=name, settings={**LOGGED, "outliers": "drop", "rules": [rule]}).json()[
-        "recordings"
-    ]
+    (recording,) = post(
+        app, "read", set=name, settings={**LOGGED, "outliers": "drop", "rules": [rule]}
+    ).json()["recordings"]
     (tmp_path / "a.csv").write_bytes(content)
     stated = {"resting_length": "300 mm", "displacement_zero": "12 mm", "skip_rows": 1}
     missing = am.bench.DropMissing((-999.0, "OL"))
     (complete,) = read(tmp_path / "a.csv", am.ColumnMapping(**stated, missing=missing))
-    (expected,) = read(tmp_path / "a.csv", am.ColumnMapping(**stated, missing=missing, drop_outliers=True))
+    (expected,) = read(
+        tmp_path / "a.csv", am.ColumnMapping(**stated, missing=missing, drop_outliers=True)
+    )
     left_out = np.flatnonzero(~np.isin(complete["time"], expected["time"]))
     assert recording["outliers"] == len(left_out) > 5
     assert recording["left_out"] == list(left_out)
@@ -773,36 +983,93 @@ def test_several_files_are_a_folder_of_episodes(app):
     ("name", "content", "settings", "field", "text"),
     [
         ("a.zip", b"PK no archive", {}, "mapping", "a.zip: cannot be read as a ZIP archive"),
-        ("a.zip", None, {"mapping": "[angles]\n"}, "mapping", "no table [pressures]; name its columns"),
-        ("a.zip", None, {"mapping": 'sample_time = "10 ms"\n[angles]\ncolumns = "q"\n[pressures]\ncolumns = "p"'},
-         "mapping", "00.csv: no column 'q'; there are angle, speed, pressure1, pressure2"),
-        ("a.zip", None, {"mapping": "x" * 30_000}, "mapping", "must be a text of at most 20000 characters"),
+        (
+            "a.zip",
+            None,
+            {"mapping": "[angles]\n"},
+            "mapping",
+            "no table [pressures]; name its columns",
+        ),
+        (
+            "a.zip",
+            None,
+            {
+                "mapping": (
+                    'sample_time = "10 ms"\n[angles]\ncolumns = "q"\n[pressures]\ncolumns = "p"'
+                )
+            },
+            "mapping",
+            "00.csv: no column 'q'; there are angle, speed, pressure1, pressure2",
+        ),
+        (
+            "a.zip",
+            None,
+            {"mapping": "x" * 30_000},
+            "mapping",
+            "must be a text of at most 20000 characters",
+        ),
         ("a.zip", None, {"horizon": "2"}, "horizon", "horizon is 2; allowed range: 5 to 1000"),
-        ("a.zip", None, {"known": "joint-dmsp-20-matrx"}, "known", "Did you mean 'joint-dmsp-20-matrix'?"),
-        ("a.zip", None, {"known": "/etc/passwd"}, "known", "'/etc/passwd' is no plant of the library"),
-        ("a.zip", None, {"known": '[plant]\nmuscle = "../m.toml"'}, "known", "must not refer to files"),
+        (
+            "a.zip",
+            None,
+            {"known": "joint-dmsp-20-matrx"},
+            "known",
+            "Did you mean 'joint-dmsp-20-matrix'?",
+        ),
+        (
+            "a.zip",
+            None,
+            {"known": "/etc/passwd"},
+            "known",
+            "'/etc/passwd' is no plant of the library",
+        ),
+        (
+            "a.zip",
+            None,
+            {"known": '[plant]\nmuscle = "../m.toml"'},
+            "known",
+            "must not refer to files",
+        ),
         ("a.zip", None, {"known": "[plant"}, "known", "known.toml"),
-        ("a.zip", None, {"known": "joint-dmsp-20-matrix", "residual": "yes"}, "residual", "known exclude each other"),
+        (
+            "a.zip",
+            None,
+            {"known": "joint-dmsp-20-matrix", "residual": "yes"},
+            "residual",
+            "known exclude each other",
+        ),
         ("a.zip", None, {"residual": "no"}, "residual", "residual is 'no'; give yes, or nothing"),
         ("a.zip", None, {"free": "zeros"}, "free", "free requires known"),
     ],
-)  # fmt: skip
+)
 def test_an_impossible_record_names_the_field(app, name, content, settings, field, text):
     _, answer = sheet_of(app, name, archive() if content is None else content, **settings)
-    found = problems(answer) if answer.status == 200 else {answer.json()["field"]: answer.json()["error"]}
+    found = (
+        problems(answer)
+        if answer.status == 200
+        else {answer.json()["field"]: answer.json()["error"]}
+    )
     assert text in found[field]
     assert "/tmp" not in found[field]
 
 
 def test_what_forbids_a_fit_is_a_problem_of_the_mapping(app):
-    mapping = 'sample_time = "10 ms"\n[angles]\ncolumns = "angle"\nunit = "deg"\n[pressures]\ncolumns = {}\n[arm]\npairs = [[2, 1]]'
+    mapping = (
+        'sample_time = "10 ms"\n[angles]\ncolumns = "angle"\nunit = "deg"\n[pressures]\ncolumns ='
+        " {}\n[arm]\npairs = [[2, 1]]"
+    )
     columns = '["pressure1", "pressure2"]'
     _, answer = sheet_of(app, "a.zip", archive(), mapping=mapping.replace("{}", columns))
-    assert "muscles are exchanged: the mapping says that pressure 1 lowers angle 1" in problems(answer)["mapping"]
+    assert (
+        "muscles are exchanged: the mapping says that pressure 1 lowers angle 1"
+        in problems(answer)["mapping"]
+    )
 
 
 def fitted(source, asked, progress):
-    """In place of the fit, which takes a minute: a chapter of the same form, from the same request."""
+    """In place of the fit, which takes a minute: a chapter of the same form, from the same
+    request.
+    """
     from matplotlib.figure import Figure
 
     progress("delay of the pressures: 0 rows")
@@ -828,12 +1095,16 @@ def test_the_fit_is_that_of_the_command_and_offers_its_files(app, monkeypatch):
     task = post(app, "start", set=files, settings=settings).json()["task"]
     assert finished(app, task)["state"] == "done"
     result = request(app, "GET", f"/api/fit/task/{task}/result.json").json()
-    assert result["arm"]["paragraphs"] == ["20 files, horizon 30, joint-dmsp-20-matrix, ('mechanism.inertia', 'zeros')"]
+    assert result["arm"]["paragraphs"] == [
+        "20 files, horizon 30, joint-dmsp-20-matrix, ('mechanism.inertia', 'zeros')"
+    ]
     assert result["arm"]["notes"] == ["not separated"]
     assert result["figures"][0]["src"].startswith("data:image/svg+xml;base64,")
     assert result["files"] == ["report.html", "scenario.toml", "report.zip"]
     assert request(app, "GET", f"/api/fit/task/{task}/scenario.toml").body == b"a = 1\n"
-    with zipfile.ZipFile(io.BytesIO(request(app, "GET", f"/api/fit/task/{task}/report.zip").body)) as packed:
+    with zipfile.ZipFile(
+        io.BytesIO(request(app, "GET", f"/api/fit/task/{task}/report.zip").body)
+    ) as packed:
         assert packed.read("muscles/m0.toml") == b"b = 1\n"
 
 

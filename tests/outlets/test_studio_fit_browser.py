@@ -1,4 +1,6 @@
-"""Tab Fit in a browser: files are dropped, corrected, selected on the chart and fitted, as a user does it."""
+"""Tab Fit in a browser: files are dropped, corrected, selected on the chart and fitted, as a user
+does it.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +34,12 @@ DROP = """([name, content]) => {
 
 def table(seed=0, rows=12):
     """Isobars of a muscle as a CSV file whose pressure has no unit."""
-    law, noise = am.load("dmsp-20-300").characteristic, np.random.default_rng(seed)
+    law = am.load("dmsp-20-300").characteristic
+    noise = np.random.default_rng(seed)
     lines = ["time [s],pressure,contraction [%],force [N]"]
-    for i, (pressure, contraction) in enumerate((p, c) for p in (1, 2, 3, 4) for c in np.linspace(0, 0.17, rows)):
+    for i, (pressure, contraction) in enumerate(
+        (p, c) for p in (1, 2, 3, 4) for c in np.linspace(0, 0.17, rows)
+    ):
         force = max(float(law.force(pressure * 1e5, contraction)), 0.0) + noise.normal(0, 1)
         lines.append(f"{i},{pressure},{100 * contraction:.3f},{force:.2f}")
     return "\n".join(lines).encode()
@@ -51,7 +56,9 @@ def reads(page):
 
 
 def wait_for_read(page, count):
-    """Wait until the server has read the files once more; the policy of the page permits no function of a test."""
+    """Wait until the server has read the files once more; the policy of the page permits no
+    function of a test.
+    """
     end = time.monotonic() + WAIT / 1e3
     while reads(page) <= count:
         assert time.monotonic() < end, "the files were not read"
@@ -86,10 +93,14 @@ def test_a_user_fits_a_file_and_downloads_the_muscle(browser, address, tmp_path)
         assert "unit of 'pressure' (pressure) is not stated" in panel_text(page)
         correct(page, "Unit of pressure", "barr")
         assert "Did you mean 'bar'?" in panel_text(page)
-        assert page.get_by_label("Unit of pressure", exact=True).get_attribute("aria-invalid") == "true"
+        assert (
+            page.get_by_label("Unit of pressure", exact=True).get_attribute("aria-invalid")
+            == "true"
+        )
         correct(page, "Unit of pressure", "bar")
         assert "48 of 48 shown rows are used" in panel_text(page)
-        count, box = reads(page), page.locator("#panel-fit .u-over").first.bounding_box()
+        count = reads(page)
+        box = page.locator("#panel-fit .u-over").first.bounding_box()
         page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 2)
         page.mouse.down()
         page.mouse.move(box["x"] + box["width"] - 2, box["y"] + box["height"] - 2, steps=4)
@@ -149,9 +160,11 @@ def test_rows_are_selected_by_click_by_numbers_and_by_run(browser, address):
         page.get_by_role("button", name="Use all rows").click()
         wait_for_read(page, count)
         assert "48 of 48 shown rows are used" in panel_text(page)
-        plot, margin = page.locator("#panel-fit .u-over").first, 0.05 / 1.1
+        plot = page.locator("#panel-fit .u-over").first
+        margin = 0.05 / 1.1
         plot.scroll_into_view_if_needed()
-        count, box = reads(page), plot.bounding_box()
+        count = reads(page)
+        box = plot.bounding_box()
         page.mouse.click(box["x"] + margin * box["width"], box["y"] + margin * box["height"])
         wait_for_read(page, count)
         assert "47 of 48 shown rows are used" in panel_text(page)
@@ -177,23 +190,33 @@ def test_bad_files_and_lost_sets_are_explained(browser, address):
 @pytest.mark.parametrize(("width", "scheme"), PAGES)
 def test_the_tab_fits_every_width(browser, address, width, scheme):
     with fit_tab(browser, address, width=width, scheme=scheme) as page:
-        drop(page, "bench with a long name of many words in it.csv", table().replace(b"pressure", b"pressure [bar]"))
+        drop(
+            page,
+            "bench with a long name of many words in it.csv",
+            table().replace(b"pressure", b"pressure [bar]"),
+        )
         assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_a_user_identifies_an_arm_from_an_archive_of_episodes(browser, address):
-    """Drop, look at what the record contains and at the proposed mapping, cancel, fit, look at the result."""
+    """Drop, look at what the record contains and at the proposed mapping, cancel, fit, look at the
+    result.
+    """
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w") as file:
         for number, run in enumerate(made_episodes(20).runs):
-            rows = [",".join(f"{v:.7g}" for v in row) for row in np.column_stack([run.angle, run.pressure / 1e3])]
+            rows = [
+                ",".join(f"{v:.7g}" for v in row)
+                for row in np.column_stack([run.angle, run.pressure / 1e3])
+            ]
             file.writestr(f"{number:02d}.csv", "angle,p1,p2\n" + "\n".join(rows))
     with fit_tab(browser, address) as page:
         drop(page, "episodes.zip", data.getvalue())
         assert "pressure 1 raises angle 1" in panel_text(page)
         mapping = page.get_by_label("Mapping (TOML)")
         assert 'columns = ["p1", "p2"]' in mapping.input_value()
-        correct_lines, count = mapping.input_value().replace('"angle"', '"angel"'), reads(page)
+        correct_lines = mapping.input_value().replace('"angle"', '"angel"')
+        count = reads(page)
         mapping.fill(correct_lines)
         mapping.blur()
         wait_for_read(page, count)

@@ -1,4 +1,6 @@
-"""Tabs Joint and Size in a browser: as a user works with them, by mouse, by keyboard and without a network."""
+"""Tabs Joint and Size in a browser: as a user works with them, by mouse, by keyboard and without a
+network.
+"""
 
 from __future__ import annotations
 
@@ -46,27 +48,35 @@ def after_next_run(page, panel, action):
     before = panel.get_attribute("data-runs")
     action()
     page.wait_for_function(
-        "([id, n]) => document.getElementById(id).dataset.runs !== n", arg=["panel-joint", before], timeout=WAIT
+        "([id, n]) => document.getElementById(id).dataset.runs !== n",
+        arg=["panel-joint", before],
+        timeout=WAIT,
     )
 
 
 def columns(page, panel, folder):
-    return np.genfromtxt(saved(page, panel, "CSV", folder), delimiter=",", names=True, deletechars="")
+    return np.genfromtxt(
+        saved(page, panel, "CSV", folder), delimiter=",", names=True, deletechars=""
+    )
 
 
-def test_a_gain_and_the_feed_forward_change_the_step_and_the_frequency_response(browser, address, tmp_path):
+def test_a_gain_and_the_feed_forward_change_the_step_and_the_frequency_response(
+    browser, address, tmp_path
+):
     with opened(browser, address) as page:
         panel = shown(page, "Joint", FIRST)
-        first, text = (
-            columns(page, panel, tmp_path),
-            panel.locator("section", has_text="Open loop of the angle").inner_text(),
-        )
+        first = columns(page, panel, tmp_path)
+        text = panel.locator("section", has_text="Open loop of the angle").inner_text()
         slider = panel.get_by_label("proportional gain, K")
         box = slider.bounding_box()
         page.mouse.move(box["x"] + 0.61 * box["width"], box["y"] + box["height"] / 2)
         page.mouse.down()
         after_next_run(
-            page, panel, lambda: page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + box["height"] / 2, steps=4)
+            page,
+            panel,
+            lambda: page.mouse.move(
+                box["x"] + 0.3 * box["width"], box["y"] + box["height"] / 2, steps=4
+            ),
         )
         page.mouse.up()
         page.wait_for_timeout(300)
@@ -76,15 +86,22 @@ def test_a_gain_and_the_feed_forward_change_the_step_and_the_frequency_response(
         after_next_run(page, panel, lambda: panel.get_by_label("Feed-forward").uncheck())
         third = columns(page, panel, tmp_path)
         begun = third["time_[s]"] > 0.2
-        assert np.abs(third["angle_[deg]"] - 15.0)[begun].mean() > np.abs(second["angle_[deg]"] - 15.0)[begun].mean()
+        assert (
+            np.abs(third["angle_[deg]"] - 15.0)[begun].mean()
+            > np.abs(second["angle_[deg]"] - 15.0)[begun].mean()
+        )
         after_next_run(page, panel, lambda: slider.press("ArrowRight"))
         after_next_run(page, panel, lambda: panel.get_by_role("button", name="Reset gains").click())
         assert panel.get_by_label("K proportional gain").input_value() == "2"
 
 
-def test_the_working_point_is_dragged_and_moved_by_keys_within_the_region(browser, address, tmp_path):
+def test_the_working_point_is_dragged_and_moved_by_keys_within_the_region(
+    browser, address, tmp_path
+):
     tables, location = plant_tables(FIRST)
-    statics = joint_statics(build_scenario({k: tables[k] for k in ("plant", "run")}, location).plant)
+    statics = joint_statics(
+        build_scenario({k: tables[k] for k in ("plant", "run")}, location).plant
+    )
     with opened(browser, address) as page:
         panel = shown(page, "Joint", FIRST)
         chart = panel.get_by_role("application")
@@ -95,17 +112,24 @@ def test_the_working_point_is_dragged_and_moved_by_keys_within_the_region(browse
         after_next_run(
             page,
             panel,
-            lambda: page.mouse.move(box["x"] + 0.62 * box["width"], box["y"] + 0.6 * box["height"], steps=3),
+            lambda: page.mouse.move(
+                box["x"] + 0.62 * box["width"], box["y"] + 0.6 * box["height"], steps=3
+            ),
         )
         page.mouse.up()
         page.wait_for_timeout(300)
         rows = columns(page, panel, tmp_path)
-        angle, stiffness = np.radians(rows["angle_[deg]"][0]), rows["stiffness_[N_m/rad]"][0]
+        angle = np.radians(rows["angle_[deg]"][0])
+        stiffness = rows["stiffness_[N_m/rad]"][0]
         found = statics.pressures(angle, stiffness).pressures[0, 0] / 1e3
-        np.testing.assert_allclose([rows["left.pressure_[kPa]"][0], rows["right.pressure_[kPa]"][0]], found, rtol=1e-6)
+        np.testing.assert_allclose(
+            [rows["left.pressure_[kPa]"][0], rows["right.pressure_[kPa]"][0]], found, rtol=1e-6
+        )
         assert 5.0 < rows["angle_[deg]"][0] < 20.0
         after_next_run(page, panel, lambda: chart.press("ArrowRight"))
-        assert columns(page, panel, tmp_path)["angle_[deg]"][0] == pytest.approx(np.degrees(angle) + 1.0)
+        assert columns(page, panel, tmp_path)["angle_[deg]"][0] == pytest.approx(
+            np.degrees(angle) + 1.0
+        )
         after_next_run(page, panel, lambda: chart.press("Shift+ArrowUp"))
         for _ in range(12):
             chart.press("Shift+ArrowUp")
@@ -121,9 +145,15 @@ def test_every_joint_controller_and_task_runs(browser, address):
             panel.get_by_label("Joint of the library").select_option(name)
             page.wait_for_selector(f'#panel-joint[data-shown="{name}"]', timeout=WAIT)
             for controller in ("cascade", "stiffness", "pid"):
-                after_next_run(page, panel, lambda key=controller: panel.get_by_label("Controller").select_option(key))
+                after_next_run(
+                    page,
+                    panel,
+                    lambda key=controller: panel.get_by_label("Controller").select_option(key),
+                )
             for task in ("sine 2 Hz", "load change", "stiffness change"):
-                after_next_run(page, panel, lambda each=task: panel.get_by_label("Task").select_option(each))
+                after_next_run(
+                    page, panel, lambda each=task: panel.get_by_label("Task").select_option(each)
+                )
                 assert "ended" not in panel.locator(".facts").first.inner_text()
 
 
@@ -135,10 +165,16 @@ def test_muscles_are_found_shown_and_simulated_from_their_file(browser, address,
         panel.get_by_role("button", name="Find muscles").click()
         page.wait_for_selector('#panel-size[data-shown^="15 kg (147.1 N)"]', timeout=WAIT)
         names = panel.locator(".choices tbody tr td:first-child").all_inner_texts()
-        wanted = size_muscles(LiftRequirement(stroke=0.04, mass=15.0), SizingConditions(6e5, max_length=0.35))
+        wanted = size_muscles(
+            LiftRequirement(stroke=0.04, mass=15.0), SizingConditions(6e5, max_length=0.35)
+        )
         assert names == [choice.entry.name for choice in wanted.choices]
-        lengths = [float(t) for t in panel.locator(".choices tbody tr td:nth-child(3)").all_inner_texts()]
-        np.testing.assert_allclose(lengths, [1e3 * choice.length for choice in wanted.choices], rtol=5e-4)
+        lengths = [
+            float(t) for t in panel.locator(".choices tbody tr td:nth-child(3)").all_inner_texts()
+        ]
+        np.testing.assert_allclose(
+            lengths, [1e3 * choice.length for choice in wanted.choices], rtol=5e-4
+        )
         text = saved(page, panel, "Scenario (TOML)", tmp_path).read_text(encoding="utf-8")
         recording = build_scenario(tomllib.loads(text), Location("page", "", Path())).simulate()
         assert np.ptp(recording["position"]) == pytest.approx(0.04, rel=0.03)

@@ -28,7 +28,12 @@ from airmuscle.outlets.studio import library_list, sheet_of_any, sheet_of_scenar
 from airmuscle.outlets.studio.law_sheet import law_sheet
 from airmuscle.physics import Braid, PleatedTube, StraightFibre
 
-WITHOUT_CLOSED_FORM = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40", "saga2007-exact")
+WITHOUT_CLOSED_FORM = (
+    "festo-tool-dmsp-10",
+    "festo-tool-dmsp-20",
+    "festo-tool-dmsp-40",
+    "saga2007-exact",
+)
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 LAWS = [name for name in list_laws() if name not in WITHOUT_CLOSED_FORM]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -57,11 +62,15 @@ def or_nan(function, *arguments):
 
 
 def points_of(law, limits):
-    """Pressures, contractions and forces (N, 3) over the validity range, some of them without a solution."""
+    """Pressures, contractions and forces (N, 3) over the validity range, some of them without a
+    solution.
+    """
     rng = np.random.default_rng(0)
-    low, high = [0.0, 0.0], [min(law.pressure_range[1], 6e5), 0.25]
+    low = [0.0, 0.0]
+    high = [min(law.pressure_range[1], 6e5), 0.25]
     if limits is not None:
-        low, high = [limits.min_pressure, limits.min_contraction], [limits.max_pressure, limits.max_contraction]
+        low = [limits.min_pressure, limits.min_contraction]
+        high = [limits.max_pressure, limits.max_contraction]
     return rng.uniform([*low, 0.0], [*high, 500.0], (6, 3))
 
 
@@ -78,15 +87,22 @@ def changed(law):
 def library_values(law, points):
     return np.array(
         [
-            [or_nan(law.force, p, c), or_nan(law.contraction, p, f), or_nan(law.pressure, c, f), or_nan(law.stiffness, p, c)]
+            [
+                or_nan(law.force, p, c),
+                or_nan(law.contraction, p, f),
+                or_nan(law.pressure, c, f),
+                or_nan(law.stiffness, p, c),
+            ]
             for p, c, f in points
         ]
-    )  # fmt: skip
+    )
 
 
 def test_every_law_of_the_page_gives_the_numbers_of_the_library(tmp_path):
     """Also with changed parameters; a point without a solution has none in the page."""
-    text, data, expected = scripts(*BEGINNING), [], {}
+    text = scripts(*BEGINNING)
+    data = []
+    expected = {}
     for name in LAWS:
         entry = am.load(name)
         sheet = law_sheet(entry)
@@ -113,7 +129,9 @@ def test_a_law_without_a_closed_form_is_approximated_and_the_error_is_stated():
     sheet = law_sheet(am.load("festo-tool-dmsp-20"))
     assert 0.0 < sheet["approximation"]["rms_error"] < sheet["approximation"]["max_error"] < 25.0
     assert sheet["parameters"] == []
-    with pytest.raises(TraceError, match=r"saga2007-exact: ExactMeridian has no closed form and no validity range"):
+    with pytest.raises(
+        TraceError, match=r"saga2007-exact: ExactMeridian has no closed form and no validity range"
+    ):
         law_sheet(am.load("saga2007-exact"))
 
 
@@ -130,12 +148,24 @@ def test_the_outline_of_the_page_is_that_of_the_geometry(tmp_path):
     entry = am.load("saga2007-circle")
     braid = Braid(0.01, 0.4, 0.3)
     shapes = [StraightFibre(0.2, 0.02, rings=2), braid, PleatedTube(0.2, 0.02)]
-    text, data = scripts(*BEGINNING), []
+    text = scripts(*BEGINNING)
+    data = []
     for shape in shapes:
         from_file = am.load("sarosi-dmsp-10") if not isinstance(shape, StraightFibre) else entry
         law = from_file.characteristic
         if isinstance(shape, StraightFibre):
-            law = build({"model": "VirtualWork", "geometry": {"model": "Braid", "radius": 0.01, "braid_angle": 0.4, "resting_length": 0.2}}, Location("", "", Path()))  # fmt: skip
+            law = build(
+                {
+                    "model": "VirtualWork",
+                    "geometry": {
+                        "model": "Braid",
+                        "radius": 0.01,
+                        "braid_angle": 0.4,
+                        "resting_length": 0.2,
+                    },
+                },
+                Location("", "", Path()),
+            )
         sheet = law_sheet(dataclasses.replace(from_file, characteristic=law, geometry=shape))
         text += sheet.pop("script")
         data.append((sheet, [0.0, 0.1, 0.2]))
@@ -144,11 +174,31 @@ def test_the_outline_of_the_page_is_that_of_the_geometry(tmp_path):
         for contraction, (axial, radius) in zip((0.0, 0.1, 0.2), outlines, strict=True):
             x, r = shape.outline(contraction, 6001)
             tolerance = 1e-9 if not isinstance(shape, PleatedTube) else 2e-4
-            np.testing.assert_allclose(np.interp(axial, x, r), radius, atol=max(tolerance, 2e-5 * r.max()))
+            np.testing.assert_allclose(
+                np.interp(axial, x, r), radius, atol=max(tolerance, 2e-5 * r.max())
+            )
             assert max(axial) == pytest.approx(x.max(), abs=1e-12)
 
 
-NUMBERS = (0.0, -0.0, 1.0, 5.0, 0.1, 1e-4, 9.999e-5, 1e-7, 123456.789, 1e15, 1e16, 1.5e22, 5e-324, 1.7976931348623157e308, -2.5e-9, 2.6167e-09, 4096.0)  # fmt: skip
+NUMBERS = (
+    0.0,
+    -0.0,
+    1.0,
+    5.0,
+    0.1,
+    1e-4,
+    9.999e-5,
+    1e-7,
+    123456.789,
+    1e15,
+    1e16,
+    1.5e22,
+    5e-324,
+    1.7976931348623157e308,
+    -2.5e-9,
+    2.6167e-09,
+    4096.0,
+)
 
 
 def test_the_page_writes_numbers_as_python_does(tmp_path):
@@ -157,8 +207,25 @@ def test_the_page_writes_numbers_as_python_does(tmp_path):
 
 
 def test_the_page_reads_what_users_type(tmp_path):
-    text = scripts("numbers") + "console.log(JSON.stringify(DATA.map((t) => String(airmuscle.readNumber(t)))));"
-    given = ["1", " 2.5 ", "2,5", "−3", "1e3", ".5", "", "abc", "1 2", "1,000,000", "0x10", "Infinity", "--1"]
+    text = (
+        scripts("numbers")
+        + "console.log(JSON.stringify(DATA.map((t) => String(airmuscle.readNumber(t)))));"
+    )
+    given = [
+        "1",
+        " 2.5 ",
+        "2,5",
+        "−3",
+        "1e3",
+        ".5",
+        "",
+        "abc",
+        "1 2",
+        "1,000,000",
+        "0x10",
+        "Infinity",
+        "--1",
+    ]
     wanted = ["1", "2.5", "2.5", "-3", "1000", "0.5", *["NaN"] * 7]
     assert run_script(text, given, tmp_path) == wanted
 
@@ -186,7 +253,14 @@ console.log(JSON.stringify([r.status, r.steps, r.columns]));
 """
 
 
-@pytest.mark.parametrize("name", ["lift-dmsp-20", "joint-dmsp-20-proportional", pytest.param("joint-dmsp-20-matrix", marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        "lift-dmsp-20",
+        "joint-dmsp-20-proportional",
+        pytest.param("joint-dmsp-20-matrix", marks=pytest.mark.slow),
+    ],
+)
 def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
     sheet = sheet_of_any(name)
     text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + RUN
@@ -195,15 +269,24 @@ def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
     scenario = scenario_of(name)
     times = np.array(columns["time"])
     recording = am.simulate(
-        scenario.plant, scenario.problem.input, duration=scenario.problem.duration,
-        initial_state=dict(scenario.initial_state), output_times=times, integrator=scenario.problem.integrator,
-    )  # fmt: skip
-    shown = np.isin(recording["time"], times)  # the page does not show the instants of the input between its rows
+        scenario.plant,
+        scenario.problem.input,
+        duration=scenario.problem.duration,
+        initial_state=dict(scenario.initial_state),
+        output_times=times,
+        integrator=scenario.problem.integrator,
+    )
+    shown = np.isin(
+        recording["time"], times
+    )  # the page does not show the instants of the input between its rows
     assert shown.sum() == times.size
     for column in recording:
         wanted = recording[column][shown]
         np.testing.assert_allclose(
-            columns[column], wanted, atol=1e-10 * max(1e-300, np.abs(wanted).max()) + 1e-13, err_msg=column
+            columns[column],
+            wanted,
+            atol=1e-10 * max(1e-300, np.abs(wanted).max()) + 1e-13,
+            err_msg=column,
         )
 
 
@@ -211,7 +294,9 @@ def scenario_of(name):
     from airmuscle.files.library import plant_tables
 
     tables, location = plant_tables(name)
-    return build_scenario({key: tables[key] for key in ("title", "plant", "input", "run")}, location)
+    return build_scenario(
+        {key: tables[key] for key in ("title", "plant", "input", "run")}, location
+    )
 
 
 BY_HAND = """
@@ -226,7 +311,9 @@ console.log(JSON.stringify([live.schedule, live.columns, again.columns]));
 
 
 def test_a_run_by_hand_is_the_run_of_its_schedule(tmp_path):
-    """To the tolerance of the integrator: a run by hand meets every row with a step, the schedule interpolates."""
+    """To the tolerance of the integrator: a run by hand meets every row with a step, the schedule
+    interpolates.
+    """
     sheet = sheet_of_any("lift-dmsp-20")
     text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + BY_HAND
     schedule, live, again = run_script(text, sheet, tmp_path)
@@ -245,7 +332,11 @@ console.log(JSON.stringify([run.initial.settled, Array.from(run.initial.state), 
 CHANGES = {
     "lift-dmsp-20": (
         {"mechanism.mass": 17.0},
-        {"muscle.contractile.geometry.radius": 0.012, "ambient.pressure": 9e4, "ambient.temperature": 310.0},
+        {
+            "muscle.contractile.geometry.radius": 0.012,
+            "ambient.pressure": 9e4,
+            "ambient.temperature": 310.0,
+        },
     ),
     "joint-dmsp-20-proportional": ({"mechanism.weight_torque": 4.0, "mechanism.radius": 0.035},),
 }
@@ -263,7 +354,9 @@ def test_a_run_with_other_parameters_begins_at_their_equilibrium(name, tmp_path)
         expected = am.find_equilibrium(plant, pressure=pressure)
         assert settled
         for variable, found in zip(plant.states, state, strict=True):
-            assert found == pytest.approx(expected[variable.name], rel=1e-8, abs=1e-9 * variable.nominal)
+            assert found == pytest.approx(
+                expected[variable.name], rel=1e-8, abs=1e-9 * variable.nominal
+            )
 
 
 def test_a_start_that_the_page_cannot_find_is_the_original_one(tmp_path):
@@ -271,7 +364,9 @@ def test_a_start_that_the_page_cannot_find_is_the_original_one(tmp_path):
     wall = 'wall = { model = "ViscoelasticWall", compliance = 5e-9, time_constant = 0.1 }'
     muscle = 'muscle = "dmsp-20-300"'
     assert muscle in OWN
-    sheet = sheet_of_scenario_text(OWN.replace(muscle, f'muscle = {{ library = "dmsp-20-300", {wall} }}'))
+    sheet = sheet_of_scenario_text(
+        OWN.replace(muscle, f'muscle = {{ library = "dmsp-20-300", {wall} }}')
+    )
     text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + START
     settled, state, _ = run_script(text, [sheet, {"mechanism.mass": 7.0}], tmp_path)
     assert not settled
@@ -287,7 +382,9 @@ def test_a_scenario_of_a_user_is_read_with_its_parameters():
     values = list(sheet["values"])
     values[rows["mechanism.mass"]["places"][0]] = 7.5
     parts = sheet["toml"]
-    written = tomllib.loads(fill_template(parts["plant"], values) + parts["input"] + "\n" + parts["run"])
+    written = tomllib.loads(
+        fill_template(parts["plant"], values) + parts["input"] + "\n" + parts["run"]
+    )
     scenario = build_scenario(written, Location("page", "", Path()))
     assert scenario.plant.mechanism.mass == 7.5
     np.testing.assert_array_equal(flatten(scenario.plant), values)
@@ -296,7 +393,9 @@ def test_a_scenario_of_a_user_is_read_with_its_parameters():
 def test_every_plant_of_the_page_is_simulated_by_its_name():
     offered = [row["name"] for row in library_list()["plants"]]
     assert "lift-dmsp-20" in offered
-    assert [load_scenario(name).title for name in offered] == [row["title"] for row in library_list()["plants"]]
+    assert [load_scenario(name).title for name in offered] == [
+        row["title"] for row in library_list()["plants"]
+    ]
 
 
 CONTROLLED = """
@@ -309,12 +408,16 @@ console.log(JSON.stringify([r.status, r.columns]));
 
 @pytest.mark.parametrize("example", ["pressure_loop", "joint_cascade"])
 def test_an_own_scenario_runs_under_its_controller_also_with_other_parameters(example, tmp_path):
-    """With the drivers and sensors of the file, as the library computes it, to the tolerance of the integrator."""
+    """With the drivers and sensors of the file, as the library computes it, to the tolerance of the
+    integrator.
+    """
     given = (EXAMPLES / f"{example}.toml").read_text(encoding="utf-8")
     # with a gain of 1.5 a pulse is as long as the delay of the valve, to rounding
     given = given.replace('"1.5 1/bar"', '"1.6 1/bar"')
     sheet = sheet_of_scenario_text(given)
-    script = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + CONTROLLED
+    script = (
+        scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + CONTROLLED
+    )
     path = "mechanism.mass" if example == "pressure_loop" else "mechanism.inertia"
     row = next(row for row in sheet["parameters"] if row["path"] == path)
     for value in (row["value"], 1.4 * row["value"]):
@@ -322,17 +425,26 @@ def test_an_own_scenario_runs_under_its_controller_also_with_other_parameters(ex
         values = list(sheet["values"])
         for place in row["places"]:
             values[place] = value
-        written = fill_template(sheet["toml"]["plant"], values) + sheet["toml"]["input"] + "\n" + sheet["toml"]["run"]
+        written = (
+            fill_template(sheet["toml"]["plant"], values)
+            + sheet["toml"]["input"]
+            + "\n"
+            + sheet["toml"]["run"]
+        )
         recording = build_scenario(tomllib.loads(written), Location("page", "", Path())).simulate()
         assert status == 0
         _, own, other = np.intersect1d(
             np.round(columns["time"], 9), np.round(recording["time"], 9), return_indices=True
         )
-        np.testing.assert_allclose(columns["time"], 0.005 * np.arange(1 + round(sheet["duration"] / 0.005)), atol=1e-9)
+        np.testing.assert_allclose(
+            columns["time"], 0.005 * np.arange(1 + round(sheet["duration"] / 0.005)), atol=1e-9
+        )
         assert own.size > 100
         name = "pressure" if example == "pressure_loop" else "angle"
         np.testing.assert_allclose(
-            np.array(columns[name])[own], recording[name][other], atol=1e-6 * np.ptp(recording[name])
+            np.array(columns[name])[own],
+            recording[name][other],
+            atol=1e-6 * np.ptp(recording[name]),
         )
 
 
@@ -373,13 +485,25 @@ def contrast(a, b):
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
 def test_colours_of_the_page_have_the_contrast_of_wcag_aa(theme):
     """4.5 for texts, 3 for curves and edges of fields."""
-    block = re.findall(r":root[^{]*\{(.*?)\}", (WEB / "style.css").read_text(encoding="utf-8"), re.DOTALL)[theme]
+    block = re.findall(
+        r":root[^{]*\{(.*?)\}", (WEB / "style.css").read_text(encoding="utf-8"), re.DOTALL
+    )[theme]
     colours = dict(re.findall(r"--([\w-]+): (#\w{6})", block))
     texts = [(a, b) for a in ("ink", "soft", "accent") for b in ("card", "ground")]
-    texts += [("on-accent", "accent"), ("ink", "wash"), ("error", "error-wash"), ("soft", "wash"), ("card", "ink")]
+    texts += [
+        ("on-accent", "accent"),
+        ("ink", "wash"),
+        ("error", "error-wash"),
+        ("soft", "wash"),
+        ("card", "ink"),
+    ]
     curves = [(f"c{i}", "card") for i in range(1, 7)] + [("edge", "card"), ("edge", "ground")]
     pairs = [*((pair, 4.5) for pair in texts), *((pair, 3.0) for pair in curves)]
-    assert {pair: c for pair, least in pairs if (c := contrast(colours[pair[0]], colours[pair[1]])) < least} == {}
+    assert {
+        pair: c
+        for pair, least in pairs
+        if (c := contrast(colours[pair[0]], colours[pair[1]])) < least
+    } == {}
 
 
 def test_the_command_writes_a_page_and_names_a_missing_package(tmp_path, monkeypatch):
@@ -390,7 +514,10 @@ def test_the_command_writes_a_page_and_names_a_missing_package(tmp_path, monkeyp
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     done = airmuscle("studio")
     assert done.exit_code == 1
-    assert "error: the studio needs starlette and uvicorn. Install them: pip install starlette uvicorn" in done.stderr
+    assert (
+        "error: the studio needs starlette and uvicorn. Install them: pip install starlette uvicorn"
+        in done.stderr
+    )
 
 
 @pytest.mark.parametrize("name", ["unknown-muscle", "matrix-821", "missing.toml"])
@@ -402,18 +529,25 @@ def test_the_command_names_what_cannot_be_shown(name):
 
 
 def test_the_loop_of_a_scenario_has_the_margins_of_the_library():
-    """Equal to those that are computed here, at the end of the run; OnOffController has no slope anywhere."""
+    """Equal to those that are computed here, at the end of the run; OnOffController has no slope
+    anywhere.
+    """
     path = EXAMPLES / "joint_cascade.toml"
     scenario = load_scenario(path)
     done = am.solve(scenario.problem)
-    linear = linearise_loop(scenario.plant, scenario.problem.input, done.final_state, control_state=done.control_state)
-    found, shown = linear.margins(), sheet_of_scenario_text(path.read_text())["loop"]
+    linear = linearise_loop(
+        scenario.plant, scenario.problem.input, done.final_state, control_state=done.control_state
+    )
+    found = linear.margins()
+    shown = sheet_of_scenario_text(path.read_text())["loop"]
     values = {name: float(value) for name, value, _ in shown["rows"]}
     assert values["gain margin"] == pytest.approx(found.gain, rel=1e-3)
     assert values["phase margin"] == pytest.approx(np.degrees(found.phase), rel=1e-3)
     assert values["delay margin"] == pytest.approx(1e3 * found.delay, rel=1e-3)
     assert values["sensitivity peak"] == pytest.approx(found.peak, rel=1e-3)
-    assert [base64.b64decode(each.partition(",")[2])[:5] for each in shown["figures"]] == [b"<?xml"] * 2
+    assert [base64.b64decode(each.partition(",")[2])[:5] for each in shown["figures"]] == [
+        b"<?xml"
+    ] * 2
     text = (EXAMPLES / "pressure_loop.toml").read_text()
     assert "with valves open by 0.01" in (once := sheet_of_scenario_text(text))["loop"]["text"]
     assert sheet_of_scenario_text(text)["id"] == once["id"], "equal scenarios have one sheet"

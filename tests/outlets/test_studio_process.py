@@ -1,4 +1,6 @@
-"""Process of the studio: it ends with its files removed, and neither silent connections nor long tasks block others."""
+"""Process of the studio: it ends with its files removed, and neither silent connections nor long
+tasks block others.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +39,9 @@ def running(folder):
 
             def send(method, path, body=None, query=""):
                 connection = http.client.HTTPConnection(address.hostname, address.port, timeout=60)
-                connection.request(method, f"{path}?{address.query}{query}", body, {"X-Airmuscle": "1"})
+                connection.request(
+                    method, f"{path}?{address.query}{query}", body, {"X-Airmuscle": "1"}
+                )
                 answer = connection.getresponse()
                 connection.close()
                 return answer.status
@@ -48,7 +52,9 @@ def running(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)], ids=str)
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)], ids=str
+)
 def test_a_server_that_is_ended_removes_its_uploads(tmp_path, number):
     with running(tmp_path) as (server, _, send):
         assert send("POST", "/api/fit/file", b"p [bar]\n1\n", "&name=a.csv&set=") == 200
@@ -73,11 +79,16 @@ def made_connection(cycle, since):
 
 
 def test_each_phase_of_a_request_has_its_limit(monkeypatch):
-    body, answer = (SimpleNamespace(response_complete=False, more_body=more) for more in (True, False))
+    body, answer = (
+        SimpleNamespace(response_complete=False, more_body=more) for more in (True, False)
+    )
     done = SimpleNamespace(response_complete=True, more_body=True)
     assert [studio_server.limit_of(cycle) for cycle in (None, body, answer, done)] == [
-        studio_server.HEAD_LIMIT, studio_server.BODY_LIMIT, studio_server.ANSWER_LIMIT, studio_server.HEAD_LIMIT,
-    ]  # fmt: skip
+        studio_server.HEAD_LIMIT,
+        studio_server.BODY_LIMIT,
+        studio_server.ANSWER_LIMIT,
+        studio_server.HEAD_LIMIT,
+    ]
     monkeypatch.setattr(studio_server, "MAX_CONNECTIONS", 2)
     kept = [made_connection(cycle, since) for since, cycle in enumerate((body, None, None))]
     studio_server.close_one_of(kept)
@@ -91,7 +102,13 @@ def test_a_silent_connection_is_closed_at_its_limit(monkeypatch):
 
     async def closed_after():
         server = uvicorn.Server(
-            uvicorn.Config(lambda *_: None, port=0, http=studio_server.limited_protocol(), lifespan="off", ws="none")
+            uvicorn.Config(
+                lambda *_: None,
+                port=0,
+                http=studio_server.limited_protocol(),
+                lifespan="off",
+                ws="none",
+            )
         )
         task = asyncio.create_task(server.serve())
         while not server.started:

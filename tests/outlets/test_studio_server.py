@@ -1,4 +1,6 @@
-"""Server of the studio: it answers its own page only, within limits, and never with a traceback or a file."""
+"""Server of the studio: it answers its own page only, within limits, and never with a traceback or
+a file.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +64,10 @@ def test_the_page_allows_scripts_of_this_server_only(app):
 
 def test_every_file_that_the_page_names_is_sent(app):
     page = request(app, "GET", "/").text
-    names = [part.split('"')[0] for part in page.replace('href="web/', 'src="web/').split('src="web/')[1:]]
+    names = [
+        part.split('"')[0]
+        for part in page.replace('href="web/', 'src="web/').split('src="web/')[1:]
+    ]
     assert len(names) > 15
     assert {request(app, "GET", f"/web/{name}").status for name in names} == {200}
     assert "MIT" in request(app, "GET", "/web/vendor/uPlot.LICENSE").text
@@ -85,12 +90,37 @@ def test_own_files_are_read(app):
 
 
 PATHS = (
-    "/../../etc/passwd", "/web/../app.py", "/web/..%2f..%2fapp.py", "/web/scripts/../../app.py", "/web//etc/passwd",
-    "/web/", "/web/.", "/web/scripts", "/web/index.html", "/web/\0", "/program/../../x.js", "/program/", "/api/law/..",
-    "/api/law/../plants/lift", "/api/law/%2e%2e", "/api/law/matrix-821", "/api/law/lift", "/api/plant/dmsp-20-300",
-    "/api/plant/../lift", "/api/law/<script>", "/api/law/" + "x" * 1500, "/api", "/docs", "/openapi.json", "/favicon.ico",
-    "/.git/config", "//", "/api/law/a\r\nx: y", "/api/law/é", "/program/" + "0" * 32 + ".js",
-)  # fmt: skip
+    "/../../etc/passwd",
+    "/web/../app.py",
+    "/web/..%2f..%2fapp.py",
+    "/web/scripts/../../app.py",
+    "/web//etc/passwd",
+    "/web/",
+    "/web/.",
+    "/web/scripts",
+    "/web/index.html",
+    "/web/\0",
+    "/program/../../x.js",
+    "/program/",
+    "/api/law/..",
+    "/api/law/../plants/lift",
+    "/api/law/%2e%2e",
+    "/api/law/matrix-821",
+    "/api/law/lift",
+    "/api/plant/dmsp-20-300",
+    "/api/plant/../lift",
+    "/api/law/<script>",
+    "/api/law/" + "x" * 1500,
+    "/api",
+    "/docs",
+    "/openapi.json",
+    "/favicon.ico",
+    "/.git/config",
+    "//",
+    "/api/law/a\r\nx: y",
+    "/api/law/é",
+    "/program/" + "0" * 32 + ".js",
+)
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -120,7 +150,9 @@ def test_another_host_name_is_refused(app, host):
     assert request(app, "GET", "/api/library", headers={"host": None}).status == 421
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:80", "[::1]:8765", "[::1]", "LOCALHOST", "localhost.:80"])
+@pytest.mark.parametrize(
+    "host", ["127.0.0.1", "localhost:80", "[::1]:8765", "[::1]", "LOCALHOST", "localhost.:80"]
+)
 def test_the_names_of_this_machine_are_accepted(app, host):
     assert request(app, "GET", "/", headers={"host": host}).status == 200
 
@@ -144,7 +176,9 @@ def test_requests_of_other_pages_are_refused(app, path, headers):
     assert request(app, "POST", path, b"", headers=headers).status == 403
 
 
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "post", "X" * 100])
+@pytest.mark.parametrize(
+    "method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "post", "X" * 100]
+)
 def test_other_methods_are_refused(app, method):
     assert request(app, method, "/api/law").status == 405
 
@@ -167,8 +201,19 @@ def test_a_large_text_is_refused_before_it_is_read(app, path):
 
 
 BAD_TEXTS = (
-    b"", b"\xff\xfe\x00", b"\x00" * 100, b"[", b"a = ", b"[[[[", b"title = 1", b"x" * 60000, b"a = " + b"[" * 30000,
-    b"a = " + b"{ a = " * 5000, b"<script>alert(1)</script>", b"title = '${7*7}{{7*7}}'", b"[characteristic]",
+    b"",
+    b"\xff\xfe\x00",
+    b"\x00" * 100,
+    b"[",
+    b"a = ",
+    b"[[[[",
+    b"title = 1",
+    b"x" * 60000,
+    b"a = " + b"[" * 30000,
+    b"a = " + b"{ a = " * 5000,
+    b"<script>alert(1)</script>",
+    b"title = '${7*7}{{7*7}}'",
+    b"[characteristic]",
     b"title='x'\nprovenance='x'\n[characteristic]\nmodel='os.system'",
     b"title='x'\nprovenance='x'\n[characteristic]\nmodel='Braid'",
     b"title='x'\nprovenance='x'\n[characteristic]\nmodel='TonduLopez2000'\nend_correction=nan",
@@ -177,22 +222,39 @@ BAD_TEXTS = (
     b"title='x'\nprovenance='x'\n[characteristic]\nmodel='Tabulated'\npressures=[]\ncontractions=[]\nforces=[]",
     b"title='x'\nprovenance='x'\nproduct='../../x'\n[characteristic]\nmodel='Serres2009'",
     b"title='x'\nprovenance='x'\n[characteristic]\nmodel='ContractileSurface'\ndegree=1000000",
-    MUSCLE.encode().replace(b"radius = ", b"radius = -"), MUSCLE.encode().replace(b"0.", b"inf #"),
-    MUSCLE.encode() + b"\n[unknown]\n", MUSCLE.encode() * 3, "title = 'ü'\r\n".encode("latin-1"),
-    b"[plant]", b"[plant]\nmuscle='/etc/passwd'", b"[plant]\nmuscle='../x.toml'\n[run]\nduration='1 s'",
-    b"[plant]\nmuscle='x.toml'", b"[plant]\nlibrary='/dev/zero'", b"[plant]\nlibrary='lift/../x'",
-    b"[plant]\nmuscle=[]", b"[plant]\nmuscle=1\n[run]\nduration=1", b"plant = 1", b"[[plant]]", b"[plant.muscle]",
-    LIFT.encode().replace(b"2 s", b"-2 s"), LIFT.encode().replace(b"2 s", b"1e9 s"),
-    LIFT.encode().replace(b"2 s", b"nan s"), LIFT.encode().replace(b"fill = [[\"1 s\", 1]]", b"file='x.csv'"),
-    LIFT.encode().replace(b"fill = [[\"1 s\", 1]]", b"[input.controller]\nmodel='PID'"),
-    LIFT.encode().replace(b"fill = [[\"1 s\", 1]]", b"fill=[[1,2]]"),
+    MUSCLE.encode().replace(b"radius = ", b"radius = -"),
+    MUSCLE.encode().replace(b"0.", b"inf #"),
+    MUSCLE.encode() + b"\n[unknown]\n",
+    MUSCLE.encode() * 3,
+    "title = 'ü'\r\n".encode("latin-1"),
+    b"[plant]",
+    b"[plant]\nmuscle='/etc/passwd'",
+    b"[plant]\nmuscle='../x.toml'\n[run]\nduration='1 s'",
+    b"[plant]\nmuscle='x.toml'",
+    b"[plant]\nlibrary='/dev/zero'",
+    b"[plant]\nlibrary='lift/../x'",
+    b"[plant]\nmuscle=[]",
+    b"[plant]\nmuscle=1\n[run]\nduration=1",
+    b"plant = 1",
+    b"[[plant]]",
+    b"[plant.muscle]",
+    LIFT.encode().replace(b"2 s", b"-2 s"),
+    LIFT.encode().replace(b"2 s", b"1e9 s"),
+    LIFT.encode().replace(b"2 s", b"nan s"),
+    LIFT.encode().replace(b'fill = [["1 s", 1]]', b"file='x.csv'"),
+    LIFT.encode().replace(b'fill = [["1 s", 1]]', b"[input.controller]\nmodel='PID'"),
+    LIFT.encode().replace(b'fill = [["1 s", 1]]', b"fill=[[1,2]]"),
     LIFT.encode().replace(b"matrix-821", b"/absolute/valve.toml"),
-    LIFT.encode().replace(b"matrix-821", b"1 x/../../valve"), LIFT.encode().replace(b"5 kg", b"0 kg"),
-    LIFT.encode().replace(b"5 kg", b"5 m"), LIFT.encode().replace(b"HangingMass", b"__import__"),
-)  # fmt: skip
+    LIFT.encode().replace(b"matrix-821", b"1 x/../../valve"),
+    LIFT.encode().replace(b"5 kg", b"0 kg"),
+    LIFT.encode().replace(b"5 kg", b"5 m"),
+    LIFT.encode().replace(b"HangingMass", b"__import__"),
+)
 
 
-@pytest.mark.parametrize("text", BAD_TEXTS, ids=lambda text: text[:40].decode("latin-1").replace("\0", "0"))
+@pytest.mark.parametrize(
+    "text", BAD_TEXTS, ids=lambda text: text[:40].decode("latin-1").replace("\0", "0")
+)
 @pytest.mark.parametrize("path", ["/api/law", "/api/plant"])
 def test_a_wrong_text_is_answered_with_its_reason(app, path, text):
     answer = request(app, "POST", path, text)
@@ -205,13 +267,25 @@ def test_a_wrong_text_is_answered_with_its_reason(app, path, text):
 @pytest.mark.parametrize(
     "body",
     [
-        b"", b"{", b"[]", b"null", b"1", b'{"sheets": []}', b'{"sheets": [], "state": {}}', b'{"sheets": ["x"], "state": {}}',
-        b'{"sheets": "x", "state": {}}', b'{"sheets": [1], "state": {}}', b'{"sheets": ["x"], "state": []}',
-        b'{"sheets": ["../x"], "state": {}}', b'{"sheets": ["' + b'x","' * 13 + b'x"], "state": {}}', b"[" * 100000,
-        b"\xff", b'{"sheets": {"a": 1}, "state": {}}',
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b"1",
+        b'{"sheets": []}',
+        b'{"sheets": [], "state": {}}',
+        b'{"sheets": ["x"], "state": {}}',
+        b'{"sheets": "x", "state": {}}',
+        b'{"sheets": [1], "state": {}}',
+        b'{"sheets": ["x"], "state": []}',
+        b'{"sheets": ["../x"], "state": {}}',
+        b'{"sheets": ["' + b'x","' * 13 + b'x"], "state": {}}',
+        b"[" * 100000,
+        b"\xff",
+        b'{"sheets": {"a": 1}, "state": {}}',
     ],
     ids=range(16),
-)  # fmt: skip
+)
 def test_a_wrong_request_for_a_page_is_refused(app, body):
     answer = request(app, "POST", "/api/page", body)
     assert answer.status in (400, 404)
@@ -225,7 +299,9 @@ def test_a_large_request_for_a_page_is_refused(app):
 @pytest.mark.parametrize("text", ["</script><script>alert(1)</script>", "<!--", "&amp;\u2028"])
 def test_texts_in_a_saved_page_remain_texts(app, text):
     sheet = request(app, "POST", "/api/law", MUSCLE.replace("Pneumatic", text).encode()).json()
-    body = f'{{"sheets": ["{sheet["id"]}"], "state": {{"tab": "</script><script>alert(2)</script>"}}}}'
+    body = (
+        f'{{"sheets": ["{sheet["id"]}"], "state": {{"tab": "</script><script>alert(2)</script>"}}}}'
+    )
     page = request(app, "POST", "/api/page", body.encode()).text
     assert "<script>alert" not in page
     assert "unsafe" not in page
@@ -234,31 +310,53 @@ def test_texts_in_a_saved_page_remain_texts(app, text):
 @pytest.mark.parametrize(
     "name",
     widened(
-        ["</script><script>alert(1)</script>", "<!--<script>", "*/ alert(1) //", "`${alert(1)}`", '"; alert(1); "'],
-        lambda name: name.startswith(("</", "<!--", '"')),  # what ends an element, a script and a text
+        [
+            "</script><script>alert(1)</script>",
+            "<!--<script>",
+            "*/ alert(1) //",
+            "`${alert(1)}`",
+            '"; alert(1); "',
+        ],
+        lambda name: name.startswith(
+            ("</", "<!--", '"')
+        ),  # what ends an element, a script and a text
     ),
 )
 def test_names_in_the_program_of_a_saved_page_remain_names(name, tmp_path):
-    """Each script of the page has its digest in the policy; the program runs in Node, and its states have the name."""
+    """Each script of the page has its digest in the policy; the program runs in Node, and its
+    states have the name.
+    """
     tables = tomllib.loads(LIFT)
     plant = tables["plant"]
-    plant |= {"muscle": [{"library": "dmsp-20-300", "name": name}, "dmsp-20-300"], "circuit": [plant["circuit"]] * 2}
+    plant |= {
+        "muscle": [{"library": "dmsp-20-300", "name": name}, "dmsp-20-300"],
+        "circuit": [plant["circuit"]] * 2,
+    }
     plant["mechanism"] = {"model": "AntagonisticJoint", "radius": 0.04, "inertia": 0.05}
     tables["input"] = {"muscle.fill": [[1.0, 1.0]]}
     sheet = sheet_of_tables(tables, Location("own", "", tmp_path), name, {}, "")
     page = self_contained_page([sheet], {"name": name})
     scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
-    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts]
+    digests = [
+        base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts
+    ]
     policy = re.search(r"script-src ([^;]*);", page).group(1)
     assert policy.split() == [f"'sha256-{digest}'" for digest in digests]
     assert not any("<!--" in text for text in scripts)
-    program = next(text for text in scripts if text.startswith('"use strict";\nairmusclePrograms["'))
+    program = next(
+        text for text in scripts if text.startswith('"use strict";\nairmusclePrograms["')
+    )
     show = f"console.log(JSON.stringify(airmusclePrograms['{sheet['id']}'].states));"
     states = run_script(f"const airmusclePrograms = {{}};\n{program}\n{show}", 0, tmp_path)
     assert states[0] == f"{name}.air_mass"
 
 
-ALLOWED = ('note = "a/b.toml"', 'x = "2.6 m3/(s Pa)"', 'x = "-1.5e-3 1/bar"', '[[reference]]\nwhere = "https://x/y"')
+ALLOWED = (
+    'note = "a/b.toml"',
+    'x = "2.6 m3/(s Pa)"',
+    'x = "-1.5e-3 1/bar"',
+    '[[reference]]\nwhere = "https://x/y"',
+)
 REFUSED = (
     'x = "/etc/passwd"',
     'x = "a.toml"',
@@ -290,13 +388,23 @@ def test_other_machines_need_the_token():
     cookie = first.headers["set-cookie"]
     assert "HttpOnly" in cookie
     assert "samesite=lax" in cookie.lower()
-    assert request(app, "GET", "/", headers={"cookie": cookie.split(";")[0], "host": "any.example"}).status == 200
+    assert (
+        request(
+            app, "GET", "/", headers={"cookie": cookie.split(";")[0], "host": "any.example"}
+        ).status
+        == 200
+    )
 
 
 def test_a_loopback_address_is_recognised_and_has_a_token_as_well():
     """Another user of this machine reaches it too."""
-    assert [is_loopback(h) for h in ("127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]", "LOCALHOST.")] == [True] * 6
-    assert [is_loopback(h) for h in ("0.0.0.0", "192.168.1.2", "::", "example.org", "")] == [False] * 5
+    assert [
+        is_loopback(h)
+        for h in ("127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]", "LOCALHOST.")
+    ] == [True] * 6
+    assert [is_loopback(h) for h in ("0.0.0.0", "192.168.1.2", "::", "example.org", "")] == [
+        False
+    ] * 5
     assert min(len(access_of(host).token) for host in ("127.0.0.1", "0.0.0.0")) > 30
 
 
@@ -308,9 +416,9 @@ def test_a_muscle_that_the_command_names_is_opened_by_its_name(tmp_path):
     muscles = studio_page.first_state([by_name, by_path])["muscle"]["muscles"]
     assert muscles[0] == {"name": "dmsp-20-300", "values": {}}
     assert set(muscles[1]) == {"text", "values"}
-    opened = json.loads(request(create_app(pool=InThisProcess(), opened=(by_name,)), "GET", "/api/library").text)[
-        "opened"
-    ]
+    opened = json.loads(
+        request(create_app(pool=InThisProcess(), opened=(by_name,)), "GET", "/api/library").text
+    )["opened"]
     assert [sheet["name"] for sheet in opened] == ["dmsp-20-300"]
 
 
@@ -321,12 +429,17 @@ def test_another_address_of_this_machine_answers_for_its_own_name():
 
 def test_the_printed_address_can_be_opened_and_an_unencrypted_connection_is_remarked():
     assert reachable_host("127.0.0.2") == "127.0.0.2"
-    assert [reachable_host(host) in ("0.0.0.0", "::") for host in ("0.0.0.0", "::")] == [False, False]
+    assert [reachable_host(host) in ("0.0.0.0", "::") for host in ("0.0.0.0", "::")] == [
+        False,
+        False,
+    ]
     assert "not encrypted" in warning_of("0.0.0.0")
     assert warning_of("127.0.0.1") == ""
 
 
-@pytest.mark.parametrize("path", ["/api/law/dmsp-20-300", "/api/plant/lift", "/api/joint/joint-dmsp-20-matrix"])
+@pytest.mark.parametrize(
+    "path", ["/api/law/dmsp-20-300", "/api/plant/lift", "/api/joint/joint-dmsp-20-matrix"]
+)
 @pytest.mark.parametrize("headers", [{"x-airmuscle": None}, {"sec-fetch-site": "cross-site"}])
 def test_what_is_read_but_computed_must_come_from_the_page(app, path, headers):
     assert request(app, "GET", path, headers=headers).status == 403
@@ -342,8 +455,16 @@ def test_a_tab_that_is_closed_during_its_request_raises_nothing(app):
         sent.append(message)
 
     headers = [(b"host", HOST.encode()), (b"x-airmuscle", b"1")]
-    scope = {"type": "http", "http_version": "1.1", "method": "POST", "path": "/api/law", "headers": headers}
-    asyncio.run(app({**scope, "query_string": b"", "root_path": "", "scheme": "http"}, receive, send))
+    scope = {
+        "type": "http",
+        "http_version": "1.1",
+        "method": "POST",
+        "path": "/api/law",
+        "headers": headers,
+    }
+    asyncio.run(
+        app({**scope, "query_string": b"", "root_path": "", "scheme": "http"}, receive, send)
+    )
     assert sent[0]["status"] == 400
 
 
@@ -351,7 +472,10 @@ def test_a_port_in_use_is_named():
     with bound_socket("127.0.0.1", 0) as used:
         used.listen()
         port = used.getsockname()[1]
-        with pytest.raises(InputError, match=rf"port {port}: no server can be started there .* Choose another --port"):
+        with pytest.raises(
+            InputError,
+            match=rf"port {port}: no server can be started there .* Choose another --port",
+        ):
             bound_socket("127.0.0.1", port)
     with pytest.raises(InputError, match="allowed range: 0 to 65535"):
         bound_socket("127.0.0.1", 70000)
@@ -377,7 +501,9 @@ def test_ten_users_at_once_are_answered():
     try:
         texts = [MUSCLE + f"# user {i}\n" for i in range(10)]
         with ThreadPoolExecutor(10) as users:
-            answers = list(users.map(lambda text: request(app, "POST", "/api/law", text.encode()), texts))
+            answers = list(
+                users.map(lambda text: request(app, "POST", "/api/law", text.encode()), texts)
+            )
     finally:
         pool.stop()
     assert [answer.status for answer in answers] == [200] * 10
@@ -389,8 +515,13 @@ def test_a_plant_that_takes_too_long_is_refused_in_time(monkeypatch):
     """The next request is answered, by a new process."""
     pool = WorkerPool(1)
     app = create_app(pool=pool)
-    tube = 'circuit = { model = "WithTubes", tube = { model = "DistributedTube", length = "2 m", diameter = "4 mm", segment_count = 200 }, circuit = { model = "FillDischarge"'
-    text = LIFT.replace('circuit = { model = "FillDischarge"', tube).replace('"matrix-821" } }', '"matrix-821" } } }')
+    tube = (
+        'circuit = { model = "WithTubes", tube = { model = "DistributedTube", length = "2 m",'
+        ' diameter = "4 mm", segment_count = 200 }, circuit = { model = "FillDischarge"'
+    )
+    text = LIFT.replace('circuit = { model = "FillDischarge"', tube).replace(
+        '"matrix-821" } }', '"matrix-821" } } }'
+    )
     try:
         assert request(app, "POST", "/api/law", MUSCLE.encode()).status == 200
         monkeypatch.setattr(studio_app, "TIME_LIMIT", 0.3)

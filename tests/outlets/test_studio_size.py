@@ -1,4 +1,6 @@
-"""Tab Size of the studio: its sheet contains the choices of the library; requests that mean nothing are refused."""
+"""Tab Size of the studio: its sheet contains the choices of the library; requests that mean nothing
+are refused.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +13,27 @@ from studio_pages import InThisProcess, request
 pytest.importorskip("starlette", reason="needs starlette")
 
 from airmuscle import load
-from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text, size_muscles
+from airmuscle.design import (
+    JointRequirement,
+    LiftRequirement,
+    SizingConditions,
+    choose,
+    scenario_text,
+    size_muscles,
+)
 from airmuscle.errors import ParameterError, SolveError
 from airmuscle.outlets.studio import create_app, joint_names, read_request
 from airmuscle.outlets.studio.tasks import size_sheet
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-LIFT = {"load": "20 kg", "stroke": "40 mm", "supply": "6 bar", "max_length": "400 mm", "max_count": "1", "sort": "length"}  # fmt: skip
+LIFT = {
+    "load": "20 kg",
+    "stroke": "40 mm",
+    "supply": "6 bar",
+    "max_length": "400 mm",
+    "max_count": "1",
+    "sort": "length",
+}
 
 
 @pytest.fixture(scope="module")
@@ -28,15 +44,23 @@ def app():
 def test_the_sheet_contains_the_choices_of_the_library_with_chart_and_scenario():
     sheet = size_sheet(json.dumps(LIFT))
     conditions = SizingConditions(6e5, max_length=0.4, max_count=1)
-    choices = sorted(size_muscles(LiftRequirement(0.04, mass=20.0), conditions).choices, key=lambda c: c.length)
+    choices = sorted(
+        size_muscles(LiftRequirement(0.04, mass=20.0), conditions).choices, key=lambda c: c.length
+    )
     assert [row["name"] for row in sheet["choices"]] == [choice.entry.name for choice in choices]
     table = sheet["tables"]["choices"]
-    lengths = [row[[each["text"] for each in table["headings"]].index("nominal length [mm]")] for row in table["rows"]]
+    lengths = [
+        row[[each["text"] for each in table["headings"]].index("nominal length [mm]")]
+        for row in table["rows"]
+    ]
     assert lengths == [f"{1e3 * choice.length:.4g}" for choice in choices]
     for row, choice in zip(sheet["choices"], choices, strict=True):
-        chart, last = row["chart"], choice.design.contracted
+        chart = row["chart"]
+        last = choice.design.contracted
         assert chart["points"][1] == pytest.approx(last._asdict())
-        reached = np.interp(last.contraction, chart["capacity"]["contractions"], chart["capacity"]["forces"])
+        reached = np.interp(
+            last.contraction, chart["capacity"]["contractions"], chart["capacity"]["forces"]
+        )
         assert reached == pytest.approx(last.capacity, rel=5e-3)
         assert bool(row["scenario"]) != bool(row["reason"])
     assert sheet["tables"]["unsuitable"]["rows"]
@@ -75,16 +99,25 @@ def test_brackets_without_end_are_no_request():
 
 
 def test_other_joints_do_not_exist_and_requests_of_other_pages_are_refused(app):
-    assert {name: request(app, "GET", f"/api/joint/{name}").status for name in ("lift", "arm-lilly-quesada", "..")} == {
-        "lift": 404, "arm-lilly-quesada": 404, "..": 404,
-    }  # fmt: skip
-    assert [row["name"] for row in request(app, "GET", "/api/library").json()["joints"]] == list(joint_names())
+    assert {
+        name: request(app, "GET", f"/api/joint/{name}").status
+        for name in ("lift", "arm-lilly-quesada", "..")
+    } == {
+        "lift": 404,
+        "arm-lilly-quesada": 404,
+        "..": 404,
+    }
+    assert [row["name"] for row in request(app, "GET", "/api/library").json()["joints"]] == list(
+        joint_names()
+    )
     assert request(app, "POST", "/api/size", b"{}", headers={"x-airmuscle": None}).status == 403
 
 
 def test_a_joint_of_muscles_without_a_geometry_has_no_scenario():
     """The reason is stated, as for a lift."""
     conditions = SizingConditions(6e5)
-    choice = choose(load("festo-tool-dmsp-40"), JointRequirement(angle=1.0, torque=5.0), conditions, 1)
+    choice = choose(
+        load("festo-tool-dmsp-40"), JointRequirement(angle=1.0, torque=5.0), conditions, 1
+    )
     with pytest.raises(SolveError, match="geometry"):
         scenario_text(choice)

@@ -1,9 +1,9 @@
 """Parameter studies: the results are bit-identical for every kind of execution.
 
-Killed and resumed, in one process or several, in threads or on a Dask cluster: results.csv, the chunk files and the
-figures are identical byte by byte. A chunk is computed again if and only if something that it depends on has changed. A
-failed run is recorded with its reason and stops no other run. An invalid study is rejected with one line that names the
-location.
+Killed and resumed, in one process or several, in threads or on a Dask cluster: results.csv, the
+chunk files and the figures are identical byte by byte. A chunk is computed again if and only if
+something that it depends on has changed. A failed run is recorded with its reason and stops no
+other run. An invalid study is rejected with one line that names the location.
 """
 
 from __future__ import annotations
@@ -76,7 +76,9 @@ def edited(folder: Path, old: str, new: str, file: str = "study.toml") -> Path:
 
 
 def run(folder: Path, out: str = "out", executor=None):
-    """The result of the study; writes results.csv without the report, whose figures take most of the time."""
+    """The result of the study; writes results.csv without the report, whose figures take most of
+    the time.
+    """
     result = run_study(load_study(folder / "study.toml"), folder / out, executor)
     save_table(result.table(), folder / out / "results.csv")
     return result
@@ -85,7 +87,9 @@ def run(folder: Path, out: str = "out", executor=None):
 def contents(out: Path) -> dict[str, bytes]:
     """All files of a study except for the page, which contains the date."""
     return {
-        p.relative_to(out).as_posix(): p.read_bytes() for p in out.rglob("*") if p.is_file() and p.suffix != ".html"
+        p.relative_to(out).as_posix(): p.read_bytes()
+        for p in out.rglob("*")
+        if p.is_file() and p.suffix != ".html"
     }
 
 
@@ -110,7 +114,9 @@ runpy.run_module("airmuscle", run_name="__main__", alter_sys=True)
 
 
 def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
-    """A running study that has saved at least `chunks` chunks; SIGINT reaches it as from a terminal."""
+    """A running study that has saved at least `chunks` chunks; SIGINT reaches it as from a
+    terminal.
+    """
     process = subprocess.Popen(
         [sys.executable, "-c", HEARING, *command(folder, *options)[3:]],
         stdout=subprocess.PIPE,
@@ -170,8 +176,12 @@ def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
     edited(folder, "count = 22", "count = 2000")
     process = started(folder, 3, "--workers", "2")
     end = time.monotonic() + 60
-    while not (len(children := children_of(process.pid)) >= 3 and all(map(ignores_sigint, children))):
-        assert time.monotonic() < end, "two workers and the resource tracker of multiprocessing are expected"
+    while not (
+        len(children := children_of(process.pid)) >= 3 and all(map(ignores_sigint, children))
+    ):
+        assert time.monotonic() < end, (
+            "two workers and the resource tracker of multiprocessing are expected"
+        )
         time.sleep(0.01)
     process.kill()
     process.wait()
@@ -182,7 +192,14 @@ def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
 
 
 def test_only_a_resumed_study_is_reported_as_resumed(folder: Path):
-    arguments = ["study", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
+    arguments = [
+        "study",
+        str(folder / "study.toml"),
+        "--out",
+        str(folder / "out"),
+        "--workers",
+        "1",
+    ]
     first, second = (airmuscle(*arguments) for _ in range(2))
     assert "resuming" not in first.stderr
     assert "resuming: 22 of 22 runs are already saved" in second.stderr
@@ -243,7 +260,11 @@ def test_a_sigint_that_python_discards_is_not_lost(monkeypatch):
         check_interrupted()  # forgotten once the block has raised it
         with pytest.raises(KeyboardInterrupt), deferred_sigint():
             interrupted_import()
-        with pytest.raises(KeyboardInterrupt), deferred_sigint(), deferred_sigint():  # blocks may be nested
+        with (
+            pytest.raises(KeyboardInterrupt),
+            deferred_sigint(),
+            deferred_sigint(),
+        ):  # blocks may be nested
             interrupted_import()
         with pytest.raises(ImportError), deferred_sigint():
             raise ImportError
@@ -263,30 +284,42 @@ def local_dask():
     distributed = pytest.importorskip("distributed")
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, worker_dashboard_address=None
+            n_workers=2,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            worker_dashboard_address=None,
         ) as cluster,
         dask_cluster(cluster.scheduler_address) as executor,
     ):
         yield executor
 
 
-def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra_and_its_share_of_the_cores(monkeypatch):
+def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra_and_its_share_of_the_cores(
+    monkeypatch,
+):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     environment = functools.partial(subprocess.check_output, shell=True, text=True)
     with process_pool(2, one_thread_each=True) as pool:
         said = set(pool.map(environment, ["sleep 0.3; echo $PPID has $OPENBLAS_NUM_THREADS"] * 8))
         cores = "__import__('sys').modules['airmuscle.engine.processes'].available_cores()"
-        assert pool.submit(eval, cores).result() == 1  # of those of this process, which conftest limits to one
+        assert (
+            pool.submit(eval, cores).result() == 1
+        )  # of those of this process, which conftest limits to one
     assert [text.split()[1:] for text in said] == [["has", "1"]] * 2
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
 def test_one_worker_is_the_process_itself_with_one_thread_of_linear_algebra(monkeypatch):
-    """Two threads of the small matrices of `compare` take five times the CPU time on a busy machine."""
+    """Two threads of the small matrices of `compare` take five times the CPU time on a busy
+    machine.
+    """
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         monkeypatch.delenv(name, raising=False)
     library = ctypes.CDLL(importlib.import_module("numpy.linalg._umath_linalg").__file__)
-    threads, set_threads = (getattr(library, f"scipy_openblas_{verb}_num_threads64_", None) for verb in ("get", "set"))
+    threads, set_threads = (
+        getattr(library, f"scipy_openblas_{verb}_num_threads64_", None) for verb in ("get", "set")
+    )
     if threads is None:
         pytest.skip("NumPy has another library of linear algebra than OpenBLAS")
     before = threads()
@@ -302,7 +335,9 @@ def test_one_worker_is_the_process_itself_with_one_thread_of_linear_algebra(monk
         set_threads(before)
 
 
-@pytest.mark.parametrize("place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"])
+@pytest.mark.parametrize(
+    "place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"]
+)
 @pytest.mark.slow
 def test_results_do_not_depend_on_the_executor(folder: Path, place):
     run(folder, "alone")
@@ -323,7 +358,11 @@ def test_a_run_is_what_simulate_gives(folder: Path):
     result = run(folder)
     scenario = result.study.scenario(5)
     alone = simulate(
-        scenario.plant, scenario.problem.input, duration=0.5, initial_state=scenario.initial_state, output_times=0.005
+        scenario.plant,
+        scenario.problem.input,
+        duration=0.5,
+        initial_state=scenario.initial_state,
+        output_times=0.005,
     )
     assert result["pressure"][5] == pytest.approx(alone["pressure"][-1], rel=1e-12)
     assert result["course"][5] == pytest.approx(alone["force"][::10], rel=1e-9)
@@ -334,7 +373,9 @@ def test_a_run_is_what_simulate_gives(folder: Path):
 def test_initial_states_computed_together_equal_those_computed_individually(folder: Path):
     study = load_study(folder / "study.toml")
     states = study.template.initial_states(*study.varying(range(22)))
-    assert [state == study.scenario(run).initial_state for run, state in enumerate(states)] == [True] * 22
+    assert [state == study.scenario(run).initial_state for run, state in enumerate(states)] == [
+        True
+    ] * 22
     assert study.scenario(3, states[3]).initial_state == states[3]
     assert len({state["air_mass"] for state in states}) == 22
 
@@ -368,7 +409,9 @@ def computed_anew(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The chunks that another execution of the study computes."""
     found = []
     original = chunk.compute_chunk
-    monkeypatch.setattr(chunk, "compute_chunk", lambda study, index: found.append(index) or original(study, index))
+    monkeypatch.setattr(
+        chunk, "compute_chunk", lambda study, index: found.append(index) or original(study, index)
+    )
     run(folder)
     monkeypatch.undo()
     return found
@@ -389,14 +432,18 @@ EVERYTHING = list(range(6))
         ('radius = "10 mm"', 'radius = "10.1 mm"', "muscle.toml", EVERYTHING),
     ],
 )
-def test_a_chunk_is_computed_again_if_something_it_depends_on_changes(folder, monkeypatch, old, new, file, expected):
+def test_a_chunk_is_computed_again_if_something_it_depends_on_changes(
+    folder, monkeypatch, old, new, file, expected
+):
     run(folder)
     assert computed_anew(folder, monkeypatch) == []
     edited(folder, old, new, file)
     assert computed_anew(folder, monkeypatch) == expected
 
 
-def test_another_program_version_computes_all_chunks_again(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_another_program_version_computes_all_chunks_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
     run(folder)
     monkeypatch.setattr(tree.metadata, "version", lambda name: "another")
     tree.program_fingerprint.cache_clear()
@@ -416,7 +463,13 @@ def test_a_damaged_chunk_is_computed_again(folder: Path, monkeypatch: pytest.Mon
         without_reasons = buffer.getvalue()
     method = whole.index(b"PK\1\2") + 10
     of_another_method = whole[:method] + b"c" + whole[method + 1 :]
-    for damaged in (whole[:-40], b"", whole[:200] + bytes(8) + whole[208:], without_reasons, of_another_method):
+    for damaged in (
+        whole[:-40],
+        b"",
+        whole[:200] + bytes(8) + whole[208:],
+        without_reasons,
+        of_another_method,
+    ):
         file.write_bytes(damaged)
         assert computed_anew(folder, monkeypatch) == [2]
         assert file.read_bytes() == whole
@@ -435,8 +488,15 @@ def test_a_chunk_is_written_atomically(folder: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: Path):
-    """In equilibrium, or at a fixed position of equal value: the same nominal scenario, but not the same varied runs."""
-    edited(folder, 'model = "Isometric"\ncontraction = 0.05', 'model = "HangingMass"\nmass = "5 kg"', "scenario.toml")
+    """In equilibrium, or at a fixed position of equal value: the same nominal scenario, but not the
+    same varied runs.
+    """
+    edited(
+        folder,
+        'model = "Isometric"\ncontraction = 0.05',
+        'model = "HangingMass"\nmass = "5 kg"',
+        "scenario.toml",
+    )
     edited(
         folder,
         '"mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }',
@@ -444,15 +504,24 @@ def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: P
     )
     at_rest = load_study(folder / "study.toml")
     place = at_rest.template.scenario.initial_state["position"]
-    edited(folder, 'pressure = "0.5 bar"', f'pressure = "0.5 bar", position = {place!r}', "scenario.toml")
+    edited(
+        folder,
+        'pressure = "0.5 bar"',
+        f'pressure = "0.5 bar", position = {place!r}',
+        "scenario.toml",
+    )
     held = load_study(folder / "study.toml")
-    assert held.template.scenario.initial_state == pytest.approx(at_rest.template.scenario.initial_state)
+    assert held.template.scenario.initial_state == pytest.approx(
+        at_rest.template.scenario.initial_state
+    )
     assert held.scenario(0).initial_state != pytest.approx(at_rest.scenario(0).initial_state)
     assert held.fingerprint() != at_rest.fingerprint()
 
 
 def test_the_fingerprint_of_a_model_depends_on_its_file_only_outside_the_program():
-    """A moved file of the program changes no exported model; models of a user with one name are different models."""
+    """A moved file of the program changes no exported model; models of a user with one name are
+    different models.
+    """
 
     def made(module: str) -> str:
         kind = dataclasses.make_dataclass("Law", ["gain"])
@@ -463,13 +532,21 @@ def test_the_fingerprint_of_a_model_depends_on_its_file_only_outside_the_program
     assert made("laws.old") != made("laws.moved")
 
 
-def test_a_failure_reason_does_not_depend_on_the_path_of_the_study(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    """A worker reads the study by its absolute path, and failure reasons are part of the results."""
+def test_a_failure_reason_does_not_depend_on_the_path_of_the_study(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A worker reads the study by its absolute path, and failure reasons are part of the
+    results.
+    """
     edited(folder, "[design]", '"run.duration" = ["0 s"]\n[design]')
     monkeypatch.chdir(folder)
-    here, elsewhere = (chunk.compute_chunk(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
+    here, elsewhere = (
+        chunk.compute_chunk(load_study(path), 0) for path in ("study.toml", folder / "study.toml")
+    )
     assert list(here["failure_reasons"]) == list(elsewhere["failure_reasons"])
-    assert here["failure_reasons"][0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
+    assert here["failure_reasons"][0].startswith(
+        "scenario.toml, [run], duration is 0.0; it must be greater than zero"
+    )
 
 
 def test_a_worker_ignores_sigint():
@@ -510,7 +587,9 @@ def test_a_failed_run_is_recorded_with_its_reason_and_stops_no_other(folder: Pat
     assert np.isfinite(result.scalars[~opened, 0]).all()
     rows = list(csv.DictReader((folder / "out" / "results.csv").open(encoding="utf-8")))
     assert [row["status"] for row in rows] == ["failed" if o else "done" for o in opened]
-    assert all("the input 'fill' is 2" in row["reason"] for row, o in zip(rows, opened, strict=True) if o)
+    assert all(
+        "the input 'fill' is 2" in row["reason"] for row, o in zip(rows, opened, strict=True) if o
+    )
     assert all(row["pressure [Pa]"] == "" for row, o in zip(rows, opened, strict=True) if o)
 
 
@@ -522,7 +601,9 @@ def test_a_value_outside_its_bounds_fails_only_its_own_run(folder: Path):
     assert "allowed range: 0 to 1e-05" in result.failure_reasons[result.failed[0]]
 
 
-def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_an_unexpected_exception_fails_only_its_own_run(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+):
     calls = []
 
     def failing(*given, **named):
@@ -564,7 +645,11 @@ def test_parameters_of_command_and_run_may_vary(folder: Path):
 
 
 def test_a_parameter_follows_another(folder: Path):
-    edited(folder, "[design]", '[follow]\n"circuit.discharge.conductance" = "circuit.fill.conductance"\n[design]')
+    edited(
+        folder,
+        "[design]",
+        '[follow]\n"circuit.discharge.conductance" = "circuit.fill.conductance"\n[design]',
+    )
     circuit = load_study(folder / "study.toml").scenario(7).plant.circuit
     assert circuit.discharge.conductance == circuit.fill.conductance != 3e-9
 
@@ -586,7 +671,10 @@ def test_the_example_runs(tmp_path: Path):
         shutil.copy(ROOT / "examples" / name, tmp_path)
     study = load_study(tmp_path / "valve_study.toml")
     assert len(study) == 384
-    assert study.template.scenario.plant == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
+    assert (
+        study.template.scenario.plant
+        == load_scenario(ROOT / "examples" / "fill_discharge.toml").plant
+    )
     (tmp_path / "valve_study.toml").rename(tmp_path / "study.toml")
     edited(tmp_path, "count = 64", "count = 2")
     result = run(tmp_path)
@@ -613,9 +701,14 @@ def test_the_table_has_one_row_per_run_with_units(folder: Path):
     result = run(folder)
     rows = list(csv.DictReader((folder / "out" / "results.csv").open(encoding="utf-8")))
     assert list(rows[0]) == [
-        "run", "circuit.fill.conductance [m3/(s Pa)]", "mechanism.contraction [1]", "pressure [Pa]", "reached [s]",
-        "status", "reason",
-    ]  # fmt: skip
+        "run",
+        "circuit.fill.conductance [m3/(s Pa)]",
+        "mechanism.contraction [1]",
+        "pressure [Pa]",
+        "reached [s]",
+        "status",
+        "reason",
+    ]
     assert [float(row["pressure [Pa]"]) for row in rows] == result["pressure"].tolist()
     write_study(result, folder / "out")
     kept = np.load(folder / "out" / "time_series.npz")
@@ -626,7 +719,8 @@ def test_the_table_has_one_row_per_run_with_units(folder: Path):
 def test_an_unknown_metric_is_an_error_with_the_nearest_name(folder: Path):
     result = run(folder)
     with pytest.raises(
-        ColumnError, match=r"no metric 'presure'; the metrics are pressure, reached, course.* 'pressure'"
+        ColumnError,
+        match=r"no metric 'presure'; the metrics are pressure, reached, course.* 'pressure'",
     ):
         result["presure"]
 
@@ -637,8 +731,12 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
     chapter = result.chapter()
     assert [t.name for t in chapter.tables] == ["statistics", "sensitivities", "varied"]
     assert [p.name for p in chapter.plots] == [
-        "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "time-series-course",
-    ]  # fmt: skip
+        "histograms",
+        "scatter-pressure",
+        "scatter-reached",
+        "sensitivities",
+        "time-series-course",
+    ]
     (scatter,) = chapter.plots[1].draw().axes[0].lines
     assert scatter.get_markersize() >= 5.0, "few points are drawn large"
     assert all(tick == round(tick) for tick in chapter.plots[0].draw().axes[0].get_yticks())
@@ -665,7 +763,11 @@ def test_the_command_names_its_report_last(folder: Path):
 # Invalid studies
 
 BAD = [
-    ("circuit.fill.conductance", "circuit.fil.conductance", "Did you mean 'circuit.fill.conductance'?"),
+    (
+        "circuit.fill.conductance",
+        "circuit.fil.conductance",
+        "Did you mean 'circuit.fill.conductance'?",
+    ),
     ("mechanism.contraction", "run.stop", "the scenario has no parameter 'run.stop'"),
     ('low = "2 %"', "low = nan", "it must be finite"),
     ('low = "2 %"', "low = -inf", "it must be finite"),
@@ -673,17 +775,59 @@ BAD = [
     ('low = "2 %"', 'low = "20 %"', "low is 0.2 and high is 0.1; low must be below high"),
     ('low = "2 %"', 'low = "-95 %"', "allowed range: "),
     ('low = "2 %", ', "", "Uniform needs 'low' (lower bound)"),
-    ('low = "2 %"', 'lo = "2 %"', "Uniform has no parameter 'lo'; its parameters are low, high. Did you mean 'low'?"),
+    (
+        'low = "2 %"',
+        'lo = "2 %"',
+        "Uniform has no parameter 'lo'; its parameters are low, high. Did you mean 'low'?",
+    ),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[]", "the list is empty"),
     ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, nan]", "it must be finite"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "0.02", "write a list of values, or a distribution"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', "[0.02, 0.99]", "includes 0.99; allowed range: "),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Range", low = 0.0, high = 0.1, count = 0 }', "2 to 1000000 values"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, std = 0.001 }, low = 0.1, high = 0.2 }', "it must be at least 1e-06"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }', "no model 'Truncated'; there are Uniform, Normal, LogNormal, Triangular."),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "Triangular", low = 0.0, mode = 0.3, high = 0.2 }', "mode is 0.3; allowed range: 0 to 0.2"),
-    ('{ model = "Uniform", low = "2 %", high = "10 %" }', '{ model = "LogNormal", median = 0.0, log_std = 0.1 }', "median is 0; it must be positive"),
-    ('model = "Uniform"', 'model = "Unifrom"', "no model 'Unifrom'; there are Range, Uniform, Normal, LogNormal, Triangular, Truncated. Did you mean 'Uniform'?"),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        "0.02",
+        "write a list of values, or a distribution",
+    ),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        "[0.02, 0.99]",
+        "includes 0.99; allowed range: ",
+    ),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        '{ model = "Range", low = 0.0, high = 0.1, count = 0 }',
+        "2 to 1000000 values",
+    ),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        (
+            '{ model = "Truncated", inner = { model = "Normal", mean = 0.05, std = 0.001 }, low ='
+            " 0.1, high = 0.2 }"
+        ),
+        "it must be at least 1e-06",
+    ),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        '{ model = "Truncated", inner = { model = "Truncated" }, low = 0.1, high = 0.2 }',
+        "no model 'Truncated'; there are Uniform, Normal, LogNormal, Triangular.",
+    ),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        '{ model = "Triangular", low = 0.0, mode = 0.3, high = 0.2 }',
+        "mode is 0.3; allowed range: 0 to 0.2",
+    ),
+    (
+        '{ model = "Uniform", low = "2 %", high = "10 %" }',
+        '{ model = "LogNormal", median = 0.0, log_std = 0.1 }',
+        "median is 0; it must be positive",
+    ),
+    (
+        'model = "Uniform"',
+        'model = "Unifrom"',
+        (
+            "no model 'Unifrom'; there are Range, Uniform, Normal, LogNormal, Triangular,"
+            " Truncated. Did you mean 'Uniform'?"
+        ),
+    ),
     ('std = "0.2e-9 m3/(s Pa)"', "std = 0", "std is 0; it must be positive"),
     ('std = "0.2e-9 m3/(s Pa)"', 'std = "1 kg"', "cannot be converted to 'm3/(s Pa)'"),
     ("count = 22", "count = 0", "count is 0; it must be at least 1"),
@@ -693,17 +837,48 @@ BAD = [
     ("count = 22", "count = 100_000_000", "the maximum is 10000000"),
     ("count = 22\n", "", "MonteCarlo needs 'count'"),
     ("seed = 3", "seed = -3", "must be a non-negative integer"),
-    ('model = "MonteCarlo"', 'model = "Sobol"', "count is 22; Sobol points are balanced only if their number is a power of two. Use 16 or 32."),
+    (
+        'model = "MonteCarlo"',
+        'model = "Sobol"',
+        (
+            "count is 22; Sobol points are balanced only if their number is a power of two. Use 16"
+            " or 32."
+        ),
+    ),
     ('model = "MonteCarlo"', 'model = "Saltelli"', "Use 16 or 32."),
-    ('model = "MonteCarlo"\ncount = 22\nseed = 3', 'model = "Grid"', "has no levels; give a list or a Range"),
-    ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random'; there are Grid, LatinHypercube"),
-    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", '[design] is missing; it must contain an entry, such as model = "Grid".'),
+    (
+        'model = "MonteCarlo"\ncount = 22\nseed = 3',
+        'model = "Grid"',
+        "has no levels; give a list or a Range",
+    ),
+    (
+        'model = "MonteCarlo"',
+        'model = "Random"',
+        "no model 'Random'; there are Grid, LatinHypercube",
+    ),
+    (
+        '[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3',
+        "",
+        '[design] is missing; it must contain an entry, such as model = "Grid".',
+    ),
     ('"2 bar"', '"2 mm"', "cannot be converted to 'Pa'"),
     ('"2 bar"', "inf", "it must be finite"),
-    ('model = "Final", column = "pressure"', 'model = "Final", column = "presure"', "a run has no column 'presure'"),
-    ('model = "Final", column = "pressure"', 'model = "Last", column = "pressure"', "no model 'Last'; there are Final, Maximum"),
+    (
+        'model = "Final", column = "pressure"',
+        'model = "Final", column = "presure"',
+        "a run has no column 'presure'",
+    ),
+    (
+        'model = "Final", column = "pressure"',
+        'model = "Last", column = "pressure"',
+        "no model 'Last'; there are Final, Maximum",
+    ),
     ('begin = "0.1 s"', 'begin = "0.1 s", end = "0.1 s"', "its end must be later than its begin"),
-    ('begin = "0.1 s"', 'begin = "-9 s", end = "-8 s"', "the window -9 to -8 s does not overlap the run, 0 to"),
+    (
+        'begin = "0.1 s"',
+        'begin = "-9 s", end = "-8 s"',
+        "the window -9 to -8 s does not overlap the run, 0 to",
+    ),
     ('begin = "0.1 s"', 'begin = "9 s"', "does not overlap the run"),
     ('sample_time = "0.05 s"', 'sample_time = "0 s"', "it must be positive and finite"),
     ('sample_time = "0.05 s"', 'sample_time = "1 ns"', "2 to 1000000 samples"),
@@ -713,10 +888,22 @@ BAD = [
     ('scenario = "scenario.toml"', "scenario = 5", "name a file"),
     ('scenario = "scenario.toml"', "", "scenario is None; name a file"),
     ("title", "titel", "unknown key 'titel'"),
-    ("[design]", '[follow]\n"circuit.discharge.conductance" = "mechanism.contraction"\n[design]', "cannot follow"),
-    ("[design]", '[follow]\n"circuit.discharge.conductance" = "mechanism.contract"\n[design]', "is not under [vary]. Did you mean 'mechanism.contraction'?"),
-    ("[design]", '[follow]\n"mechanism.contraction" = "mechanism.contraction"\n[design]', "is also under [vary]"),
-]  # fmt: skip
+    (
+        "[design]",
+        '[follow]\n"circuit.discharge.conductance" = "mechanism.contraction"\n[design]',
+        "cannot follow",
+    ),
+    (
+        "[design]",
+        '[follow]\n"circuit.discharge.conductance" = "mechanism.contract"\n[design]',
+        "is not under [vary]. Did you mean 'mechanism.contraction'?",
+    ),
+    (
+        "[design]",
+        '[follow]\n"mechanism.contraction" = "mechanism.contraction"\n[design]',
+        "is also under [vary]",
+    ),
+]
 
 
 @pytest.mark.parametrize(("old", "new", "message"), BAD)
@@ -763,5 +950,8 @@ def test_a_cluster_that_does_not_respond_is_rejected(monkeypatch: pytest.MonkeyP
 
 def test_without_dask_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install airmuscle\[cluster\]"), dask_cluster("tcp://127.0.0.1:8786"):
+    with (
+        pytest.raises(InputError, match=r"pip install airmuscle\[cluster\]"),
+        dask_cluster("tcp://127.0.0.1:8786"),
+    ):
         pass

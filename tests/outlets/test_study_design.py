@@ -1,8 +1,9 @@
 """Designs of experiments and distributions have their defining properties.
 
-The quantiles of a distribution are monotonic and within its support. A grid contains each combination once, a Latin
-hypercube each equiprobable interval once; a larger Monte Carlo or Sobol design begins with the points of the smaller one;
-Saltelli's design exchanges one parameter at a time. Equal seeds give equal points.
+The quantiles of a distribution are monotonic and within its support. A grid contains each
+combination once, a Latin hypercube each equiprobable interval once; a larger Monte Carlo or Sobol
+design begins with the points of the smaller one; Saltelli's design exchanges one parameter at a
+time. Equal seeds give equal points.
 """
 
 from __future__ import annotations
@@ -41,7 +42,8 @@ widths = st.floats(1e-3, 1e6)
 
 @st.composite
 def distributions(draw) -> Variation:
-    low, width = draw(numbers), draw(widths)
+    low = draw(numbers)
+    width = draw(widths)
     inner = draw(
         st.sampled_from(
             [
@@ -80,13 +82,17 @@ def test_a_truncated_distribution_keeps_the_shape_of_its_middle(variation):
         (Uniform(-2.0, 7.3), stats.uniform(-2.0, 9.3)),
         (Normal(3.0, 0.7), stats.norm(3.0, 0.7)),
         (LogNormal(2.1, 0.25), stats.lognorm(0.25, scale=2.1)),
-        *((Triangular(1.0, 1.0 + 5.1 * c, 6.1), stats.triang(5.1 * c / 5.1, 1.0, 5.1)) for c in (0.0, 0.5, 1.0)),
+        *(
+            (Triangular(1.0, 1.0 + 5.1 * c, 6.1), stats.triang(5.1 * c / 5.1, 1.0, 5.1))
+            for c in (0.0, 0.5, 1.0)
+        ),
     ],
     ids=["uniform", "normal", "log-normal", "falling", "triangular", "rising"],
 )
 def test_distributions_are_those_of_scipy(variation, scipy):
     """Also at their ends and beyond, without a warning."""
-    probabilities, values = np.linspace(0.0, 1.0, 99), np.linspace(-12.0, 12.0, 99)
+    probabilities = np.linspace(0.0, 1.0, 99)
+    values = np.linspace(-12.0, 12.0, 99)
     np.testing.assert_allclose(variation.ppf(probabilities), scipy.ppf(probabilities), rtol=4e-16)
     np.testing.assert_allclose(variation.cdf(values), scipy.cdf(values), rtol=4e-16)
     assert variation.support == scipy.support()
@@ -100,9 +106,17 @@ EVEN = (np.arange(100_000) + 0.5) / 100_000
     [
         (Uniform(2.0, 8.0), 5.0, 6 / 12**0.5),
         (Normal(3.0, 0.5), 3.0, 0.5),
-        (LogNormal(2.0, 0.25), 2.0 * np.exp(0.25**2 / 2), 2.0 * np.exp(0.25**2 / 2) * np.sqrt(np.expm1(0.25**2))),
+        (
+            LogNormal(2.0, 0.25),
+            2.0 * np.exp(0.25**2 / 2),
+            2.0 * np.exp(0.25**2 / 2) * np.sqrt(np.expm1(0.25**2)),
+        ),
         (Triangular(1.0, 2.0, 6.0), 3.0, np.sqrt((1 + 4 + 36 - 2 - 6 - 12) / 18)),
-        (Truncated(Normal(0.0, 1.0), -1.0, 1.0), 0.0, 0.5395599),  # sqrt(1 - 2 phi(1) / (Phi(1) - Phi(-1)))
+        (
+            Truncated(Normal(0.0, 1.0), -1.0, 1.0),
+            0.0,
+            0.5395599,
+        ),  # sqrt(1 - 2 phi(1) / (Phi(1) - Phi(-1)))
         (LevelSet((1.0, 2.0, 6.0)), 3.0, np.sqrt(14 / 3)),
     ],
 )
@@ -119,9 +133,15 @@ def test_values_have_units_and_standard_deviations_are_differences():
     assert found.std == pytest.approx(1e4)
     assert read_difference("5 degC", "K", "here") == pytest.approx(5.0)
     assert read_variation(["1 mm", 2e-3], "m", place) == LevelSet((0.001, 0.002))
-    assert read_variation({"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place).values == (
-        0.0, 0.25, 0.5, 0.75, 1.0,
-    )  # fmt: skip
+    assert read_variation(
+        {"model": "Range", "low": "0 kg", "high": "1 kg", "count": 5}, "kg", place
+    ).values == (
+        0.0,
+        0.25,
+        0.5,
+        0.75,
+        1.0,
+    )
 
 
 @settings(deadline=None)

@@ -1,7 +1,8 @@
 """Metrics of a curve, compared with closed forms.
 
-The references are straight lines (exact up to rounding) and the step response of a second-order system with damping
-ratio zeta (overshoot exp(-pi zeta / sqrt(1 - zeta^2)), Ogata, Modern Control Engineering, 5.3).
+The references are straight lines (exact up to rounding) and the step response of a second-order
+system with damping ratio zeta (overshoot exp(-pi zeta / sqrt(1 - zeta^2)), Ogata, Modern Control
+Engineering, 5.3).
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ def test_a_missing_metric_is_nan():
     assert math.isnan(Final("x", begin=2.5).value(TIME, RAMP))
     assert math.isnan(Overshoot("x").value(TIME, np.ones_like(TIME)))
     assert SettlingTime("x").value(TIME, np.ones_like(TIME)) == 0.0
-    assert math.isnan(SettlingTime("x").value(TIME, np.sin(np.pi * TIME) * (TIME < 2)))  # it comes back to its start
+    assert math.isnan(
+        SettlingTime("x").value(TIME, np.sin(np.pi * TIME) * (TIME < 2))
+    )  # it comes back to its start
 
 
 def test_a_falling_column_reaches_its_level_too():
@@ -72,9 +75,14 @@ def test_a_falling_column_reaches_its_level_too():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_column_that_crosses_its_band_between_two_rows_settles_where_the_straight_line_enters_it(sign):
-    """The line falls from 2 at 1 s to -1 at 4 s; half the band is 1.5, a tenth of the change from 15 to 0."""
-    time, values = np.array([0.0, 1.0, 4.0, 5.0]), sign * np.array([15.0, 2.0, -1.0, 0.0])
+def test_a_column_that_crosses_its_band_between_two_rows_settles_where_the_straight_line_enters_it(
+    sign,
+):
+    """The line falls from 2 at 1 s to -1 at 4 s; half the band is 1.5, a tenth of the change from
+    15 to 0.
+    """
+    time = np.array([0.0, 1.0, 4.0, 5.0])
+    values = sign * np.array([15.0, 2.0, -1.0, 0.0])
     assert SettlingTime("x", band=0.1).value(time, values) == pytest.approx(1.5, rel=1e-12)
 
 
@@ -99,7 +107,9 @@ def test_metrics_scale_and_shift_with_their_column(values, factor, shift):
     time = np.linspace(0.0, 1.0, 12)
     for metric in (Final("x"), Maximum("x"), Minimum("x"), Mean("x")):
         expected = factor * metric.value(time, values) + shift
-        assert metric.value(time, factor * values + shift) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+        assert metric.value(time, factor * values + shift) == pytest.approx(
+            expected, rel=1e-9, abs=1e-6
+        )
     low, mean, high = (o.value(time, values) for o in (Minimum("x"), Mean("x"), Maximum("x")))
     assert low - 1e-9 <= mean <= high + 1e-9
     assert abs(mean) - 1e-9 <= RootMeanSquare("x").value(time, values) <= max(-low, high) + 1e-9
@@ -124,9 +134,13 @@ def test_a_time_series_is_sampled_at_its_times():
 
 def test_units_follow_from_the_column():
     found: list[tuple[Metric, str]] = [
-        (Final("p"), "Pa"), (RootMeanSquare("p"), "Pa"), (TimeToReach("p", 1.0), "s"), (Overshoot("p"), "1"),
-        (SettlingTime("p"), "s"), (TimeSeries("p", 0.1), "Pa"),
-    ]  # fmt: skip
+        (Final("p"), "Pa"),
+        (RootMeanSquare("p"), "Pa"),
+        (TimeToReach("p", 1.0), "s"),
+        (Overshoot("p"), "1"),
+        (SettlingTime("p"), "s"),
+        (TimeSeries("p", 0.1), "Pa"),
+    ]
     for metric, unit in found:
         assert metric.unit("Pa") == unit
 

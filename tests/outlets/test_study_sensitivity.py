@@ -1,8 +1,9 @@
 """Sobol indices, compared with closed forms and with SciPy.
 
-For Ishigami's function sin x1 + a sin^2 x2 + b x3^4 sin x1 on (-pi, pi)^3 they are known in closed form (Ishigami, Homma
-1990; Saltelli, Chan, Scott, Sensitivity Analysis, 2000), for a linear model they are c_i^2 / sum c^2. The
-estimators agree with those of scipy.stats.sobol_indices up to rounding.
+For Ishigami's function sin x1 + a sin^2 x2 + b x3^4 sin x1 on (-pi, pi)^3 they are known in closed
+form (Ishigami, Homma 1990; Saltelli, Chan, Scott, Sensitivity Analysis, 2000), for a linear model
+they are c_i^2 / sum c^2. The estimators agree with those of scipy.stats.sobol_indices up to
+rounding.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from scipy import stats
 
 from airmuscle.design.study import Normal, Saltelli, Uniform, sobol_indices
 
-A, B = 7.0, 0.1
+A = 7.0
+B = 0.1
 CUBE = [Uniform(-np.pi, np.pi)] * 3
 
 
@@ -64,7 +66,9 @@ def test_the_estimators_agree_with_scipy():
     assert ours.total == pytest.approx(theirs.total_order, rel=1e-9)
     intervals = theirs.bootstrap(confidence_level=0.95, n_resamples=1000)
     assert np.ptp(ours.first_interval, axis=0) == pytest.approx(
-        intervals.first_order.confidence_interval.high - intervals.first_order.confidence_interval.low, rel=0.2
+        intervals.first_order.confidence_interval.high
+        - intervals.first_order.confidence_interval.low,
+        rel=0.2,
     )
 
 
@@ -82,7 +86,8 @@ def test_the_indices_agree_with_an_independent_estimate_by_scipy():
 def test_the_intervals_have_their_nominal_coverage():
     """With random base points, which satisfy the independence assumption of the bootstrap."""
     first, _ = of_ishigami()
-    generator, covered = np.random.default_rng(4), []
+    generator = np.random.default_rng(4)
+    covered = []
     for _ in range(60):
         a, b = generator.uniform(-np.pi, np.pi, (2, 300, 3))
         mixed = [np.where(np.arange(3) == i, b, a) for i in range(3)]
@@ -110,5 +115,9 @@ def test_a_constant_metric_has_no_indices(value):
 
 def test_equal_seeds_give_equal_intervals():
     y = ishigami(Saltelli(64, 1).values(CUBE))
-    assert np.array_equal(sobol_indices(y, 3, 1).first_interval, sobol_indices(y, 3, 1).first_interval)
-    assert not np.array_equal(sobol_indices(y, 3, 1).first_interval, sobol_indices(y, 3, 2).first_interval)
+    assert np.array_equal(
+        sobol_indices(y, 3, 1).first_interval, sobol_indices(y, 3, 1).first_interval
+    )
+    assert not np.array_equal(
+        sobol_indices(y, 3, 1).first_interval, sobol_indices(y, 3, 2).first_interval
+    )

@@ -1,4 +1,6 @@
-"""Numbers that are possible but that no muscle explains give a warning with the reason; plausible files give none."""
+"""Numbers that are possible but that no muscle explains give a warning with the reason; plausible
+files give none.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,12 @@ def columns(*, isometric: bool = False, pressure: float = 300.0) -> dict[str, np
     percent = np.full(200, 5.0) if isometric else 20.0 * UP_AND_DOWN
     force = np.maximum(MUSCLE.unclamped_force(1e3 * kilopascals, percent / 100), 0.0)
     noise = np.random.default_rng(1).standard_normal(200)
-    return {"time": SECONDS, "pressure": kilopascals, "contraction": percent, "force": force + noise}
+    return {
+        "time": SECONDS,
+        "pressure": kilopascals,
+        "contraction": percent,
+        "force": force + noise,
+    }
 
 
 def write(path: Path, values: dict[str, np.ndarray], head: str = HEAD) -> Path:
@@ -43,17 +50,39 @@ def warned(files: list[Path]) -> list[str]:
 @pytest.mark.parametrize(
     ("isometric", "changes", "head", "reason"),
     [
-        (True, {"pressure": lambda p: p + 101.325}, HEAD, "may be absolute: the unit is then 'kPa(a)'"),
+        (
+            True,
+            {"pressure": lambda p: p + 101.325},
+            HEAD,
+            "may be absolute: the unit is then 'kPa(a)'",
+        ),
         (False, {"force": lambda f: -f}, HEAD, "multiply the column by -1"),
         (True, {"force": lambda f: f - 150.0}, HEAD, "a muscle cannot push"),
         (False, {"contraction": lambda c: -c}, HEAD, "an elongation that muscles do not bear"),
-        (False, {"contraction": lambda c: c / 100}, HEAD, "If these numbers are ratios and not percent"),
-        (True, {"pressure": lambda p: p / 100}, HEAD, "The unit of force or pressure is probably wrong"),
+        (
+            False,
+            {"contraction": lambda c: c / 100},
+            HEAD,
+            "If these numbers are ratios and not percent",
+        ),
+        (
+            True,
+            {"pressure": lambda p: p / 100},
+            HEAD,
+            "The unit of force or pressure is probably wrong",
+        ),
         (False, {}, HEAD.replace("[N]", "[kN]"), "The unit of force or pressure is probably wrong"),
-        (True, {}, "time [s],force [N],contraction [%],pressure [kPa]", "columns of pressure and force are not"),
+        (
+            True,
+            {},
+            "time [s],force [N],contraction [%],pressure [kPa]",
+            "columns of pressure and force are not",
+        ),
     ],
 )
-def test_a_suspicious_file_gives_one_warning_with_the_reason(tmp_path, isometric, changes, head, reason):
+def test_a_suspicious_file_gives_one_warning_with_the_reason(
+    tmp_path, isometric, changes, head, reason
+):
     values = columns(isometric=isometric)
     for name, change in changes.items():
         values[name] = change(values[name])
@@ -84,21 +113,29 @@ def test_an_absolute_isobar_of_the_atmosphere_is_noticed_among_others(tmp_path):
 
 def test_the_absolute_pressures_of_a_fill_without_force_are_noticed(tmp_path):
     fill = {"time": SECONDS, "pressure": 101.3 + 500.0 * (1.0 - np.exp(-SECONDS))}
-    assert "may be absolute" in warned([write(tmp_path / "fill.csv", fill, "time [s],pressure [kPa]")])[0]
+    assert (
+        "may be absolute"
+        in warned([write(tmp_path / "fill.csv", fill, "time [s],pressure [kPa]")])[0]
+    )
 
 
 def test_equal_columns_are_read_once_and_two_tables_side_by_side_are_refused(tmp_path):
-    one, other = columns(), columns(pressure=400.0)
+    one = columns()
+    other = columns(pressure=400.0)
     double = {**one, "clock": one["time"]}
     (recording,) = read(write(tmp_path / "double.csv", double, f"{HEAD},time [s]"))
     assert any("read once: 'time [s]'" in note for note in recording.notes)
     both = {**one, **{f"{name} of the other": values for name, values in other.items()}}
-    with pytest.raises(ColumnError, match=r"2 quantities are in several columns .*two tables side by side"):
+    with pytest.raises(
+        ColumnError, match=r"2 quantities are in several columns .*two tables side by side"
+    ):
         read(write(tmp_path / "both.csv", both, f"{HEAD},{HEAD}"))
 
 
 def test_a_displacement_is_not_taken_for_a_contraction_but_explained(tmp_path):
-    (recording,) = read(write(tmp_path / "run.csv", columns(), HEAD.replace("contraction [%]", "displacement [mm]")))
+    (recording,) = read(
+        write(tmp_path / "run.csv", columns(), HEAD.replace("contraction [%]", "displacement [mm]"))
+    )
     with pytest.raises(ColumnError, match="A displacement has no stated zero and direction"):
         recording["contraction"]
 
@@ -115,5 +152,8 @@ def test_a_length_and_a_contraction_that_contradict_each_other_give_a_warning(tm
     assert warned([write(tmp_path / "run.csv", values, head)]) == []
     values["length"] = np.full(200, 300.0)
     (text,) = warned([write(tmp_path / "run.csv", values, head)])
-    assert "run.csv: with the resting length of 300 mm, the length of 300 mm is a contraction of 0 %" in text
+    assert (
+        "run.csv: with the resting length of 300 mm, the length of 300 mm is a contraction of 0 %"
+        in text
+    )
     assert "the file states 19.9 %, which is used. Check the resting length" in text

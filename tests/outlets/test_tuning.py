@@ -1,7 +1,9 @@
-"""`study.tune` finds the gains that minimise the objective over all cases, within its budget and reproducibly.
+"""`study.tune` finds the gains that minimise the objective over all cases, within its budget and
+reproducibly.
 
-The optimum is known where a regulator follows a scaled set point: the scale is 1. A set of gains that fails in a case is
-worse than all that do not, an interruption keeps the best so far, and metrics are those of the single run.
+The optimum is known where a regulator follows a scaled set point: the scale is 1. A set of gains
+that fails in a case is worse than all that do not, an interruption keeps the best so far, and
+metrics are those of the single run.
 """
 
 from __future__ import annotations
@@ -58,7 +60,9 @@ BOUNDS = {"gain": (1e-6, 1e-4), "integral_time": (0.05, 5.0)}
 
 @model
 class ScaledSetpoint(ControlLaw):
-    """The set point times a scale is the command of a regulator; above a limit the command is not a number."""
+    """The set point times a scale is the command of a regulator; above a limit the command is not a
+    number.
+    """
 
     from_file: ClassVar[bool] = False
 
@@ -70,10 +74,14 @@ class ScaledSetpoint(ControlLaw):
 
     def step(self, memory, measurement, dt):
         root = ops.sqrt(self.limit - self.scale)
-        return {"setpoint": self.scale * measurement.setpoints["pressure"] * root / (root + 1e-12)}, {}
+        return {
+            "setpoint": self.scale * measurement.setpoints["pressure"] * root / (root + 1e-12)
+        }, {}
 
 
-REGULATOR = ProportionalRegulator(Supply(6e5), Valve(2e-7, 0.3), Valve(2e-7, 0.3), SecondOrderLag(50.0, 0.8), 1e3)
+REGULATOR = ProportionalRegulator(
+    Supply(6e5), Valve(2e-7, 0.3), Valve(2e-7, 0.3), SecondOrderLag(50.0, 0.8), 1e3
+)
 REGULATED = Plant(chosen_muscle(), REGULATOR, Isometric(0.05))
 
 
@@ -101,7 +109,9 @@ def test_the_known_optimum_is_found():
 
 
 def test_the_same_seed_gives_the_same_search_and_another_seed_another_one():
-    first, second, other = small(), small(), small(seed=4)
+    first = small()
+    second = small()
+    other = small(seed=4)
     np.testing.assert_array_equal(first.history.gains, second.history.gains)
     np.testing.assert_array_equal(first.history.objective, second.history.objective)
     assert not np.array_equal(first.history.gains, other.history.gains)
@@ -110,7 +120,12 @@ def test_the_same_seed_gives_the_same_search_and_another_seed_another_one():
 def test_the_budget_is_an_upper_bound_and_progress_counts_loops():
     seen = []
     tuning = small(budget=90, progress=lambda done, total: seen.append((done, total)))
-    assert seen == [(32, 90), (48, 90), (64, 90), (80, 90)], "a first generation of 16 sets, then 8 sets each"
+    assert seen == [
+        (32, 90),
+        (48, 90),
+        (64, 90),
+        (80, 90),
+    ], "a first generation of 16 sets, then 8 sets each"
     assert tuning.simulated_loops == 80 == 2 * len(tuning.history)
     assert not tuning.interrupted
     assert not tuning.converged
@@ -126,7 +141,8 @@ def test_a_search_ends_where_two_descents_agree():
 def test_the_evolution_strategy_finds_the_minimum_of_a_rotated_narrow_valley():
     """A condition of 1e4, and an optimum on the surface of the cube."""
     rotation, _ = np.linalg.qr(np.random.default_rng(2).standard_normal((4, 4)))
-    optimum, scales = np.array([0.3, 0.6, 0.5, 0.4]), np.array([1.0, 4.6, 21.5, 100.0])
+    optimum = np.array([0.3, 0.6, 0.5, 0.4])
+    scales = np.array([1.0, 4.6, 21.5, 100.0])
     strategy = EvolutionStrategy(np.full(4, 0.9), np.random.default_rng(1))
     for _ in range(150):
         points = strategy.ask()
@@ -154,7 +170,8 @@ def test_the_result_is_never_worse_than_the_present_gains_or_a_start():
 
 
 def test_gains_are_written_with_five_digits_within_their_bounds():
-    low, high = 1.23456789e-6, 9.87654321e-5
+    low = 1.23456789e-6
+    high = 9.87654321e-5
     gains = tune([NOMINAL], {"gain": (low, high)}, duration=0.1, budget=32).history.gains[1:, 0]
     assert ((gains >= low) & (gains <= high)).all()
     inner = gains[(gains > low) & (gains < high)]
@@ -174,16 +191,27 @@ def test_gains_that_fail_are_worse_than_all_others():
 
 
 def test_gains_that_all_fail_are_an_error_with_the_reason():
-    with pytest.raises(SimulationError, match=r"each of 8 sets of gains fails .* a command that is not finite"):
+    with pytest.raises(
+        SimulationError, match=r"each of 8 sets of gains fails .* a command that is not finite"
+    ):
         tune([regulated(3.0, limit=2.0)], {"scale": (2.5, 8.0)}, duration=0.1, budget=8)
 
 
 def test_an_unstable_range_is_avoided():
-    """With a dead time of eight samples a large gain oscillates between both valves; the tuned gain does not."""
+    """With a dead time of eight samples a large gain oscillates between both valves; the tuned gain
+    does not.
+    """
     law = WithSensors(PRESSURE, (ColumnSensor("pressure", delay=8),))
     case = LoopCase("delay", LIFT, dataclasses.replace(LOOP, controller=law), START, "law")
-    tuning = tune([case], {"gain": (1e-6, 1e-3)}, duration=1.0, budget=64, index=RootMeanSquareError(begin=0.5))
-    gains, index = tuning.history.gains[:, 0], tuning.history.means("index")
+    tuning = tune(
+        [case],
+        {"gain": (1e-6, 1e-3)},
+        duration=1.0,
+        budget=64,
+        index=RootMeanSquareError(begin=0.5),
+    )
+    gains = tuning.history.gains[:, 0]
+    index = tuning.history.means("index")
     assert index[gains.argmax()] > 5 * index[tuning.best]
     assert tuning.gains["gain"] < 0.3 * gains.max()
 
@@ -193,7 +221,8 @@ def test_an_interruption_keeps_the_best_so_far():
         if done >= 32:
             raise KeyboardInterrupt
 
-    tuning, complete = small(progress=stop), small()
+    tuning = small(progress=stop)
+    complete = small()
     assert tuning.interrupted
     np.testing.assert_array_equal(tuning.history.objective, complete.history.objective[:16])
     assert tuning.objective == complete.history.objective[:16].min()
@@ -212,14 +241,20 @@ def test_metrics_are_those_of_the_single_run():
     tuning = small(budget=16)
     gains = dict(zip(tuning.history.paths, tuning.history.gains[5].tolist(), strict=True))
     loop = dataclasses.replace(LOOP, controller=dataclasses.replace(PRESSURE, **gains))
-    run = am.simulate(HEAVY.plant, loop, duration=0.3, initial_state=HEAVY.initial_state, output_times=0.01)
+    run = am.simulate(
+        HEAVY.plant, loop, duration=0.3, initial_state=HEAVY.initial_state, output_times=0.01
+    )
     time, first = np.unique(run["time"], return_index=True)
     error = (run["setpoint.pressure"] - run["pressure"])[first]
     metrics = tuning.history.metrics
-    assert metrics.index[5, 1] == pytest.approx(np.sqrt(np.trapezoid(error**2, time) / 0.3), rel=1e-9)
+    assert metrics.index[5, 1] == pytest.approx(
+        np.sqrt(np.trapezoid(error**2, time) / 0.3), rel=1e-9
+    )
     grown = np.diff(run["air_mass"][first])
     assert metrics.air[5, 1] == pytest.approx(grown[grown > 0].sum() / 0.3, rel=1e-9)
-    travel = sum(np.abs(np.diff(run[f"command.{name}"][first])).sum() for name in ("fill", "discharge"))
+    travel = sum(
+        np.abs(np.diff(run[f"command.{name}"][first])).sum() for name in ("fill", "discharge")
+    )
     assert metrics.travel[5, 1] == pytest.approx(travel / 0.3)
 
 
@@ -232,7 +267,9 @@ def test_the_travel_of_a_set_point_is_counted_in_its_range():
 
 
 def test_cases_of_several_kinds_share_one_controller():
-    leaking = perturbed_family(LIFT, LOOP, Perturbations((), (), 0.02, 0, 0), initial_state=lambda plant: START)
+    leaking = perturbed_family(
+        LIFT, LOOP, Perturbations((), (), 0.02, 0, 0), initial_state=lambda plant: START
+    )
     law = WithSensors(PRESSURE, (ColumnSensor("pressure", delay=1),))
     delayed = LoopCase("delay", LIFT, dataclasses.replace(LOOP, controller=law), START, "law")
     family = [NOMINAL, leaking.cases[1], HEAVY, delayed]
@@ -258,31 +295,60 @@ def test_the_family_is_the_nominal_plant_and_one_case_for_each_perturbation():
     by_name = {case.name: case.plant for case in family.cases}
     assert by_name["nominal"] is LIFT
     assert by_name["load x 2"].mechanism.mass == 2 * LIFT.mechanism.mass
-    assert by_name["supply x 0.8"].circuit.supply.pressure == pytest.approx(0.8 * LIFT.circuit.supply.pressure)
-    assert by_name["leak"].circuit.leak.conductance == pytest.approx(0.01 * LIFT.circuit.fill.conductance)
+    assert by_name["supply x 0.8"].circuit.supply.pressure == pytest.approx(
+        0.8 * LIFT.circuit.supply.pressure
+    )
+    assert by_name["leak"].circuit.leak.conductance == pytest.approx(
+        0.01 * LIFT.circuit.fill.conductance
+    )
     assert family.cases[-1].controller == PRESSURE
-    joint = perturbed_family(JOINT, dataclasses.replace(LOOP, controller=PID("angle", "left.fill", gain=1.0), setpoint=Schedule({"angle": ((0, 0.0),)})), Perturbations(draws=0, delay=0))  # fmt: skip
+    joint = perturbed_family(
+        JOINT,
+        dataclasses.replace(
+            LOOP,
+            controller=PID("angle", "left.fill", gain=1.0),
+            setpoint=Schedule({"angle": ((0, 0.0),)}),
+        ),
+        Perturbations(draws=0, delay=0),
+    )
     heavy = joint.cases[2].plant.mechanism
-    assert (heavy.inertia, heavy.weight_torque) == (2 * JOINT.mechanism.inertia, 2 * JOINT.mechanism.weight_torque)
+    assert (heavy.inertia, heavy.weight_torque) == (
+        2 * JOINT.mechanism.inertia,
+        2 * JOINT.mechanism.weight_torque,
+    )
     assert joint.cases[2].plant.muscles == MUSCLES
 
 
 def test_the_load_of_an_arm_without_masses_is_its_inertia():
-    """An identified joint has all its inertia about its axis: cases with another load were copies of the nominal one."""
+    """An identified joint has all its inertia about its axis: cases with another load were copies
+    of the nominal one.
+    """
     routes = (MuscleRoute((1,), (0.03,)), MuscleRoute((1,), (-0.03,)))
-    arm = dataclasses.replace(JOINT, mechanism=SerialArm((SpatialLink((0, 0, 1), rotor_inertia=0.1),), routes))
-    loop = ControlLoop(PID("joint1.angle", "left.fill", gain=1.0), 0.01, Schedule({"joint1.angle": ((0, 0.0),)}))
+    arm = dataclasses.replace(
+        JOINT, mechanism=SerialArm((SpatialLink((0, 0, 1), rotor_inertia=0.1),), routes)
+    )
+    loop = ControlLoop(
+        PID("joint1.angle", "left.fill", gain=1.0), 0.01, Schedule({"joint1.angle": ((0, 0.0),)})
+    )
     family = perturbed_family(arm, loop, Perturbations(supplies=(), leak=0.0, draws=0, delay=0))
-    assert [case.plant.mechanism.links[0].rotor_inertia for case in family.cases] == [0.1, 0.05, 0.2]
+    assert [case.plant.mechanism.links[0].rotor_inertia for case in family.cases] == [
+        0.1,
+        0.05,
+        0.2,
+    ]
 
 
 def test_a_perturbation_that_the_plant_does_not_have_is_noted():
     case = regulated()
-    family = perturbed_family(case.plant, dataclasses.replace(case.loop, controller=Called(case.loop.controller)))
+    family = perturbed_family(
+        case.plant, dataclasses.replace(case.loop, controller=Called(case.loop.controller))
+    )
     assert [each.name for each in family.cases] == ["nominal", "supply x 0.8", "leak"]
     assert [note.partition(":")[0] for note in family.notes] == [
-        "no case with another load", "no drawn parameters", "no case with a delay",
-    ]  # fmt: skip
+        "no case with another load",
+        "no drawn parameters",
+        "no case with a delay",
+    ]
 
 
 def test_drawn_parameters_have_the_covariance_of_the_fit_and_are_equal_in_muscles_of_one_fit():
@@ -290,16 +356,27 @@ def test_drawn_parameters_have_the_covariance_of_the_fit_and_are_equal_in_muscle
     c = [leaf.path for leaf in am.core.leaves(contractile)][:2]
     values = [leaf.value for leaf in am.core.leaves(contractile)][:2]
     errors = tuple(0.01 * abs(value) for value in values)
-    fit = ParameterUncertainty(tuple(f"characteristic.{name}" for name in c), errors, ((1.0, 0.6), (0.6, 1.0)))
+    fit = ParameterUncertainty(
+        tuple(f"characteristic.{name}" for name in c), errors, ((1.0, 0.6), (0.6, 1.0))
+    )
     loop = ControlLoop(PID("angle", "left.fill", gain=1.0), 0.01, Schedule({"angle": ((0, 0.0),)}))
     options = Perturbations((), (), 0.0, 0, 120)
-    family = perturbed_family(JOINT, loop, options, initial_state=lambda plant: {}, uncertainties=[fit, fit], seed=2)
-    drawn = np.array([[leaf.value for leaf in am.core.leaves(case.plant.muscles[0].contractile)][:2] for case in family.cases[1:]])  # fmt: skip
+    family = perturbed_family(
+        JOINT, loop, options, initial_state=lambda plant: {}, uncertainties=[fit, fit], seed=2
+    )
+    drawn = np.array(
+        [
+            [leaf.value for leaf in am.core.leaves(case.plant.muscles[0].contractile)][:2]
+            for case in family.cases[1:]
+        ]
+    )
     scaled = (drawn - values) / np.array(errors)
     assert np.cov(scaled.T) == pytest.approx(np.array([[1.0, 0.6], [0.6, 1.0]]), abs=0.25)
     for case in family.cases[:5]:
         assert case.plant.muscles[0].contractile == case.plant.muscles[1].contractile
-    again = perturbed_family(JOINT, loop, options, initial_state=lambda plant: {}, uncertainties=[fit, fit], seed=2)
+    again = perturbed_family(
+        JOINT, loop, options, initial_state=lambda plant: {}, uncertainties=[fit, fit], seed=2
+    )
     assert again.cases[7].plant == family.cases[7].plant
 
 
@@ -325,22 +402,30 @@ def test_the_objective_is_the_mean_and_a_quantile_over_the_cases():
     ones = np.ones((2, 3))
     metrics = CaseMetrics(index, 2 * ones, 3 * ones, np.isfinite(index))
     assert RobustObjective(1.0, 0.5)(metrics).tolist() == [3.0 + 0.5 * 6.0, np.inf]
-    assert RobustObjective(0.5, 1.0, 10.0, 100.0)(metrics)[0] == pytest.approx(3.0 + 2.0 + 20.0 + 300.0)
+    assert RobustObjective(0.5, 1.0, 10.0, 100.0)(metrics)[0] == pytest.approx(
+        3.0 + 2.0 + 20.0 + 300.0
+    )
 
 
 def test_another_objective_is_a_function_of_the_metrics():
     least_air = small(objective=lambda metrics: metrics.air.max(axis=1))
-    assert least_air.history.metrics.air[least_air.best].max() <= small().history.metrics.air.max(axis=1).min() * 1.001
+    assert (
+        least_air.history.metrics.air[least_air.best].max()
+        <= small().history.metrics.air.max(axis=1).min() * 1.001
+    )
 
 
 def test_no_set_of_gains_surpasses_the_pareto_front():
     history = small(budget=128).history
-    error, air = history.means("index"), history.means("air")
+    error = history.means("index")
+    air = history.means("air")
     front = history.pareto("air")
     assert front.size >= 2
     assert (np.diff(error[front]) >= 0).all()
     for i in front:
-        assert not ((error <= error[i]) & (air <= air[i]) & ((error < error[i]) | (air < air[i]))).any()
+        assert not (
+            (error <= error[i]) & (air <= air[i]) & ((error < error[i]) | (air < air[i]))
+        ).any()
     with pytest.raises(ColumnError, match=r"no metric 'airs'.*Did you mean 'air'"):
         history.pareto("airs")
 
@@ -376,9 +461,15 @@ def test_bad_bounds_are_refused(bounds, message):
         ({"seed": -1}, "seed is -1"),
         ({"index": "rmse"}, "give a TrackingIndex"),
         ({"objective": "robust"}, "give RobustObjective"),
-        ({"objective": lambda metrics: 1.0}, r"the objective returned \(\); it must return \(16,\)"),
+        (
+            {"objective": lambda metrics: 1.0},
+            r"the objective returned \(\); it must return \(16,\)",
+        ),
         ({"start": [{"gian": 1.0}]}, "start 0 names 'gian'"),
-        ({"start": [{"gain": 1.0}], "workers": 0}, "start 0 is outside the bounds"),  # before a process is started
+        (
+            {"start": [{"gain": 1.0}], "workers": 0},
+            "start 0 is outside the bounds",
+        ),  # before a process is started
         ({"start": [{"gain": 1e-5}] * 20}, "20 starts; at most"),
         ({"index": RootMeanSquareError(begin=0.5)}, "fewer than two samples follow begin"),
     ],
@@ -396,18 +487,26 @@ def test_bad_cases_are_refused():
         ([NOMINAL, NOMINAL], "two cases are named 'nominal'"),
         ([NOMINAL, LoopCase("other", LIFT, other)], "all cases need the same controller"),
         ([LoopCase("none", LIFT, LOOP, None, "law")], "has no controller at 'law'"),
-        ([LoopCase("angle", JOINT, LOOP)], "case 'angle': PID measures 'pressure', which the plant does not have"),
+        (
+            [LoopCase("angle", JOINT, LOOP)],
+            "case 'angle': PID measures 'pressure', which the plant does not have",
+        ),
     ):
         with pytest.raises(ParameterError, match=message):
             tune(cases, BOUNDS, duration=0.3)
-    with pytest.raises(ParameterError, match=r"LoopCase: plant must be an instance of Plant; it is "):
+    with pytest.raises(
+        ParameterError, match=r"LoopCase: plant must be an instance of Plant; it is "
+    ):
         LoopCase("a", SPLIT, LOOP)
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Perturbations(loads=(1.0,)), "loads contains 1; a factor must be positive, finite and not 1"),
+        (
+            lambda: Perturbations(loads=(1.0,)),
+            "loads contains 1; a factor must be positive, finite and not 1",
+        ),
         (lambda: Perturbations(supplies=(float("nan"),)), "supplies contains nan"),
         (lambda: Perturbations(leak=2.0), "leak is 2.0; allowed range: 0 to 1"),
         (lambda: Perturbations(delay=0.5), "delay must be an integer; it is 0.5"),
@@ -415,10 +514,22 @@ def test_bad_cases_are_refused():
         (lambda: RobustObjective(air_weight=-1.0), "air_weight is -1.0"),
         (lambda: RootMeanSquareError({"y": 0.0}), "scale of 'y' is 0.0; it must be positive"),
         (lambda: RootMeanSquareError(begin=-1.0), "begin is -1.0 s"),
-        (lambda: RootMeanSquareError({"z": 1.0}).scales_for(("y",), ("y", "x")), "'z' is not both a set point and"),
-        (lambda: RootMeanSquareError().scales_for(("y", "x"), ("y", "x")), "y and x can be compared .* state scales"),
-        (lambda: perturbed_family(LIFT, LOOP, Perturbations(loads=(1e9,))), "load x 1e[+]09.*allowed range"),
-        (lambda: perturbed_family(LIFT, LOOP, uncertainties=[None, None]), "2 uncertainties for 1 muscles"),
+        (
+            lambda: RootMeanSquareError({"z": 1.0}).scales_for(("y",), ("y", "x")),
+            "'z' is not both a set point and",
+        ),
+        (
+            lambda: RootMeanSquareError().scales_for(("y", "x"), ("y", "x")),
+            "y and x can be compared .* state scales",
+        ),
+        (
+            lambda: perturbed_family(LIFT, LOOP, Perturbations(loads=(1e9,))),
+            "load x 1e[+]09.*allowed range",
+        ),
+        (
+            lambda: perturbed_family(LIFT, LOOP, uncertainties=[None, None]),
+            "2 uncertainties for 1 muscles",
+        ),
     ],
 )
 def test_impossible_settings_are_refused(make, message):
@@ -428,7 +539,8 @@ def test_impossible_settings_are_refused(make, message):
 
 def test_the_report_states_index_and_objective_in_words():
     assert (
-        str(RobustObjective(air_weight=100.0)) == "mean + 1 x 0.9 quantile of the index + 100 x mean air drawn [kg/s]"
+        str(RobustObjective(air_weight=100.0))
+        == "mean + 1 x 0.9 quantile of the index + 100 x mean air drawn [kg/s]"
     )
     assert str(RobustObjective(quantile=1.0)) == "mean + 1 x 1 quantile of the index"
     assert (
@@ -439,9 +551,13 @@ def test_the_report_states_index_and_objective_in_words():
 
 def test_a_tuning_shows_its_gains_in_their_units_and_the_response_of_the_nominal_case():
     tuning = pickle.loads(pickle.dumps(small(budget=16)))
-    (gains, *_) = tuning.chapter().tables
+    gains, *_ = tuning.chapter().tables
     assert list(gains.columns["unit"].values) == ["1/Pa", "s"]
     assert str(tuning).startswith(f"Tuning of {type(PRESSURE).__name__}\n16 loops were simulated")
     assert "<img" in tuning._repr_html_()
     (axis,) = tuning.chapter().plots[-1].draw().axes
-    assert [line.get_label() for line in axis.get_lines()] == ["present gains", "tuned gains", "set point"]
+    assert [line.get_label() for line in axis.get_lines()] == [
+        "present gains",
+        "tuned gains",
+        "set point",
+    ]

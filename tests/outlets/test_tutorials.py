@@ -1,4 +1,6 @@
-"""The tutorials and explanations are true: their code runs from an empty folder, and shows the printed output."""
+"""The tutorials and explanations are true: their code runs from an empty folder, and shows the
+printed output.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +12,13 @@ from page_code import PageRun, run_page
 
 
 def is_shown(expected: str, found: str) -> bool:
-    """Whether every line of a shown output is in what was printed, in order; an ellipsis stands for other lines, or for a
-    part of one."""
+    """Whether every line of a shown output is in what was printed, in order; an ellipsis stands for
+    other lines, or for a part of one."""
     lines = iter(line.strip() for line in found.splitlines())
     shown = [
-        ".*".join(map(re.escape, line.strip().split("..."))) for line in expected.splitlines() if line.strip() != "..."
+        ".*".join(map(re.escape, line.strip().split("...")))
+        for line in expected.splitlines()
+        if line.strip() != "..."
     ]
     return all(any(re.fullmatch(pattern, each) for each in lines) for pattern in shown)
 
@@ -22,7 +26,9 @@ def is_shown(expected: str, found: str) -> bool:
 def check(run: PageRun) -> None:
     assert run.outputs
     for expected, found in run.outputs:
-        assert is_shown(expected, found), f"the page shows\n{expected}\nand the code prints\n{found}"
+        assert is_shown(expected, found), (
+            f"the page shows\n{expected}\nand the code prints\n{found}"
+        )
 
 
 @pytest.mark.parametrize("page", ["air-mass.md", "stiffness.md", "where-papers-err.md"])

@@ -1,4 +1,6 @@
-"""Files that are damaged or unusual in their format: a clear error, or the table that they contain."""
+"""Files that are damaged or unusual in their format: a clear error, or the table that they
+contain.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +28,16 @@ def table(folder: Path, text: str, name: str = "bench.csv") -> Path:
 
 @pytest.mark.parametrize(
     "text",
-    [HEAD.replace("force [N]", "x" * 140_000) + ROWS, HEAD + ROWS + "9,109," + "x" * 140_000 + "\n"],
+    [
+        HEAD.replace("force [N]", "x" * 140_000) + ROWS,
+        HEAD + ROWS + "9,109," + "x" * 140_000 + "\n",
+    ],
     ids=["heading", "cell"],
 )
 def test_a_cell_of_more_characters_than_the_parser_takes_is_refused(tmp_path, text: str):
-    with pytest.raises(FileError, match=r"bench\.csv, line \d+: a cell has more than 131072 characters"):
+    with pytest.raises(
+        FileError, match=r"bench\.csv, line \d+: a cell has more than 131072 characters"
+    ):
         read(table(tmp_path, text))
 
 
@@ -49,7 +56,9 @@ def test_time_steps_near_the_smallest_number_are_inspected(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names of files are bytes on Linux only")
 def test_a_file_whose_name_is_no_text_is_fitted(tmp_path):
-    contraction, pressure = (x.ravel() for x in np.meshgrid(np.linspace(0, 0.2, 6), np.linspace(1e2, 5e2, 5)))
+    contraction, pressure = (
+        x.ravel() for x in np.meshgrid(np.linspace(0, 0.2, 6), np.linspace(1e2, 5e2, 5))
+    )
     lines = [f"{p},{e},{1.5 * p * (1 - 4 * e)}" for p, e in zip(pressure, contraction, strict=True)]
     name = os.fsdecode(os.fsencode(tmp_path) + b"/bad\xff.csv")
     try:
@@ -57,10 +66,21 @@ def test_a_file_whose_name_is_no_text_is_fitted(tmp_path):
             file.write("\n".join(["pressure [kPa],contraction,force [N]", *lines]))
     except OSError:
         pytest.skip("the file system takes no such name")
-    command = ["fit", name, "--characteristic", "ContractileSurface", "--degree", "2", "--out", str(tmp_path / "out")]
+    command = [
+        "fit",
+        name,
+        "--characteristic",
+        "ContractileSurface",
+        "--degree",
+        "2",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     result = airmuscle(*command)
     assert result.exit_code == 0, result.output
-    assert r"bad\xff" in (tmp_path / "out" / "muscle.toml").read_text(encoding="utf-8").replace("\\\\", "\\")
+    assert r"bad\xff" in (tmp_path / "out" / "muscle.toml").read_text(encoding="utf-8").replace(
+        "\\\\", "\\"
+    )
 
 
 def test_an_empty_chart_sheet_is_passed_over(tmp_path):
@@ -89,34 +109,51 @@ def with_contents(path: Path, member: str, *changes: tuple[bytes, bytes]) -> Pat
 
 def test_formulas_dates_hidden_sheets_and_merged_cells_of_a_workbook(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
-    book, start = openpyxl.Workbook(), datetime.datetime(2024, 5, 17, 12)
+    book = openpyxl.Workbook()
+    start = datetime.datetime(2024, 5, 17, 12)
     book.active.append(["log of the rig"])
     book.active.merge_cells("A1:C1")
     book.active.append(["time", "pressure [kPa]", "force [N]"])
     for i in range(9):
-        book.active.append([start + datetime.timedelta(milliseconds=100 * i), f"={100 + i}*1", 50 + i])
+        book.active.append(
+            [start + datetime.timedelta(milliseconds=100 * i), f"={100 + i}*1", 50 + i]
+        )
     hidden = book.create_sheet("hidden")
     for row in [["time [s]", "force [N]"], *([i, 2 * i] for i in range(9))]:
         hidden.append(row)
     hidden.sheet_state = "hidden"
     book.save(tmp_path / "bench.xlsx")
     computed = [
-        (f"<f>{100 + i}*1</f><v></v>".encode(), f"<f>{100 + i}*1</f><v>{100 + i}</v>".encode()) for i in range(9)
+        (f"<f>{100 + i}*1</f><v></v>".encode(), f"<f>{100 + i}*1</f><v>{100 + i}</v>".encode())
+        for i in range(9)
     ]
-    first, second = read(with_contents(tmp_path / "bench.xlsx", "xl/worksheets/sheet1.xml", *computed))
+    first, second = read(
+        with_contents(tmp_path / "bench.xlsx", "xl/worksheets/sheet1.xml", *computed)
+    )
     assert first["time"] == pytest.approx(0.1 * np.arange(9), abs=1e-6)
     assert first["pressure"].tolist() == [1e3 * (100 + i) for i in range(9)]
     assert second["force"].tolist() == [2.0 * i for i in range(9)]
-    assert [each.origin for each in (first, second)] == ["bench.xlsx, sheet 'Sheet'", "bench.xlsx, sheet 'hidden'"]
+    assert [each.origin for each in (first, second)] == [
+        "bench.xlsx, sheet 'Sheet'",
+        "bench.xlsx, sheet 'hidden'",
+    ]
 
 
 def test_a_formula_that_was_never_computed_and_one_with_an_error_have_no_value(tmp_path):
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
-    for row in [["time [s]", "force [N]"], *([i, 50 + i] for i in range(7)), [7, "=1/0"], [8, "#DIV/0!"]]:
+    for row in [
+        ["time [s]", "force [N]"],
+        *([i, 50 + i] for i in range(7)),
+        [7, "=1/0"],
+        [8, "#DIV/0!"],
+    ]:
         book.active.append(row)
     book.save(tmp_path / "bench.xlsx")
-    with pytest.raises(ColumnError, match=r"2 cells in 2 of 9 rows .* row 9 \(force empty\), row 10 \(force empty\)"):
+    with pytest.raises(
+        ColumnError,
+        match=r"2 cells in 2 of 9 rows .* row 9 \(force empty\), row 10 \(force empty\)",
+    ):
         read(tmp_path / "bench.xlsx")
     assert len(read(tmp_path / "bench.xlsx", ColumnMapping(missing=DropMissing()))[0]) == 7
 
@@ -147,15 +184,22 @@ def cells(*values: object) -> np.ndarray:
     ],
     ids=["complex", "texts", "cells"],
 )
-def test_a_column_of_matlab_that_contains_no_real_numbers_is_left_out_with_a_remark(tmp_path, value, what: str):
+def test_a_column_of_matlab_that_contains_no_real_numbers_is_left_out_with_a_remark(
+    tmp_path, value, what: str
+):
     scipy_io = pytest.importorskip("scipy.io")
-    scipy_io.savemat(tmp_path / "bench.mat", {"time_s": np.arange(9.0), "force_N": np.arange(9.0), "state": value})
+    scipy_io.savemat(
+        tmp_path / "bench.mat",
+        {"time_s": np.arange(9.0), "force_N": np.arange(9.0), "state": value},
+    )
     (recording,) = read(tmp_path / "bench.mat")
     assert list(recording) == ["time", "force"]
     assert f"Not read, because it contains no real numbers: state ({what})." in recording.notes
 
 
-def test_complex_numbers_cells_and_a_sparse_matrix_of_version_7_3_are_left_out_with_a_remark(tmp_path):
+def test_complex_numbers_cells_and_a_sparse_matrix_of_version_7_3_are_left_out_with_a_remark(
+    tmp_path,
+):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "bench.mat", "w", userblock_size=512) as file:
         for name in ("time_s", "force_N"):
@@ -175,7 +219,9 @@ def test_complex_numbers_cells_and_a_sparse_matrix_of_version_7_3_are_left_out_w
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
     (recording,) = read(tmp_path / "bench.mat")
     assert recording["force"].tolist() == [*range(9)]
-    assert {"Not read: S, a sparse matrix.", "Not read: z, which contains no real numbers."} <= set(recording.notes)
+    assert {"Not read: S, a sparse matrix.", "Not read: z, which contains no real numbers."} <= set(
+        recording.notes
+    )
     assert "Not read, because it contains no real numbers: state (cells)." in recording.notes
 
 
@@ -191,7 +237,11 @@ def test_a_struct_with_time_and_signals_that_simulink_did_not_save(tmp_path, sig
 @pytest.mark.parametrize(
     ("heading", "below", "message"),
     [
-        ("pressure [kPa]", "bar", r"the heading 'pressure \[kPa\]' states kPa, but the row of units below it bar"),
+        (
+            "pressure [kPa]",
+            "bar",
+            r"the heading 'pressure \[kPa\]' states kPa, but the row of units below it bar",
+        ),
         ("pressure [kPa(a)]", "kPa(g)", r"states kPa\(a\), but the row of units below it kPa\(g\)"),
         ("pressure [kPa]", "kPa", None),
         ("pressure [kPa]", "kPa(a)", None),
@@ -199,7 +249,9 @@ def test_a_struct_with_time_and_signals_that_simulink_did_not_save(tmp_path, sig
         ("pressure", "kPa", None),
     ],
 )
-def test_a_unit_row_that_contradicts_a_heading_is_refused(tmp_path, heading: str, below: str, message: str | None):
+def test_a_unit_row_that_contradicts_a_heading_is_refused(
+    tmp_path, heading: str, below: str, message: str | None
+):
     path = table(tmp_path, f"time [s],{heading},force [N]\ns,{below},N\n{ROWS}")
     if message is None:
         assert len(read(path)[0]) == 9
@@ -214,5 +266,8 @@ def test_a_unit_row_that_contradicts_a_heading_is_refused(tmp_path, heading: str
 def test_a_clock_time_that_is_none_is_named(tmp_path, cell: str):
     rows = "".join(f"12:00:0{i},{100 + i},{50 + i}\n" for i in range(9))
     path = table(tmp_path, HEAD.replace(" [s]", "") + rows.replace("12:00:04", cell))
-    with pytest.raises(ColumnError, match=rf"line 6: time '{cell}' is not a number or a clock time\. Correct the cell"):
+    with pytest.raises(
+        ColumnError,
+        match=rf"line 6: time '{cell}' is not a number or a clock time\. Correct the cell",
+    ):
         read(path)

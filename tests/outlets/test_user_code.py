@@ -1,4 +1,6 @@
-"""Code of a user, a controller in a scenario file or a law that is fitted: it runs with an explicit permission alone."""
+"""Code of a user, a controller in a scenario file or a law that is fitted: it runs with an explicit
+permission alone.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +68,9 @@ def scenario(tmp_path, monkeypatch):
 
 
 def test_without_permission_nothing_runs_and_the_error_says_why(scenario, capsys):
-    with pytest.raises(UnknownNameError, match=r"'user_laws:Zone' is code of a user.*use files.allow_code"):
+    with pytest.raises(
+        UnknownNameError, match=r"'user_laws:Zone' is code of a user.*use files.allow_code"
+    ):
         load_scenario(scenario)
     assert "user_laws" not in sys.modules
     for command in ("simulate", "tune"):
@@ -88,13 +92,37 @@ def test_the_permission_ends_with_its_block(scenario):
 
 def test_tune_and_export_take_it(scenario):
     """Also in worker processes, which import the module of the current folder."""
-    options = ("--budget", "8", "--draws", "0", "--loads", "", "--supplies", "", "--leak", "0", "--delay", "0")
+    options = (
+        "--budget",
+        "8",
+        "--draws",
+        "0",
+        "--loads",
+        "",
+        "--supplies",
+        "",
+        "--leak",
+        "0",
+        "--delay",
+        "0",
+    )
     options = (*options, "--workers", "2")
-    tuned = airmuscle("tune", scenario, "--allow-code", *options, "--bounds", "gain=0.1 1/bar:5 1/bar")
+    tuned = airmuscle(
+        "tune", scenario, "--allow-code", *options, "--bounds", "gain=0.1 1/bar:5 1/bar"
+    )
     assert tuned.exit_code == 0, tuned.output
     assert 'model = "user_laws:Zone"' in (scenario.parent / "loop-tuned.toml").read_text()
     exported = airmuscle(
-        "export", scenario, "--allow-code", "--controller", "--to", "c", "--out", "law", "--name", "law"
+        "export",
+        scenario,
+        "--allow-code",
+        "--controller",
+        "--to",
+        "c",
+        "--out",
+        "law",
+        "--name",
+        "law",
     )
     assert exported.exit_code == 0, exported.output
     assert "gain = 1e-05 1/Pa" in (scenario.parent / "law" / "law.h").read_text()
@@ -106,7 +134,10 @@ def test_tune_and_export_take_it(scenario):
         ("no_such_module:Zone", r"cannot be imported: ModuleNotFoundError.*in the current folder"),
         ("user_laws:Zones", r"cannot be imported: AttributeError"),
         ("user_laws:Plain", "is no class that is declared with @model"),
-        ("user_laws:Unresolved", "the fields of 'user_laws:Unresolved' are unknown: an annotation is of a name"),
+        (
+            "user_laws:Unresolved",
+            "the fields of 'user_laws:Unresolved' are unknown: an annotation is of a name",
+        ),
     ],
 )
 def test_what_is_no_model_is_refused(scenario, name, message):
@@ -162,10 +193,25 @@ def fitted_laws(tmp_path, monkeypatch):
 
 
 def test_a_law_of_a_user_takes_part_in_a_comparison_and_its_file_loads(fitted_laws):
-    pressure, contraction = (each.ravel() for each in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.0, 0.2, 7)))
-    force = 1.3e-3 * pressure * (1.0 - contraction / 0.31) + np.random.default_rng(1).normal(0.0, 0.5, pressure.size)
-    write(Recording({"pressure": pressure, "contraction": contraction, "force": force}, "linear"), "linear.csv")
-    given = ("fit", "linear.csv", "--characteristic", "fitted_laws:Linear", "--compare", "--workers", "1")
+    pressure, contraction = (
+        each.ravel() for each in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.0, 0.2, 7))
+    )
+    force = 1.3e-3 * pressure * (1.0 - contraction / 0.31) + np.random.default_rng(1).normal(
+        0.0, 0.5, pressure.size
+    )
+    write(
+        Recording({"pressure": pressure, "contraction": contraction, "force": force}, "linear"),
+        "linear.csv",
+    )
+    given = (
+        "fit",
+        "linear.csv",
+        "--characteristic",
+        "fitted_laws:Linear",
+        "--compare",
+        "--workers",
+        "1",
+    )
     assert "use --allow-code" in airmuscle(*given).output
     assert "fitted_laws" not in sys.modules
     done = airmuscle(*given, "--allow-code", "--out", "out")
@@ -180,14 +226,29 @@ def test_a_law_of_a_user_takes_part_in_a_comparison_and_its_file_loads(fitted_la
 def test_a_friction_law_of_a_user_is_fitted_beside_the_others(fitted_laws):
     contraction = np.concatenate([np.linspace(0.02, 0.14, 60), np.linspace(0.14, 0.02, 60)])
     sliding = np.where(np.arange(contraction.size) < 60, 1.0, -1.0)
-    columns = {"time": 0.2 * np.arange(contraction.size), "pressure": np.full(contraction.size, 3e5)}
+    columns = {
+        "time": 0.2 * np.arange(contraction.size),
+        "pressure": np.full(contraction.size, 3e5),
+    }
     columns |= {"contraction": contraction, "force": 900.0 - 4000.0 * contraction - 20.0 * sliding}
     write(Recording(columns, "loop"), "loop.csv")
-    given = ("hysteresis", "loop.csv", "--resting-length", "300 mm", "--degree", "1", "--elements", "2")
+    given = (
+        "hysteresis",
+        "loop.csv",
+        "--resting-length",
+        "300 mm",
+        "--degree",
+        "1",
+        "--elements",
+        "2",
+    )
     done = airmuscle(*given, "--friction", "fitted_laws:Bristle", "--allow-code", "--json")
     assert done.exit_code == 0, done.output
     rms = {each["law"]: each["rms_error"] for each in json.loads(done.stdout)["friction"]["laws"]}
     assert rms["Bristle"] == pytest.approx(rms["Dahl"])
     refused = airmuscle(*given, "--friction", "fitted_laws:Unstarted", "--allow-code")
     assert "Unstarted is not started from data; define its guess(scales)." in refused.output
-    assert "is no friction law" in airmuscle(*given, "--friction", "fitted_laws:Linear", "--allow-code").output
+    assert (
+        "is no friction law"
+        in airmuscle(*given, "--friction", "fitted_laws:Linear", "--allow-code").output
+    )

@@ -1,4 +1,5 @@
-"""Real valves by name: their published flows come out of their law, every number has a source, bad files are refused.
+"""Real valves by name: their published flows come out of their law, every number has a source, bad
+files are refused.
 
 A valve of the catalogue stands in a scenario as `{ library = "matrix-821" }`.
 """
@@ -14,7 +15,13 @@ from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.core import cite
-from airmuscle.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
+from airmuscle.errors import (
+    AirmuscleWarning,
+    FileError,
+    ParameterError,
+    UnitError,
+    UnknownNameError,
+)
 from airmuscle.files import (
     Entry,
     PlantEntry,
@@ -75,7 +82,9 @@ def written(folder: Path, text: str) -> Path:
 def test_published_flows_come_out_of_the_law(name: str):
     entry = load_valve(name)
     for check in entry.checks:
-        assert abs(entry.flow(**dict(check.conditions)) - check.equals) <= check.tolerance, check.source
+        assert abs(entry.flow(**dict(check.conditions)) - check.equals) <= check.tolerance, (
+            check.source
+        )
 
 
 def test_enough_of_the_catalogue_is_judged_by_a_published_flow():
@@ -94,7 +103,11 @@ def test_a_check_fails_when_the_valve_changes():
 def test_every_valve_says_where_it_is_from_and_what_was_converted(name: str):
     entry = load_valve(name)
     assert entry.references, "no source"
-    assert entry.provenance in ("printed", "data sheet, secondary source", "secondary source, converted")
+    assert entry.provenance in (
+        "printed",
+        "data sheet, secondary source",
+        "secondary source, converted",
+    )
     assert entry.note
     assert ("chosen" in entry.note) == ("converted" in entry.provenance)
     assert all(check.source for check in entry.checks)
@@ -117,7 +130,10 @@ def test_the_paths_of_a_valve_may_differ():
 def test_a_file_of_the_user_is_read_in_si(tmp_path: Path):
     entry = load_valve(written(tmp_path, GOOD))
     assert entry.valve.conductance == pytest.approx(2e-8)
-    assert (entry.switching_times.opening_delay, entry.switching_times.closing_delay) == pytest.approx((4e-3, 7e-3))
+    assert (
+        entry.switching_times.opening_delay,
+        entry.switching_times.closing_delay,
+    ) == pytest.approx((4e-3, 7e-3))
     (check,) = entry.checks
     assert entry.flow(**dict(check.conditions)) == pytest.approx(check.equals, rel=1e-9)
     assert dict(check.conditions) == {"upstream": 7e5, "downstream": 1e5}
@@ -179,7 +195,11 @@ def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
 @pytest.mark.parametrize(
     ("table", "error", "message"),
     [
-        ({"library": "matrx-821"}, UnknownNameError, r"\[fill\]: no valve 'matrx-821'; .* Did you mean 'matrix-821'\?"),
+        (
+            {"library": "matrx-821"},
+            UnknownNameError,
+            r"\[fill\]: no valve 'matrx-821'; .* Did you mean 'matrix-821'\?",
+        ),
         ({"library": "dmsp-20-300"}, UnknownNameError, "no valve 'dmsp-20-300'"),
         ({"library": "ckd"}, UnknownNameError, "'ckd' is ambiguous"),
         (
@@ -187,8 +207,16 @@ def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
             UnknownNameError,
             "matrix-821 has no path 'exhaust'; it has valve",
         ),
-        ({"library": "matrix-821", "path": "exaust"}, UnknownNameError, r"no path 'exaust'.* Did you mean 'exhaust'\?"),
-        ({"library": "matrix-821", "conductance": 1e-8}, ParameterError, "unknown key 'conductance'"),
+        (
+            {"library": "matrix-821", "path": "exaust"},
+            UnknownNameError,
+            r"no path 'exaust'.* Did you mean 'exhaust'\?",
+        ),
+        (
+            {"library": "matrix-821", "conductance": 1e-8},
+            ParameterError,
+            "unknown key 'conductance'",
+        ),
         ({"library": 821}, ParameterError, "library is 821; it must be a text in quotes"),
         ({"library": "none.toml"}, FileError, r"none\.toml: there is no such file"),
     ],
@@ -209,20 +237,62 @@ def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, mess
             ParameterError,
             r"\[valve\]: Supply is not allowed here; an Orifice is required: .*Valve",
         ),
-        ('"2 dm3/(s bar)"', '"2 dm3/s"', UnitError, r"\[valve\], conductance: unit 'dm3/s' cannot be converted to"),
-        ('"4 ms"', '"-4 ms"', ParameterError, r"\[switching_times\]: .*opening_delay .* allowed range: 0 to 1 s"),
-        ('"4 ms"', '"4 mm"', UnitError, r"\[switching_times\], opening_delay: unit 'mm' cannot be converted to 's'"),
-        ('closing_delay = "7 ms"', "", ParameterError, "'closing_delay' is missing: time from the command to close"),
-        ('upstream = "7 bara"', 'upstream = "7 barg"', UnitError, r"\[check 1\], upstream: unit 'barg' is gauge"),
-        ('equals = "840 l/min"', "", ParameterError, r"\[check 1\]: 'equals' is missing: published value"),
-        ('equals = "840 l/min"', "equals = nan", ParameterError, r"\[check 1\]: equals is nan; it must be finite"),
+        (
+            '"2 dm3/(s bar)"',
+            '"2 dm3/s"',
+            UnitError,
+            r"\[valve\], conductance: unit 'dm3/s' cannot be converted to",
+        ),
+        (
+            '"4 ms"',
+            '"-4 ms"',
+            ParameterError,
+            r"\[switching_times\]: .*opening_delay .* allowed range: 0 to 1 s",
+        ),
+        (
+            '"4 ms"',
+            '"4 mm"',
+            UnitError,
+            r"\[switching_times\], opening_delay: unit 'mm' cannot be converted to 's'",
+        ),
+        (
+            'closing_delay = "7 ms"',
+            "",
+            ParameterError,
+            "'closing_delay' is missing: time from the command to close",
+        ),
+        (
+            'upstream = "7 bara"',
+            'upstream = "7 barg"',
+            UnitError,
+            r"\[check 1\], upstream: unit 'barg' is gauge",
+        ),
+        (
+            'equals = "840 l/min"',
+            "",
+            ParameterError,
+            r"\[check 1\]: 'equals' is missing: published value",
+        ),
+        (
+            'equals = "840 l/min"',
+            "equals = nan",
+            ParameterError,
+            r"\[check 1\]: equals is nan; it must be finite",
+        ),
         ('source = "the bench"', "", ParameterError, r"\[check 1\]: 'source' is missing"),
-        ("[[check]]", "[check]", ParameterError, r"'check' must be an array of tables; write \[\[check\]\]"),
+        (
+            "[[check]]",
+            "[check]",
+            ParameterError,
+            r"'check' must be an array of tables; write \[\[check\]\]",
+        ),
         ('key = "ours"', "key = 1", ParameterError, "key is 1; it must be a text in quotes"),
         ("[valve]", "valve = 3\n[other]", ParameterError, "unknown key 'other'"),
     ],
 )
-def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path: Path, old, new, error, message: str):
+def test_what_is_wrong_with_a_file_is_said_with_its_place(
+    tmp_path: Path, old, new, error, message: str
+):
     with pytest.raises(error, match=message):
         load_valve(written(tmp_path, GOOD.replace(old, new, 1)))
 
@@ -249,7 +319,10 @@ def test_the_command_line_lists_shows_and_cites_valves():
     assert values["valve.conductance"] == pytest.approx(2.5e-9)
     assert values["switching_times.opening_delay"] == pytest.approx(0.01)
     assert shown["checks"][0]["checked_quantity"] == "flow"
-    assert all(word in run("show", "matrix-821").output for word in ("critical pressure ratio", "0.433", "Hošovský"))
+    assert all(
+        word in run("show", "matrix-821").output
+        for word in ("critical pressure ratio", "0.433", "Hošovský")
+    )
     assert "SM-P00077-A/3" in run("cite", "ckd-m4ga1").output
     assert "festo-mh2" in run("show", "festo").output + run("show", "festo").stderr
 
@@ -270,10 +343,15 @@ def test_load_reads_every_entry_that_the_library_lists():
 
 def test_loaded_entries_make_a_plant():
     valve, muscle = am.load("matrix-821"), am.load("dmsp-20-300").muscle
-    plant = am.Plant(muscle, am.FillDischarge(am.Supply(5e5), valve.valve, valve.valve), am.Isometric(0.0))
+    plant = am.Plant(
+        muscle, am.FillDischarge(am.Supply(5e5), valve.valve, valve.valve), am.Isometric(0.0)
+    )
     assert plant.circuit.fill == MATRIX
     run = am.simulate(
-        plant, am.Schedule({"fill": ((0.0, 1.0),)}), duration=0.05, initial_state=plant.state_at(pressure=0.0)
+        plant,
+        am.Schedule({"fill": ((0.0, 1.0),)}),
+        duration=0.05,
+        initial_state=plant.state_at(pressure=0.0),
     )
     assert run["pressure"][-1] > 1e4
 
@@ -283,17 +361,27 @@ def test_loaded_entries_make_a_plant():
     [
         (
             lambda muscle, valve: am.Plant(
-                muscle.muscle, am.FillDischarge(am.Supply(5e5), valve, valve.valve), am.Isometric(0.0)
+                muscle.muscle,
+                am.FillDischarge(am.Supply(5e5), valve, valve.valve),
+                am.Isometric(0.0),
             ),
-            r"FillDischarge: fill must be an instance of Orifice; .* It contains one: write \.valve after it",
+            (
+                r"FillDischarge: fill must be an instance of Orifice; .* It contains one: write"
+                r" \.valve after it"
+            ),
         ),
         (
             lambda muscle, valve: am.Plant(
-                muscle, am.FillDischarge(am.Supply(5e5), valve.valve, valve.valve), am.Isometric(0.0)
+                muscle,
+                am.FillDischarge(am.Supply(5e5), valve.valve, valve.valve),
+                am.Isometric(0.0),
             ),
             r"Plant: its muscle must be a Muscle; .* give its \.muscle",
         ),
-        (lambda muscle, valve: in_series(valve, valve.valve), r"argument 1 is ValveEntry; .* write \.valve after it"),
+        (
+            lambda muscle, valve: in_series(valve, valve.valve),
+            r"argument 1 is ValveEntry; .* write \.valve after it",
+        ),
     ],
 )
 def test_an_entry_in_place_of_its_part_is_refused_with_what_to_write(make, message: str):
@@ -309,8 +397,12 @@ def test_both_paths_of_a_valve_are_named():
 
 def test_a_valve_in_place_of_a_muscle_is_refused(tmp_path: Path):
     with pytest.raises(
-        UnknownNameError, match=r"'matrix-821' is a valve; a muscle or a law is required: .*dmsp-20-300"
+        UnknownNameError,
+        match=r"'matrix-821' is a valve; a muscle or a law is required: .*dmsp-20-300",
     ):
         load_law("matrix-821")
-    with pytest.raises(ParameterError, match=r"valve\.toml: the file describes a valve; a muscle or a law is required"):
+    with pytest.raises(
+        ParameterError,
+        match=r"valve\.toml: the file describes a valve; a muscle or a law is required",
+    ):
         load_law(written(tmp_path, GOOD))

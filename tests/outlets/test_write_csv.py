@@ -1,4 +1,6 @@
-"""Writer of recordings: reading a written file gives bit-identical numbers, and writing is atomic."""
+"""Writer of recordings: reading a written file gives bit-identical numbers, and writing is
+atomic.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,12 @@ def run(rows: int = 50) -> Recording:
             "valve, raw": random.normal(0, 1.0, rows),
         },
         origin="a simulation",
-        constants={"resting_length": 0.1 + 0.2, "ambient": 98_000.0, "specimen": 'DMSP-20 "ü" 1', "seed": 7},
+        constants={
+            "resting_length": 0.1 + 0.2,
+            "ambient": 98_000.0,
+            "specimen": 'DMSP-20 "ü" 1',
+            "seed": 7,
+        },
         notes=("The first note.", "The\nsecond."),
     )
 
@@ -55,10 +62,19 @@ def test_any_number_is_read_back_bit_identical(tmp_path_factory, force: list[flo
 def test_every_quantity_is_written_in_a_unit_that_is_read(tmp_path: Path):
     """But an elongation, which is read as a shortening of the opposite sign."""
     names = [name for name in QUANTITIES if name != "elongation"]
-    back = read_csv(write(Recording({name: np.array([0.25, 0.5]) for name in names}, "all"), tmp_path / "all.csv"))
+    back = read_csv(
+        write(
+            Recording({name: np.array([0.25, 0.5]) for name in names}, "all"), tmp_path / "all.csv"
+        )
+    )
     assert all(np.array_equal(back[name], [0.25, 0.5]) for name in names)
-    stretched = Recording({"force": np.array([1.0, 2.0]), "elongation": np.array([0.25, 0.5])}, "stretched")
-    assert read_csv(write(stretched, tmp_path / "stretched.csv"))["shortening"].tolist() == [-0.25, -0.5]
+    stretched = Recording(
+        {"force": np.array([1.0, 2.0]), "elongation": np.array([0.25, 0.5])}, "stretched"
+    )
+    assert read_csv(write(stretched, tmp_path / "stretched.csv"))["shortening"].tolist() == [
+        -0.25,
+        -0.5,
+    ]
 
 
 def test_the_file_shows_units_origin_constants_and_notes(tmp_path: Path):
@@ -98,7 +114,10 @@ def test_a_failed_write_leaves_the_existing_file(tmp_path: Path, monkeypatch: py
 
 def test_the_plot_of_a_recording_has_units():
     figure = run().plot("left.pressure", "contraction")
-    assert [axis.get_ylabel() for axis in figure.axes] == ["left.pressure\n[kPa]", "contraction\n[%]"]
+    assert [axis.get_ylabel() for axis in figure.axes] == [
+        "left.pressure\n[kPa]",
+        "contraction\n[%]",
+    ]
     assert figure.axes[-1].get_xlabel() == "time [s]"
     assert figure.axes[0].lines[0].get_ydata() == pytest.approx(run()["left.pressure"] / 1e3)
     assert len(run().plot().figure.axes) == 5

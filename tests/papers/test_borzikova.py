@@ -1,7 +1,7 @@
 """The verdicts on Borzíková et al. are computed: other coefficients give other verdicts.
 
-The printed matrix is neither the exponent of equation (1) nor, because of a misprint, the direct surface; corrected,
-it is the latter.
+The printed matrix is neither the exponent of equation (1) nor, because of a misprint, the direct
+surface; corrected, it is the latter.
 """
 
 import dataclasses
@@ -77,7 +77,8 @@ def test_the_misprint_put_back_changes_the_verdict(laws):
 
 
 @pytest.mark.parametrize(
-    ("place", "corrected", "printed", "digit"), [(5, 0.002404, 0.0024, 5e-5), (8, -0.002259, -0.0023, 5e-5)]
+    ("place", "corrected", "printed", "digit"),
+    [(5, 0.002404, 0.0024, 5e-5), (8, -0.002259, -0.0023, 5e-5)],
 )
 def test_the_correction_is_within_rounding_and_matters(laws, place, corrected, printed, digit):
     coefficients = list(laws[CORRECTED].coefficients)
@@ -90,12 +91,18 @@ def test_the_correction_is_within_rounding_and_matters(laws, place, corrected, p
 def test_the_second_coefficient_without_its_digits_changes_the_verdict(laws):
     coefficients = list(laws[CORRECTED].coefficients)
     coefficients[8] = -0.0023
-    assert verdict(CORRECTED, dataclasses.replace(laws[CORRECTED], coefficients=tuple(coefficients))) == DIFFERS
+    assert (
+        verdict(CORRECTED, dataclasses.replace(laws[CORRECTED], coefficients=tuple(coefficients)))
+        == DIFFERS
+    )
 
 
 @pytest.mark.parametrize("saturation", [0.36, 0.44])
 def test_another_saturation_changes_the_verdict(laws, saturation):
-    assert verdict(EXPONENTIAL, dataclasses.replace(laws[EXPONENTIAL], saturation=saturation)) == DIFFERS
+    assert (
+        verdict(EXPONENTIAL, dataclasses.replace(laws[EXPONENTIAL], saturation=saturation))
+        == DIFFERS
+    )
 
 
 def test_another_sign_of_a_plane_curve_changes_the_verdict(laws):
@@ -133,12 +140,20 @@ def test_the_corrected_surface_lies_within_037_per_cent_of_the_curves(laws):
 
 
 def test_with_only_the_misprint_corrected_it_is_off_by_a_sixth_at_260_newton(laws):
-    assert 16.0 < rms(laws[MISPRINT_CORRECTED], 260.0, least=0.0) < rms(laws[MISPRINT_CORRECTED], 260.0) < 17.0
+    assert (
+        16.0
+        < rms(laws[MISPRINT_CORRECTED], 260.0, least=0.0)
+        < rms(laws[MISPRINT_CORRECTED], 260.0)
+        < 17.0
+    )
 
 
 def test_between_the_loads_both_surfaces_dip_below_zero(laws):
     pressure, force = LoadRange(0.0, 3.5e5, 130.0, 260.0).grid(351, 651)
-    for name, depth, bar, newton in ((CORRECTED, -1.96, 0.43, 203), (EXPONENTIAL, -3.41, 0.61, 206)):
+    for name, depth, bar, newton in (
+        (CORRECTED, -1.96, 0.43, 203),
+        (EXPONENTIAL, -3.41, 0.61, 206),
+    ):
         contraction = laws[name].contraction(pressure, force)
         at = np.unravel_index(contraction.argmin(), contraction.shape)
         assert 100 * contraction[at] == pytest.approx(depth, abs=0.005)
@@ -178,7 +193,11 @@ def test_the_catalogue_contradicts_itself_and_the_measurements():
         30.0,
         NOT_TESTABLE,
     )  # force, and load at 25 %
-    assert (smaller.printed.value, smaller.reproduced, smaller.verdict) == (12.0, 12.0, NOT_TESTABLE)
+    assert (smaller.printed.value, smaller.reproduced, smaller.verdict) == (
+        12.0,
+        12.0,
+        NOT_TESTABLE,
+    )
     assert (diameter.printed.value, diameter.reproduced, diameter.verdict) == (6.0, 12.0, DIFFERS)
     assert [c.case.split(",")[0] for c in contracted] == ["3 kg", "12 kg", "30 kg", "75 kg"]
     assert [c.verdict for c in contracted] == [NOT_TESTABLE] * 4  # the pressure is not printed

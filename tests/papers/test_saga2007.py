@@ -1,7 +1,9 @@
-"""Saga, Nakamura and Yaegashi 2007: equation (19) in every interpretation, its branches and limits, and the claims.
+"""Saga, Nakamura and Yaegashi 2007: equation (19) in every interpretation, its branches and limits,
+and the claims.
 
-P = [2 m t (alpha l^2 + 6 a beta d0) + 12 d0 M F/q]/(d0 [w m (l^2 + 6 a d0) - 3 pi M d0^2/q]), a^2 = l^3/(24 (l0 - l)).
-Pressures were computed from the printed equations independently of this code; M = 5.12583 by default.
+P = [2 m t (alpha l^2 + 6 a beta d0) + 12 d0 M F/q]/(d0 [w m (l^2 + 6 a d0) - 3 pi M d0^2/q]), a^2 =
+l^3/(24 (l0 - l)). Pressures were computed from the printed equations independently of this code; M
+= 5.12583 by default.
 """
 
 import math
@@ -61,7 +63,8 @@ PRINTED = {
     (1, 2, "A", 0): (0.0928, 0.0822, 0.0718, 0.0676, 0.0645, 0.0639),
     (1, 2, "B", 0): (0.0501, 0.0619, 0.0738, 0.0790, 0.0841, 0.0888),
 }
-# w, q: pole % for 0, 1, 2 rings; minimum of line A unloaded MPa, %; load N from which pressure rises at once
+# w, q: pole % for 0, 1, 2 rings; minimum of line A unloaded MPa, %; load N from which pressure
+# rises at once
 LIMITS = {
     (2, 1): ((83.6, 70.2, 59.0), (0.03186, 29.9), 72.4),
     (2, 2): ((88.7, 79.6, 71.7), (0.03079, 36.1), 150.5),
@@ -80,11 +83,17 @@ READINGS = st.builds(
 def letter_for_letter(law, contraction, force):
     """Equation (19) as it is written, per segment."""
     tube = law.geometry
-    l0, d0, m, t = tube.fibre_length, tube.end_diameter, law.fibres, law.wall_thickness
-    w, q, big_m = law.projection_factor, law.slope_factor, law.fibre_sum.sum_of_sines(m)
+    l0 = tube.fibre_length
+    d0 = tube.end_diameter
+    m = law.fibres
+    t = law.wall_thickness
+    w = law.projection_factor
+    q = law.slope_factor
+    big_m = law.fibre_sum.sum_of_sines(m)
     length = l0 * (1 - contraction)
     a = math.sqrt(length**3 / (24 * (l0 - length)))
-    alpha, beta = law.rubber.slope, law.rubber.intercept
+    alpha = law.rubber.slope
+    beta = law.rubber.intercept
     top = 2 * m * t * (alpha * length**2 + 6 * a * beta * d0) + 12 * d0 * big_m * force / q
     return top / (d0 * (w * m * (length**2 + 6 * a * d0) - 3 * math.pi * big_m * d0**2 / q))
 
@@ -110,9 +119,13 @@ def test_along_the_arc_it_integrates_the_hoop_stress_there(name):
 
         def stress(x, parabola=parabola, a=a, law=law):
             radius = parabola.max_radius - x * x / (2 * a)
-            return law.rubber.stress(2 * radius / law.geometry.end_diameter - 1) * math.hypot(1, x / a)
+            return law.rubber.stress(2 * radius / law.geometry.end_diameter - 1) * math.hypot(
+                1, x / a
+            )
 
-        hoop = law.wall_thickness * 2 * quad(stress, 0, parabola.length / 2, epsabs=0, epsrel=1e-12)[0]
+        hoop = (
+            law.wall_thickness * 2 * quad(stress, 0, parabola.length / 2, epsabs=0, epsrel=1e-12)[0]
+        )
         lever = parabola.end_slope / math.pi
         shell = parabola.half_section - lever * math.pi * parabola.end_radius**2
         expected = (hoop + lever * 100.0) / shell
@@ -120,8 +133,18 @@ def test_along_the_arc_it_integrates_the_hoop_stress_there(name):
 
 
 def test_the_exact_mechanics_reading_agrees_with_its_reference():
-    found = exact_mechanics(LINE_A).pressure(np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40]), 100.0) / 1e6
-    assert np.round(found, 6).tolist() == [0.095430, 0.096585, 0.101415, 0.115607, 0.136510, 0.168392]
+    found = (
+        exact_mechanics(LINE_A).pressure(np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40]), 100.0)
+        / 1e6
+    )
+    assert np.round(found, 6).tolist() == [
+        0.095430,
+        0.096585,
+        0.101415,
+        0.115607,
+        0.136510,
+        0.168392,
+    ]
 
 
 @given(law=READINGS, contraction=st.floats(1e-3, 0.40), force=st.floats(0, 300))
@@ -145,7 +168,9 @@ def test_line_b_always_rises_so_that_contraction_returns(contraction, force, q, 
 
 @given(law=READINGS, contraction=st.floats(1e-3, 0.40), force=st.floats(0, 300))
 def test_the_two_fibre_tensions_agree_in_balance(law, contraction, force):
-    """(8) from the end section, (18) from the half shell with the minus that (9) and (19) demand."""
+    """(8) from the end section, (18) from the half shell with the minus that (9) and (19)
+    demand.
+    """
     pressure = law.equilibrium_pressure(contraction, force)
     assert law.shell_tension(pressure, contraction) == pytest.approx(
         law.end_tension(pressure, contraction, force), rel=1e-9
@@ -153,8 +178,11 @@ def test_the_two_fibre_tensions_agree_in_balance(law, contraction, force):
 
 
 def test_fibre_tension_is_the_printed_one():
-    law, c, force = interpretation(LINE_A, 2.0, 1.0), 0.2, 50.0
-    pressure, length = law.pressure(c, force), 0.072 * 0.8
+    law = interpretation(LINE_A, 2.0, 1.0)
+    c = 0.2
+    force = 50.0
+    pressure = law.pressure(c, force)
+    length = 0.072 * 0.8
     a = math.sqrt(length**3 / (24 * 0.072 * 0.2))
     axial = (math.pi * 0.012**2 * pressure / 4 + force) / (16 * math.cos(math.atan(length / a)))
     hoop = 0.002 * length * (0.1263e6 * length**2 + 6 * 0.3e6 * a * 0.012) / (3 * 0.012 * a)
@@ -175,13 +203,17 @@ def test_limits_of_each_reading(w, q):
     assert 100 * contraction[needed.argmin()] == pytest.approx(where, abs=0.06)
     assert laws[0].snap_through_load == pytest.approx(load, abs=0.06)
     for offset, rises in ((-1.0, False), (1.0, True)):
-        start = laws[0].equilibrium_pressure(np.array([0.0, 1e-8]), laws[0].snap_through_load + offset)
+        start = laws[0].equilibrium_pressure(
+            np.array([0.0, 1e-8]), laws[0].snap_through_load + offset
+        )
         assert (start[1] > start[0]) is np.bool_(rises)
     assert interpretation(LINE_B, float(w), float(q)).snap_through_load < 0
 
 
 def test_pressure_starts_at_that_of_a_thin_ring():
-    assert interpretation(LINE_A, 1.0, 2.0).pressure(0.0, 50.0) == pytest.approx(2 * 0.002 * 0.3e6 / 0.012, rel=1e-14)
+    assert interpretation(LINE_A, 1.0, 2.0).pressure(0.0, 50.0) == pytest.approx(
+        2 * 0.002 * 0.3e6 / 0.012, rel=1e-14
+    )
     assert DEFAULT.pressure(0.0, 50.0) == pytest.approx(0.002 * 0.1263e6 / 0.012, rel=1e-14)
     assert DEFAULT.threshold_pressure == pytest.approx(DEFAULT.pressure(0.0, 0.0), rel=1e-14)
 
@@ -214,10 +246,16 @@ def test_equilibria_that_the_reference_lists():
 
 
 @given(law=READINGS, pressure=st.floats(0.02e6, 0.4e6), force=st.floats(0, 200))
-@example(law=interpretation(LINE_B, 1.0, 1.0), pressure=0.1e6, force=0.0)  # its leading coefficient is zero
+@example(
+    law=interpretation(LINE_B, 1.0, 1.0), pressure=0.1e6, force=0.0
+)  # its leading coefficient is zero
 def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
-    """Sign changes of P(eps) - p on 4000 places up to the pole, closed with brentq; and no root is made up."""
-    grid = np.concatenate([np.geomspace(1e-9, 1e-3, 800), np.linspace(1.01e-3, law.pole - 1e-6, 3200)])
+    """Sign changes of P(eps) - p on 4000 places up to the pole, closed with brentq; and no root is
+    made up.
+    """
+    grid = np.concatenate(
+        [np.geomspace(1e-9, 1e-3, 800), np.linspace(1.01e-3, law.pole - 1e-6, 3200)]
+    )
 
     def miss(c):
         return float(law.equilibrium_pressure(c, force)) - pressure
@@ -235,19 +273,28 @@ def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
         assert near.stable == (miss(root * (1 + 1e-5)) > miss(root * (1 - 1e-5)))
     for equilibrium in listed:
         c = equilibrium.contraction
-        scale = abs(autodiff.derivative(law, "equilibrium_pressure", max(c, 1e-12), force)) * max(c, 1e-12) + pressure
+        scale = (
+            abs(autodiff.derivative(law, "equilibrium_pressure", max(c, 1e-12), force))
+            * max(c, 1e-12)
+            + pressure
+        )
         assert abs(miss(c)) < 1e-6 * scale
 
 
 def test_the_branch_from_rest_is_not_the_one_beyond_the_snap():
     law = interpretation(LINE_A, 2.0, 1.0)
     with pytest.raises(
-        SolveError, match=r"36 kPa is below the threshold pressure of 50 kPa, at which contraction starts"
+        SolveError,
+        match=r"36 kPa is below the threshold pressure of 50 kPa, at which contraction starts",
     ):
         law.contraction(0.036e6, 0.0)
-    with pytest.raises(SolveError, match=r"with 0 N at 60 kPa\. Required pressure at this load: 31\.86 to 50 kPa"):
+    with pytest.raises(
+        SolveError, match=r"with 0 N at 60 kPa\. Required pressure at this load: 31\.86 to 50 kPa"
+    ):
         law.contraction(0.06e6, 0.0)
-    loaded = law.contraction(0.0501e6, 60.0)  # below the snap-through load: it jumps over the falling part
+    loaded = law.contraction(
+        0.0501e6, 60.0
+    )  # below the snap-through load: it jumps over the falling part
     assert loaded > 0.05
     assert law.equilibria(0.0499e6, 60.0)[0].stable is False
 
@@ -264,7 +311,10 @@ def test_strain_passes_the_rubber_test_at_21_percent():
 def test_warnings_name_the_limits_of_the_model_at_a_point():
     assert DEFAULT.validity_warnings(DEFAULT.pressure(0.1, 100.0), 0.1) == ()
     strained, volume = DEFAULT.validity_warnings(DEFAULT.pressure(0.31, 100.0), 0.31)
-    assert "the rubber strain of 3.4 exceeds the tested maximum of 3, reached at a contraction of 21.1 %" in strained
+    assert (
+        "the rubber strain of 3.4 exceeds the tested maximum of 3, reached at a contraction of"
+        " 21.1 %" in strained
+    )
     assert "the volume decreases with contraction but the tension is positive" in volume
     law = interpretation(LINE_A, 2.0, 1.0)
     (unstable,) = law.validity_warnings(law.pressure(0.05, 0.0), 0.05)
@@ -274,12 +324,19 @@ def test_warnings_name_the_limits_of_the_model_at_a_point():
 def test_what_cannot_be_is_refused():
     with pytest.raises(
         GeometryLimitError,
-        match=r"Saga2007: a contraction of 43 % is outside.*the pole of this interpretation is at 41\.96 %",
+        match=(
+            r"Saga2007: a contraction of 43 % is outside.*the pole of this interpretation is at"
+            r" 41\.96 %"
+        ),
     ):
         interpretation(LINE_B, 1.0, 1.0, 2).pressure(0.43, 0.0)
-    with pytest.raises(GeometryLimitError, match=r"a contraction of -1 % is outside its range, 0 to 50 %"):
+    with pytest.raises(
+        GeometryLimitError, match=r"a contraction of -1 % is outside its range, 0 to 50 %"
+    ):
         DEFAULT.force(1e5, -0.01)
-    with pytest.raises(ParameterError, match=r"Saga2007\.fibres is 15; it must be an even integer, 4 or more"):
+    with pytest.raises(
+        ParameterError, match=r"Saga2007\.fibres is 15; it must be an even integer, 4 or more"
+    ):
         replace(DEFAULT, fibres=15)
     with pytest.raises(ParameterError, match="its geometry has a CircularArc"):
         Saga2007(StraightFibre(0.072, 0.012, 0, CircularArc()), LINE_A, 0.002)
@@ -309,29 +366,46 @@ def test_rings_are_muscles_in_series(law, contraction):
 
 
 def test_the_previous_model_is_the_circle_with_the_middle_balance():
-    """Both equations of Ferraresi et al., as restored, with E in place of the line: they give the pair's pressure."""
-    modulus, r0, s, n, force = 0.4e6, 0.006, 0.002, 16, 60.0
+    """Both equations of Ferraresi et al., as restored, with E in place of the line: they give the
+    pair's pressure.
+    """
+    modulus = 0.4e6
+    r0 = 0.006
+    s = 0.002
+    n = 16
+    force = 60.0
     for contraction in (0.02, 0.2, 0.35):
         phi = brentq(lambda a, c=contraction: np.sin(a) / a - (1 - c), 0.05, 2.0, xtol=1e-15)
         radius = 0.072 / (2 * phi)
         wall = 2 * modulus * radius**2 * s / r0 * (np.sin(phi) - phi * np.cos(phi))
         shell = radius**2 * phi + 2 * radius * r0 * np.sin(phi) - radius**2 / 2 * np.sin(2 * phi)
         middle = np.pi * (r0 + radius * (1 - np.cos(phi))) ** 2
-        # the sum over the half, cot(pi/N), replaced by that of evenly spread fibres, N/pi, as the pairs take it
+        # the sum over the half, cot(pi/N), replaced by that of evenly spread fibres, N/pi, as the
+        # pairs take it
         lever = np.sin(phi) / np.pi
         expected = (wall + lever * force) / (shell - lever * middle)
-        share = pairs.force_balances(pairs.OUTLINES["circle"], RubberLine(modulus, 0.0), np.array([contraction]))
+        share = pairs.force_balances(
+            pairs.OUTLINES["circle"], RubberLine(modulus, 0.0), np.array([contraction])
+        )
         assert share["middle balance"].pressure(force) == pytest.approx(expected, rel=1e-12)
     cut = sum(math.cos(2 * math.pi * k / n) for k in range(-n // 4, n // 4 + 1))
-    assert cut == pytest.approx(1 / math.tan(math.pi / n), rel=1e-14) == pytest.approx(5.0273, abs=5e-5)
+    assert (
+        cut
+        == pytest.approx(1 / math.tan(math.pi / n), rel=1e-14)
+        == pytest.approx(5.0273, abs=5e-5)
+    )
 
 
 @pytest.mark.parametrize("initial", [0.006, 0.005])
 @pytest.mark.parametrize("line", [RubberLine(0.4e6, 0.0), LINE_A])
 def test_the_previous_model_as_printed_satisfies_both_balances_term_by_term(initial, line):
-    """Equations (A) and (B) by quadrature over the arc, with the printed sum and a narrower tube than its ends."""
+    """Equations (A) and (B) by quadrature over the arc, with the printed sum and a narrower tube
+    than its ends.
+    """
     model = Ferraresi2001(line, initial_radius=initial)
-    r0, s, force = 0.006, 0.002, 60.0
+    r0 = 0.006
+    s = 0.002
+    force = 60.0
     for contraction in (0.02, 0.2, 0.35):
         phi = brentq(lambda a, c=contraction: np.sin(a) / a - (1 - c), 0.05, 2.0, xtol=1e-15)
         big = 0.072 / (2 * phi)
@@ -339,11 +413,19 @@ def test_the_previous_model_as_printed_satisfies_both_balances_term_by_term(init
         def radius(t, big=big, phi=phi):
             return r0 + big * (math.cos(t) - math.cos(phi))
 
-        hoop = s * big * quad(lambda t, at=radius: line.stress(at(t) / initial - 1), -phi, phi, epsrel=1e-12)[0]
+        hoop = (
+            s
+            * big
+            * quad(lambda t, at=radius: line.stress(at(t) / initial - 1), -phi, phi, epsrel=1e-12)[
+                0
+            ]
+        )
         section = big * quad(lambda t, at=radius: at(t) * math.cos(t), -phi, phi, epsrel=1e-12)[0]
         pressure = model.pressure(contraction, force)
         fibre = (force + math.pi * pressure * (r0 + big * (1 - math.cos(phi))) ** 2) / 16
-        assert hoop + fibre * math.sin(phi) / math.tan(math.pi / 16) == pytest.approx(pressure * section, rel=1e-11)
+        assert hoop + fibre * math.sin(phi) / math.tan(math.pi / 16) == pytest.approx(
+            pressure * section, rel=1e-11
+        )
         radial = model.hoop_force(contraction) + fibre * math.sin(phi) * model.fibre_sum
         assert radial == pytest.approx(pressure * model.half_section(contraction), abs=1e-9)
     assert model.fibre_sum == pytest.approx(5.0273, abs=5e-5)
@@ -362,10 +444,17 @@ def test_the_circle_of_the_previous_model_moves_with_pressure_at_a_load_and_not_
     assert (at_load.verdict, at_contraction.verdict) == (HOLDS, DIFFERS)
     assert at_contraction.reproduced == pytest.approx(1.0, rel=1e-9)
     model = Ferraresi2001(LINE_A)
-    assert float(model.pressure(model.contraction(0.16e6, 100.0), 100.0)) == pytest.approx(0.16e6, rel=1e-9)
-    with pytest.raises(SolveError, match=r"no contraction from 0.01 to 45 % at 10 kPa and 100 N. Change the pressure"):
+    assert float(model.pressure(model.contraction(0.16e6, 100.0), 100.0)) == pytest.approx(
+        0.16e6, rel=1e-9
+    )
+    with pytest.raises(
+        SolveError,
+        match=r"no contraction from 0.01 to 45 % at 10 kPa and 100 N. Change the pressure",
+    ):
         model.contraction(1e4, 100.0)
-    with pytest.raises(ParameterError, match=r"fibres is 15; it must be a multiple of 4, 4 or more"):
+    with pytest.raises(
+        ParameterError, match=r"fibres is 15; it must be a multiple of 4, 4 or more"
+    ):
         Ferraresi2001(LINE_A, fibres=15)
 
 
@@ -397,7 +486,8 @@ CIRCLE_BALANCES = {
 
 @pytest.mark.parametrize(("name", "force"), CIRCLE_BALANCES)
 def test_the_balances_of_the_circle_agree_with_the_reference(name, force):
-    tube, line = pairs.OUTLINES["circle"], LINES[name]
+    tube = pairs.OUTLINES["circle"]
+    line = LINES[name]
     along_arc = pairs.force_balances(tube, line, pairs.CONTRACTIONS)
     along_axis = pairs.force_balances(tube, line, pairs.CONTRACTIONS, along=AxialIntegral())
     found = (along_arc["end balance"], along_axis["end balance"], along_arc["middle balance"])
@@ -417,7 +507,11 @@ def test_other_outlines_with_the_end_balance_agree_with_the_reference():
 
 # error of F/p without rubber, %: end / middle / virtual work, at 1, 5, 10, 20, 30, 40 %
 IDEAL = {
-    "parabola (3)": ("-5.2 -4.8 -0.7 14.3 48.9 187", "-5.1 -3.8 0.0 8.9 21.4 58.6", "-1.7 -8.5 -18.6 -47.6 -104 -306"),
+    "parabola (3)": (
+        "-5.2 -4.8 -0.7 14.3 48.9 187",
+        "-5.1 -3.8 0.0 8.9 21.4 58.6",
+        "-1.7 -8.5 -18.6 -47.6 -104 -306",
+    ),
     "parabola, true arc": (
         "-5.5 -5.8 -2.6 10.6 42.0 169",
         "-5.3 -4.9 -2.0 1.9 -4.7 -73.5",
@@ -439,7 +533,9 @@ IDEAL = {
 @pytest.mark.parametrize("outline", IDEAL)
 def test_errors_of_the_pairs_without_rubber_agree_with_the_reference(outline):
     found = pairs.ideal_errors(pairs.CONTRACTIONS)
-    for closure, row in zip(("end balance", "middle balance", "virtual work"), IDEAL[outline], strict=True):
+    for closure, row in zip(
+        ("end balance", "middle balance", "virtual work"), IDEAL[outline], strict=True
+    ):
         for text, value in zip(row.split(), 100 * found[outline, closure], strict=True):
             assert abs(float(text) - value) < (0.06 if "." in text else 0.6), (closure, text, value)
 
@@ -455,7 +551,9 @@ def test_there_are_fifteen_pairs():
 
 
 def test_the_balances_break_virtual_work_by_as_much_as_the_reference_says():
-    """Without rubber, at 20 %: the reading of exact mechanics pulls 14.3 % too much, its outline's work 47.6 % less."""
+    """Without rubber, at 20 %: the reading of exact mechanics pulls 14.3 % too much, its outline's
+    work 47.6 % less.
+    """
     law = replace(exact_mechanics(LINE_A), rubber=RubberLine(0.0, 0.0))
     truth = 1e5 * exact_meridian(LINE_A).geometry.effective_area(0.2)
     assert law.force(1e5, 0.2) / truth - 1 == pytest.approx(0.143, abs=5e-4)
@@ -480,7 +578,10 @@ def test_the_combined_claim_holds_only_with_w_2_and_q_2():
         for q in (1.0, 2.0)
         for name in "AB"
     }
-    assert {key for key, value in found.items() if value == HOLDS} == {(2.0, 2.0, "A"), (2.0, 2.0, "B")}
+    assert {key for key, value in found.items() if value == HOLDS} == {
+        (2.0, 2.0, "A"),
+        (2.0, 2.0, "B"),
+    }
     numbers = [claims.claim("lifting", interpretation(LINES[n], 2.0, 2.0)).reproduced for n in "AB"]
     assert np.round(numbers, 1).tolist() == [41.2, 36.5]
 
@@ -497,8 +598,12 @@ def whole():
 
 
 def test_the_accuracy_is_not_testable_and_compared_with_the_exact_meridian_on_every_line(whole):
-    assert [claims.claim(row).verdict for row in ("accurate", "deviates", "cause")] == [NOT_TESTABLE] * 3
-    found = {c.case: c for c in whole.claims if c.claim.startswith("Maximum pressure error up to 20 %")}
+    assert [claims.claim(row).verdict for row in ("accurate", "deviates", "cause")] == [
+        NOT_TESTABLE
+    ] * 3
+    found = {
+        c.case: c for c in whole.claims if c.claim.startswith("Maximum pressure error up to 20 %")
+    }
     errors = {case: round(c.reproduced, 1) for case, c in found.items()}
     assert errors["exact mechanics, line A, 100 N"] == 10.9
     assert errors["exact mechanics, line B, 100 N"] == 16.9
@@ -507,7 +612,9 @@ def test_the_accuracy_is_not_testable_and_compared_with_the_exact_meridian_on_ev
 
 
 def test_200_newton_are_reached_as_a_maximum_of_its_own():
-    assert {c.verdict for c in cases_of("largest force")} == {NOT_TESTABLE}  # at 0 % every law reaches any force
+    assert {c.verdict for c in cases_of("largest force")} == {
+        NOT_TESTABLE
+    }  # at 0 % every law reaches any force
     assert all(c.reproduced > 200.0 for c in cases_of("largest force"))
     weak = replace(exact_mechanics(LINE_A), wall_thickness=0.0022)
     assert values.tension(weak, 0.11e6, 0.01) < 200.0
@@ -524,13 +631,20 @@ def test_the_tube_expands_by_300_per_cent_near_20_and_by_more_at_35_per_cent():
 
 
 def test_a_ring_reduces_the_force_at_equal_pressure_and_contraction():
-    """Without rubber the exact tension at 5 % is 1652.5 instead of 4863.3 mm2 times the pressure."""
+    """Without rubber the exact tension at 5 % is 1652.5 instead of 4863.3 mm2 times the
+    pressure.
+    """
     found = cases_of("ring force")
     equal = [claim for claim in found if claim.case.endswith("equal pressure")]
     assert (len(equal), len(found)) == (4, 8)
     assert all(claim.verdict == DIFFERS and claim.reproduced < 0.5 for claim in equal)
-    assert {s.verdict for s in statements(found)} == {DEPENDS}  # the paper's reason is a higher supply pressure
-    free = [replace(exact_mechanics(LINE_A, n), rubber=RubberLine(0.0, 0.0)).force(0.11e6, 0.05) for n in (0, 1)]
+    assert {s.verdict for s in statements(found)} == {
+        DEPENDS
+    }  # the paper's reason is a higher supply pressure
+    free = [
+        replace(exact_mechanics(LINE_A, n), rubber=RubberLine(0.0, 0.0)).force(0.11e6, 0.05)
+        for n in (0, 1)
+    ]
     assert free[1] / free[0] == pytest.approx(1652.497 / 4863.313, rel=0.1)
 
 
@@ -546,7 +660,9 @@ def test_a_thicker_wall_raises_the_pressure_for_a_small_contraction():
     found = cases_of("thick wall")
     assert {c.verdict for c in found} == {HOLDS}
     ratios = [c.reproduced for c in found]
-    assert ratios == pytest.approx([1.5] * 4, rel=1e-5), "unloaded, the pressure is proportional to the wall"
+    assert ratios == pytest.approx([1.5] * 4, rel=1e-5), (
+        "unloaded, the pressure is proportional to the wall"
+    )
 
 
 def test_the_wall_thins_as_incompressible_rubber_does():
@@ -569,12 +685,20 @@ def test_mechanics_caps_the_tension():
 def test_verdicts_change_with_the_fibre_sum_and_the_projection_factor():
     law = interpretation(LINE_B, 2.0, 2.0)
     assert verdict(claims.claim("lifting", law)) == HOLDS
-    assert verdict(claims.claim("lifting", replace(law, fibre_sum=UserDefinedFibreSum(5.5)))) == DIFFERS
+    assert (
+        verdict(claims.claim("lifting", replace(law, fibre_sum=UserDefinedFibreSum(5.5))))
+        == DIFFERS
+    )
     assert verdict(claims.claim("lifting", replace(law, projection_factor=1.0))) == DIFFERS
     assert verdict(claims.claim("low start", DEFAULT)) == HOLDS
     assert verdict(claims.claim("low start", replace(DEFAULT, projection_factor=1.0))) == DIFFERS
-    corrected = claims.claim("error below 20 %", replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), 100.0)
-    assert (verdict(claims.claim("error below 20 %", DEFAULT, 100.0)), verdict(corrected)) == (DIFFERS, DIFFERS)
+    corrected = claims.claim(
+        "error below 20 %", replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), 100.0
+    )
+    assert (verdict(claims.claim("error below 20 %", DEFAULT, 100.0)), verdict(corrected)) == (
+        DIFFERS,
+        DIFFERS,
+    )
     assert verdict(claims.claim("error below 20 %", exact_mechanics(LINE_A), 100.0)) == HOLDS
     even = replace(exact_mechanics(LINE_A), fibre_sum=UserDefinedFibreSum(8.0))
     assert verdict(claims.claim("error below 20 %", even, 100.0)) == DIFFERS
@@ -583,10 +707,15 @@ def test_verdicts_change_with_the_fibre_sum_and_the_projection_factor():
 def test_verdicts_change_with_the_rubber_line():
     for name, low, high in (("A", DIFFERS, HOLDS), ("B", HOLDS, DIFFERS)):
         law = interpretation(LINES[name], 2.0, 1.0)
-        assert [verdict(claims.claim(row, law)) for row in ("low start", "high start")] == [low, high]
+        assert [verdict(claims.claim(row, law)) for row in ("low start", "high start")] == [
+            low,
+            high,
+        ]
     assert verdict(claims.claim("rings contract less", DEFAULT, 0.0)) == DIFFERS
     assert verdict(claims.claim("rings contract less", DEFAULT, 100.0)) == HOLDS
-    assert verdict(claims.claim("rings contract less", interpretation(LINE_A, 2.0, 1.0), 0.0)) == HOLDS
+    assert (
+        verdict(claims.claim("rings contract less", interpretation(LINE_A, 2.0, 1.0), 0.0)) == HOLDS
+    )
     assert verdict(claims.claim("feed-forward", DEFAULT, 0.0)) == HOLDS
     assert verdict(claims.claim("feed-forward", interpretation(LINE_A, 2.0, 1.0), 0.0)) == DIFFERS
 
@@ -595,9 +724,14 @@ def test_rings_fail_unloaded_as_the_reference_says():
     """Line B, no load, as printed: P at 5 % is 0.0369 / 0.0333 / 0.0322 MPa for 0 / 1 / 2 rings."""
     found = [with_rings(DEFAULT, n).pressure(0.05, 0.0) / 1e6 for n in (0, 1, 2)]
     assert np.round(found, 4).tolist() == [0.0369, 0.0333, 0.0322]
-    for slope_factor, force in ((2.0, 76.0), (1.0, 37.0)):  # below these it fails at small contraction
+    for slope_factor, force in (
+        (2.0, 76.0),
+        (1.0, 37.0),
+    ):  # below these it fails at small contraction
         law = interpretation(LINE_B, 2.0, slope_factor)
-        assert [verdict(claims.claim("rings contract less", law, force + step)) for step in (0.0, -1.0)] == [
+        assert [
+            verdict(claims.claim("rings contract less", law, force + step)) for step in (0.0, -1.0)
+        ] == [
             HOLDS,
             DIFFERS,
         ]
@@ -611,11 +745,15 @@ def test_figure_2_has_the_radii_of_the_reference():
 
 def test_a_claim_without_a_number_is_never_held():
     runaway = interpretation(LINE_A, 2.0, 1.0)
-    assert [verdict(claims.claim(row, runaway, 0.0)) for row in ("strains", "tensions")] == [NOT_PRINTED] * 2
+    assert [verdict(claims.claim(row, runaway, 0.0)) for row in ("strains", "tensions")] == [
+        NOT_PRINTED
+    ] * 2
 
 
 def test_the_printed_fibre_sum_is_a_reading():
-    assert replace(DEFAULT, fibre_sum=PrintedFibreSum()).pressure(0.2, 100.0) < DEFAULT.pressure(0.2, 100.0)
+    assert replace(DEFAULT, fibre_sum=PrintedFibreSum()).pressure(0.2, 100.0) < DEFAULT.pressure(
+        0.2, 100.0
+    )
     sums = [
         replace(DEFAULT, fibre_sum=s).pressure(0.2, 100.0)
         for s in (PrintedFibreSum(), UniformFibreSum(), UserDefinedFibreSum(5.12583))
@@ -631,15 +769,20 @@ def test_the_chapter_judges_each_claim_and_names_its_place(whole):
     assert verdicts["The model is accurate below 20 %"] == NOT_TESTABLE
     assert verdicts["About 200 N at 0.11 MPa and 35 % or more"] == DEPENDS
     assert all(
-        "no control experiment" in c.note for c in whole.claims if c.claim.startswith("Feed-forward control of a")
+        "no control experiment" in c.note
+        for c in whole.claims
+        if c.claim.startswith("Feed-forward control of a")
     )
     assert all(plot.figure.axes for plot in whole.plots)
     assert visible_words(whole) <= 2200
 
 
 def test_the_answers_state_what_the_models_give():
-    """Up to 20 % and at 100 N: the printed model is up to 50 % low, exact mechanics within 17 %, the circle within 0.7 %."""
-    at, force = np.linspace(0.01, 0.20, 20), 100.0
+    """Up to 20 % and at 100 N: the printed model is up to 50 % low, exact mechanics within 17 %,
+    the circle within 0.7 %.
+    """
+    at = np.linspace(0.01, 0.20, 20)
+    force = 100.0
     for name, printed_error, mechanics_error in (("A", 44.3, 10.9), ("B", 49.9, 16.9)):
         exact = np.asarray(exact_meridian(LINES[name]).shape_at_force(at, force).pressure)
         printed = interpretation(LINES[name], 2.0, 1.0).pressure(at, force) / exact - 1
@@ -647,7 +790,9 @@ def test_the_answers_state_what_the_models_give():
         assert -100 * printed.min() == pytest.approx(printed_error, abs=0.05)
         mechanics = exact_mechanics(LINES[name]).pressure(at, force) / exact - 1
         assert 100 * np.abs(mechanics).max() == pytest.approx(mechanics_error, abs=0.05)
-        assert 100 * np.abs(circular_meridian(LINES[name]).pressure(at, force) / exact - 1).max() < 0.7
+        assert (
+            100 * np.abs(circular_meridian(LINES[name]).pressure(at, force) / exact - 1).max() < 0.7
+        )
     answers = dict(chapter_texts("saga2007")["answers"])
     assert "up to 50 % too low" in answers["May I use it?"]
     assert "saga2007-circle" in answers["With which correction?"]
@@ -669,19 +814,28 @@ def test_the_library_holds_the_muscle_of_table_1(name):
 
 @pytest.mark.parametrize("line", ["A", "B"])
 def test_the_pressures_of_the_exact_model_place_the_exact_pair_at_each_angle(line):
-    np.testing.assert_allclose(joining.reached_angles("exact meridian", line), joining.ANGLES, rtol=1e-5)
+    np.testing.assert_allclose(
+        joining.reached_angles("exact meridian", line), joining.ANGLES, rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize("line", ["A", "B"])
 def test_the_pair_is_in_balance_at_the_angle_that_a_model_reaches(line):
-    """Equal tensions of both exact muscles at the pressures of the model, by Newton's method instead of a spline."""
-    name, exact = "circular meridian, virtual work", exact_meridian(LINES[line])
+    """Equal tensions of both exact muscles at the pressures of the model, by Newton's method
+    instead of a spline.
+    """
+    name = "circular meridian, virtual work"
+    exact = exact_meridian(LINES[line])
     law = joining.models(LINES[line])[name]
     for wanted, reached in zip(joining.ANGLES, joining.reached_angles(name, line), strict=True):
         contractions = [
-            joining.OFFSET + sign * joining.RADIUS / joining.LENGTH * np.array([wanted, reached]) for sign in (1, -1)
+            joining.OFFSET + sign * joining.RADIUS / joining.LENGTH * np.array([wanted, reached])
+            for sign in (1, -1)
         ]
-        tensions = [float(exact.force(float(law.pressure(c[0], joining.TENSION)), c[1])) for c in contractions]
+        tensions = [
+            float(exact.force(float(law.pressure(c[0], joining.TENSION)), c[1]))
+            for c in contractions
+        ]
         assert tensions[0] == pytest.approx(tensions[1], rel=1e-3)
 
 
@@ -694,18 +848,24 @@ def test_an_angle_is_missing_only_where_both_pressures_are_below_those_of_a_taut
 
 
 def test_the_greatest_error_of_the_angle_is_that_of_all_angles_not_of_three():
-    """With the circular meridian it lies between the angles of the table: 0.487 % of 15 degrees, at most 0.467 at them."""
+    """With the circular meridian it lies between the angles of the table: 0.487 % of 15 degrees, at
+    most 0.467 at them.
+    """
     name = "circular meridian, virtual work"
     stated, _ = joining.relative_angle_error(name, "A")
     others = np.linspace(0.01, 1.0, 23) * joining.ANGLES[-1]
     errors = 100.0 * np.abs(joining.angle_errors(name, "A", tuple(others))) / joining.ANGLES[-1]
-    of_three = 100.0 * np.abs(joining.angle_errors(name, "A", joining.ANGLES)).max() / joining.ANGLES[-1]
+    of_three = (
+        100.0 * np.abs(joining.angle_errors(name, "A", joining.ANGLES)).max() / joining.ANGLES[-1]
+    )
     assert errors.max() <= stated <= 1.001 * errors.max()
     assert of_three < 0.96 * stated
 
 
 def test_the_printed_model_leaves_both_muscles_slack_and_the_circular_one_is_accurate():
-    verdicts = {c.case: (c.reproduced, c.verdict) for c in claims.ROWS["feed-forward of a pair"].claims()}
+    verdicts = {
+        c.case: (c.reproduced, c.verdict) for c in claims.ROWS["feed-forward of a pair"].claims()
+    }
     assert len(verdicts) == 6
     for line in ("A", "B"):
         assert verdicts[rf"printed, \(w = 2\), \(q = 1\), line {line}"] == (100.0, DIFFERS)

@@ -1,4 +1,6 @@
-"""Bench: readers of measurement files, inspection, identification of muscles and plants, prediction."""
+"""Bench: readers of measurement files, inspection, identification of muscles and plants,
+prediction.
+"""
 
 from ..core.stubs import attach_stub
 

@@ -1,4 +1,6 @@
-"""Baselines that a prediction must beat, persistence and a linear ARX model, and the skill of a model against them."""
+"""Baselines that a prediction must beat, persistence and a linear ARX model, and the skill of a
+model against them.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -9,19 +11,25 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ..core import Array, ShortRepr
 
-DEPTH, RIDGE = 4, 1e-6
+DEPTH = 4
+RIDGE = 1e-6
 """Rows of outputs and inputs that the ARX model sees, and its regularisation (chosen)."""
 GRID_ROWS = 200
-"""Maximum number of rows of the longest record in a baseline, which has one sample time for all records (chosen)."""
+"""Maximum number of rows of the longest record in a baseline, which has one sample time for all
+records (chosen).
+"""
 LIMIT_MARGIN = 10.0
 """Distance of the limits of a free run from the measured values, in ranges of these (chosen)."""
-PERSISTENCE, ARX = "persistence", f"ARX of depth {DEPTH}"
+PERSISTENCE = "persistence"
+ARX = f"ARX of depth {DEPTH}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class LinearArx(ShortRepr):
-    """Linear ARX model of the change of J outputs, from DEPTH rows of all outputs and K inputs and the inputs of the
-    next row; the outputs of a free run are limited to `low` and `high` (J,), so that an unstable one stays finite."""
+    """Linear ARX model of the change of J outputs, from DEPTH rows of all outputs and K inputs and
+    the inputs of the next row; the outputs of a free run are limited to `low` and `high` (J,), so
+    that an unstable one stays finite.
+    """
 
     mean: Array
     spread: Array
@@ -30,28 +38,45 @@ class LinearArx(ShortRepr):
     high: Array | float
 
     def free_run(self, past: Array, inputs: Array) -> Array:
-        """Outputs (N, R, J) after `past` (N, DEPTH, J) by `inputs` (N, DEPTH + R, K), the first DEPTH at these rows."""
+        """Outputs (N, R, J) after `past` (N, DEPTH, J) by `inputs` (N, DEPTH + R, K), the first
+        DEPTH at these rows.
+        """
         outputs = past.copy()
         for row in range(DEPTH - 1, inputs.shape[1] - 1):
             seen = outputs[:, row - DEPTH + 1 : row + 1].reshape(len(outputs), -1)
             driven = inputs[:, row - DEPTH + 1 : row + 2].reshape(len(outputs), -1)
             scaled = (np.concatenate([seen, driven], axis=1) - self.mean) / self.spread
             following = outputs[:, -1] + scaled @ self.coefficients[:-1] + self.coefficients[-1]
-            outputs = np.concatenate([outputs, np.clip(following, self.low, self.high)[:, None]], axis=1)
+            outputs = np.concatenate(
+                [outputs, np.clip(following, self.low, self.high)[:, None]], axis=1
+            )
         return outputs[:, DEPTH:]
 
 
-def fit_arx(runs: Sequence[tuple[Array, Array]], low: Array | float, high: Array | float) -> LinearArx:
-    """Least squares of the change of the outputs in runs with outputs (R, J) and inputs (R, K), R > DEPTH + 1."""
-    seen, changes = [], []
+def fit_arx(
+    runs: Sequence[tuple[Array, Array]], low: Array | float, high: Array | float
+) -> LinearArx:
+    """Least squares of the change of the outputs in runs with outputs (R, J) and inputs (R, K), R >
+    DEPTH + 1.
+    """
+    seen = []
+    changes = []
     for outputs, inputs in runs:
         count = len(outputs) - DEPTH
-        past = sliding_window_view(outputs, DEPTH, axis=0)[:count].transpose(0, 2, 1).reshape(count, -1)
-        driven = sliding_window_view(inputs, DEPTH + 1, axis=0).transpose(0, 2, 1).reshape(count, -1)
+        past = (
+            sliding_window_view(outputs, DEPTH, axis=0)[:count]
+            .transpose(0, 2, 1)
+            .reshape(count, -1)
+        )
+        driven = (
+            sliding_window_view(inputs, DEPTH + 1, axis=0).transpose(0, 2, 1).reshape(count, -1)
+        )
         seen.append(np.concatenate([past, driven], axis=1))
         changes.append(outputs[DEPTH:] - outputs[DEPTH - 1 : -1])
-    x, y = np.concatenate(seen), np.concatenate(changes)
-    mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-9
+    x = np.concatenate(seen)
+    y = np.concatenate(changes)
+    mean = x.mean(axis=0)
+    spread = x.std(axis=0) + 1e-9
     design = np.column_stack([(x - mean) / spread, np.ones(len(x))])
     normal = design.T @ design + RIDGE * len(design) * np.eye(design.shape[1])
     return LinearArx(mean, spread, np.linalg.solve(normal, design.T @ y), low, high)
@@ -64,7 +89,9 @@ def skill(error: float, baselines: Mapping[str, float]) -> float | None:
 
 
 class TimedRecord(NamedTuple):
-    """Rising times (R,), measured outputs (R, J), inputs (R, K) that drive them, mask (R, J) of the compared rows."""
+    """Rising times (R,), measured outputs (R, J), inputs (R, K) that drive them, mask (R, J) of the
+    compared rows.
+    """
 
     time: Array
     outputs: Array
@@ -73,8 +100,12 @@ class TimedRecord(NamedTuple):
 
     def on_grid(self, step: float) -> "TimedRecord":
         """The record at even times; missing values are interpolated."""
-        time = self.time[0] + step * np.arange(int((self.time[-1] - self.time[0]) / step * (1 + 1e-9)) + 1)
-        outputs, inputs = (_interpolated(time, self.time, part) for part in (self.outputs, self.inputs))
+        time = self.time[0] + step * np.arange(
+            int((self.time[-1] - self.time[0]) / step * (1 + 1e-9)) + 1
+        )
+        outputs, inputs = (
+            _interpolated(time, self.time, part) for part in (self.outputs, self.inputs)
+        )
         return TimedRecord(time, outputs, inputs, np.ones(outputs.shape, dtype=bool))
 
 
@@ -88,19 +119,26 @@ def _interpolated(at: Array, time: Array, columns: Array) -> Array:
 
 
 def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
-    """The rms errors (J,) of the free run of each baseline over the compared rows of each record, by name.
+    """The rms errors (J,) of the free run of each baseline over the compared rows of each record,
+    by name.
 
-    Persistence keeps the first value. The ARX model is fitted to the other records with as many outputs and inputs, or,
-    for a record without others, to each half of it, and runs through the rest; its first DEPTH rows are the measured
-    ones. A record of fewer rows than two such fits need has persistence alone.
+    Persistence keeps the first value. The ARX model is fitted to the other records with as many
+    outputs and inputs, or, for a record without others, to each half of it, and runs through the
+    rest; its first DEPTH rows are the measured ones. A record of fewer rows than two such fits need
+    has persistence alone.
     """
     longest = max((float(np.ptp(each.time)) for each in records), default=0.0)
-    sampled = max((float(np.median(np.diff(each.time))) for each in records if each.time.size > 1), default=0.0)
+    sampled = max(
+        (float(np.median(np.diff(each.time))) for each in records if each.time.size > 1),
+        default=0.0,
+    )
     grids = [each.on_grid(max(sampled, longest / GRID_ROWS)) for each in records]
     sizes = [(each.outputs.shape[1], each.inputs.shape[1]) for each in records]
     found = []
     for i, record in enumerate(records):
-        first = record.outputs[np.argmax(record.compared, axis=0), np.arange(record.outputs.shape[1])]
+        first = record.outputs[
+            np.argmax(record.compared, axis=0), np.arange(record.outputs.shape[1])
+        ]
         errors = {PERSISTENCE: _rms(record, np.broadcast_to(first, record.outputs.shape))}
         alike = [each for k, each in enumerate(grids) if k != i and sizes[k] == sizes[i]]
         others = [each for each in alike if len(each.time) > DEPTH + 1]
@@ -111,9 +149,13 @@ def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
 
 
 def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None:
-    """The outputs of the ARX model at the grid of a record (R, J); None where there are too few rows."""
+    """The outputs of the ARX model at the grid of a record (R, J); None where there are too few
+    rows.
+    """
     middle = len(grid.time) // 2
-    halves = [TimedRecord(*(part[rows] for part in grid)) for rows in (slice(middle), slice(middle, None))]
+    halves = [
+        TimedRecord(*(part[rows] for part in grid)) for rows in (slice(middle), slice(middle, None))
+    ]
     if others:
         return _run(grid, others) if len(grid.time) > DEPTH + 1 else None
     if middle <= DEPTH + 1:
@@ -123,9 +165,12 @@ def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None
 
 def _run(grid: TimedRecord, known: Sequence[TimedRecord]) -> Array:
     measured = np.concatenate([each.outputs for each in known])
-    margin, runs = LIMIT_MARGIN * np.ptp(measured, axis=0), [(each.outputs, each.inputs) for each in known]
+    margin = LIMIT_MARGIN * np.ptp(measured, axis=0)
+    runs = [(each.outputs, each.inputs) for each in known]
     model = fit_arx(runs, measured.min(axis=0) - margin, measured.max(axis=0) + margin)
-    return np.concatenate([grid.outputs[:DEPTH], model.free_run(grid.outputs[None, :DEPTH], grid.inputs[None])[0]])
+    return np.concatenate(
+        [grid.outputs[:DEPTH], model.free_run(grid.outputs[None, :DEPTH], grid.inputs[None])[0]]
+    )
 
 
 def _rms(record: TimedRecord, predicted: Array) -> Array:

@@ -1,4 +1,6 @@
-"""Results of an identification that describe themselves: one chapter for `print`, notebooks, reports and outlets."""
+"""Results of an identification that describe themselves: one chapter for `print`, notebooks,
+reports and outlets.
+"""
 
 import abc
 import shutil
@@ -22,21 +24,33 @@ class Reported(NotebookDisplay):
         """The description of the result: summary, quantities, tables, figures and notes."""
 
     def __str__(self) -> str:
-        return as_text([self.chapter()], shutil.get_terminal_size((WIDTH, 24)).columns, "its chapter()")
+        return as_text(
+            [self.chapter()], shutil.get_terminal_size((WIDTH, 24)).columns, "its chapter()"
+        )
 
     def _card(self) -> Card:
         chapter = self.chapter()
-        columns = next((shown_columns(table, brief=True) for table in chapter.tables if table.brief_rows), [])
-        table = [tuple(each.heading for each in columns), *zip(*(each.texts for each in columns), strict=True)]
-        lines = [f"{each.name}: {' '.join(filter(None, (*value_cells(each), each.remark)))}"
-                 for each in chapter.values if each.brief]  # fmt: skip
+        columns = next(
+            (shown_columns(table, brief=True) for table in chapter.tables if table.brief_rows), []
+        )
+        table = [
+            tuple(each.heading for each in columns),
+            *zip(*(each.texts for each in columns), strict=True),
+        ]
+        lines = [
+            f"{each.name}: {' '.join(filter(None, (*value_cells(each), each.remark)))}"
+            for each in chapter.values
+            if each.brief
+        ]
         plot = chapter.plots[0].figure if chapter.plots else None
         notes = (*chapter.paragraphs, *(["; ".join(lines)] if lines else []), *chapter.notes)
         return Card(chapter.title, table if columns else (), plot, notes)
 
 
 def unit_column(names: Sequence[str]) -> TableColumn:
-    """The column "unit" of a table each row of which has a value of another quantity, by the names of columns."""
+    """The column "unit" of a table each row of which has a value of another quantity, by the names
+    of columns.
+    """
     known = [quantity_of(name) for name in names]
     shown = [display_scale(name)[1].removesuffix("-") for name in names]
     return TableColumn(["" if each is None else each.unit for each in known], shown=shown)

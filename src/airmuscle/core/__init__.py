@@ -1,4 +1,6 @@
-"""Foundations: models and parameters, parameter trees, numeric and symbolic operators, errors, references, units."""
+"""Foundations: models and parameters, parameter trees, numeric and symbolic operators, errors,
+references, units.
+"""
 
 from .stubs import attach_stub
 

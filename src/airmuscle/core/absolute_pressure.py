@@ -1,4 +1,6 @@
-"""Pressures that are stated as absolute: gauge pressures that keep the absolute pressure they were converted from."""
+"""Pressures that are stated as absolute: gauge pressures that keep the absolute pressure they were
+converted from.
+"""
 
 import contextlib
 from collections.abc import Iterator
@@ -14,7 +16,8 @@ _ambient: ContextVar[float] = ContextVar("ambient_pressure", default=STANDARD_AT
 
 
 class AbsolutePressure(float):
-    """A gauge pressure [Pa] that was stated as an absolute one, such as "7 bara", at an ambient pressure [Pa].
+    """A gauge pressure [Pa] that was stated as an absolute one, such as "7 bara", at an ambient
+    pressure [Pa].
 
     It is a number like any other; a plant converts it anew with its own ambient pressure.
     """
@@ -26,7 +29,8 @@ class AbsolutePressure(float):
 
     def __new__(cls, absolute: float, ambient: float) -> "AbsolutePressure":
         pressure = super().__new__(cls, absolute - ambient)
-        pressure.absolute, pressure.ambient = absolute, ambient
+        pressure.absolute = absolute
+        pressure.ambient = ambient
         return pressure
 
     def __getnewargs__(self) -> tuple[float, float]:  # type: ignore[override]
@@ -34,8 +38,12 @@ class AbsolutePressure(float):
 
 
 def at_ambient(value: Any, ambient: float) -> Any:
-    """A value, or where it was stated as an absolute pressure, the gauge pressure at an ambient pressure [Pa]."""
-    return AbsolutePressure(value.absolute, ambient) if isinstance(value, AbsolutePressure) else value
+    """A value, or where it was stated as an absolute pressure, the gauge pressure at an ambient
+    pressure [Pa].
+    """
+    return (
+        AbsolutePressure(value.absolute, ambient) if isinstance(value, AbsolutePressure) else value
+    )
 
 
 def ambient_of_texts() -> float:
@@ -45,7 +53,9 @@ def ambient_of_texts() -> float:
 
 @contextlib.contextmanager
 def ambient_pressure(pressure: float) -> Iterator[None]:
-    """Context in which texts of absolute pressures are converted with an ambient pressure [Pa], that of a plant."""
+    """Context in which texts of absolute pressures are converted with an ambient pressure [Pa],
+    that of a plant.
+    """
     token = _ambient.set(pressure)
     try:
         yield

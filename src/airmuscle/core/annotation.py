@@ -1,4 +1,6 @@
-"""Annotations of fields and arguments: whether a value conforms, its description, checks of a dataclass and a call."""
+"""Annotations of fields and arguments: whether a value conforms, its description, checks of a
+dataclass and a call.
+"""
 
 import dataclasses
 import functools
@@ -24,7 +26,9 @@ _ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))
 
 
 def type_hints(cls: Any) -> dict[str, Any]:
-    """The annotations of a class or function as types; empty if they contain names imported for type checking only."""
+    """The annotations of a class or function as types; empty if they contain names imported for
+    type checking only.
+    """
     try:
         return _resolved(cls)
     except NameError:
@@ -37,21 +41,30 @@ def _resolved(cls: Any) -> dict[str, Any]:
 
 
 def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
-    """Whether a value conforms to an annotation of numbers, texts, classes, arrays, unions and collections of these.
+    """Whether a value conforms to an annotation of numbers, texts, classes, arrays, unions and
+    collections of these.
 
-    Any other annotation is conformed to by every value. With `lists`, a list conforms to the annotation of a tuple. The
-    contents of an array are seen where the annotation is `ArrayLike` only.
+    Any other annotation is conformed to by every value. With `lists`, a list conforms to the
+    annotation of a tuple. The contents of an array are seen where the annotation is `ArrayLike`
+    only.
     """
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    origin = typing.get_origin(hint)
+    arguments = typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
         if set(arguments) >= _ARRAY_LIKE:
             arguments = tuple(each for each in arguments if each not in _ARRAY_LIKE)
-            return is_numeric(value) or any(conforms(value, each, lists=lists) for each in arguments)
+            return is_numeric(value) or any(
+                conforms(value, each, lists=lists) for each in arguments
+            )
         return any(conforms(value, each, lists=lists) for each in arguments)
     if hint is float:
         return _is_number(value)
     if hint is int:
-        return isinstance(value, numbers.Integral) and not isinstance(value, bool) and abs(int(value)) < _MAX_INTEGER
+        return (
+            isinstance(value, numbers.Integral)
+            and not isinstance(value, bool)
+            and abs(int(value)) < _MAX_INTEGER
+        )
     if origin is np.ndarray:
         return hasattr(value, "__array__") or isinstance(value, tuple | list)
     if origin is Mapping:
@@ -64,9 +77,12 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
         kinds = (Sequence,) if origin is Sequence else (tuple, list) if lists else (tuple,)
         if not isinstance(value, kinds) or isinstance(value, str | bytes):
             return False
-        of_items = arguments if origin is tuple and arguments[1:] != (...,) else arguments[:1] * len(value)
+        of_items = (
+            arguments if origin is tuple and arguments[1:] != (...,) else arguments[:1] * len(value)
+        )
         return len(value) == len(of_items) and all(
-            conforms(item, of_item, lists=lists) for item, of_item in zip(value, of_items, strict=True)
+            conforms(item, of_item, lists=lists)
+            for item, of_item in zip(value, of_items, strict=True)
         )
     if origin in (Collection, Iterable) and isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
         return all(conforms(item, arguments[0], lists=lists) for item in value)
@@ -74,7 +90,12 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
         return callable(value) and _takes(value, arguments[0])
     if origin in (Collection, Iterable):
         return isinstance(value, origin) and not isinstance(value, np.ndarray)
-    return hint is Any or not isinstance(hint, type) or getattr(hint, "_is_protocol", False) or isinstance(value, hint)
+    return (
+        hint is Any
+        or not isinstance(hint, type)
+        or getattr(hint, "_is_protocol", False)
+        or isinstance(value, hint)
+    )
 
 
 def is_model(obj: Any) -> bool:
@@ -91,7 +112,9 @@ def is_numeric(value: Any) -> bool:
 
 
 def _takes(function: Callable[..., Any], arguments: Any) -> bool:
-    """Whether a function can be called with the declared arguments; a class that does not tell, as `int`, cannot."""
+    """Whether a function can be called with the declared arguments; a class that does not tell, as
+    `int`, cannot.
+    """
     if not isinstance(arguments, list):
         return True
     try:
@@ -116,7 +139,8 @@ def _is_number(value: Any) -> bool:
 
 def describe(hint: Any) -> str:
     """An annotation in words: `a number`, `a text or an instance of SplitRange`."""
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    origin = typing.get_origin(hint)
+    arguments = typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
         is_array = set(arguments) >= _ARRAY_LIKE
         others = [describe(each) for each in arguments if not (is_array and each in _ARRAY_LIKE)]
@@ -131,9 +155,15 @@ def describe(hint: Any) -> str:
     if origin is Mapping:
         return f"a mapping, from {describe(arguments[0])} to {describe(arguments[1])}"
     if origin is Sequence or (origin is tuple and arguments[1:] == (...,)):
-        return f"a {'tuple' if origin is tuple else 'sequence'}, each element of which is {describe(arguments[0])}"
+        return (
+            f"a {'tuple' if origin is tuple else 'sequence'}, each element of which is"
+            f" {describe(arguments[0])}"
+        )
     if origin is tuple:
-        return f"a tuple of {len(arguments)} values ({', '.join(describe(each) for each in arguments)})"
+        return (
+            f"a tuple of {len(arguments)} values"
+            f" ({', '.join(describe(each) for each in arguments)})"
+        )
     if origin is not None:
         return "anything"
     return _NAMES.get(hint) or f"an instance of {getattr(hint, '__name__', hint)}"
@@ -159,12 +189,18 @@ def _shortened(write: Callable[[Any], str], value: Any) -> str:
         text = write(value)
     except Exception:  # an integer of more than 4300 digits, or a class that cannot be printed
         is_integer = isinstance(value, int)
-        return "an integer of thousands of digits" if is_integer else f"an instance of {type(value).__name__}"
+        return (
+            "an integer of thousands of digits"
+            if is_integer
+            else f"an instance of {type(value).__name__}"
+        )
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def within(low: float, high: float, **field: Any) -> Any:
-    """Declare a number without a unit, such as a number of samples, as a dataclass field with closed bounds."""
+    """Declare a number without a unit, such as a number of samples, as a dataclass field with
+    closed bounds.
+    """
     return dataclasses.field(metadata={"within": (low, high)}, **field)
 
 
@@ -172,26 +208,34 @@ def check_within(obj: Any, field: "dataclasses.Field[Any]") -> None:
     """Raise ParameterError if the number of a field is not within the bounds that it declares."""
     if "within" not in field.metadata:
         return
-    (low, high), value = field.metadata["within"], getattr(obj, field.name)
+    low, high = field.metadata["within"]
+    value = getattr(obj, field.name)
     if not low <= value <= high:
-        raise ParameterError(f"{type(obj).__name__}: {field.name} is {value}; allowed range: {low} to {high}.")
+        raise ParameterError(
+            f"{type(obj).__name__}: {field.name} is {value}; allowed range: {low} to {high}."
+        )
 
 
 def check_field_types(obj: Any) -> None:
-    """Raise ParameterError, with class and field, if a field of a dataclass does not conform to its annotation.
+    """Raise ParameterError, with class and field, if a field of a dataclass does not conform to its
+    annotation.
 
-    Numbers, texts, classes, arrays, unions, tuples, sequences and mappings of these are checked; any other annotation
-    is conformed to by every value. A list conforms to the annotation of a tuple; the contents of an array are not seen.
+    Numbers, texts, classes, arrays, unions, tuples, sequences and mappings of these are checked;
+    any other annotation is conformed to by every value. A list conforms to the annotation of a
+    tuple; the contents of an array are not seen.
     """
     hints = type_hints(type(obj))
     for field in dataclasses.fields(obj):
         hint = hints.get(field.name)
         value: Any = getattr(obj, field.name, None)
-        if type(value) is hint and (hint is not int or abs(value) < _MAX_INTEGER):  # most often so, and fast
+        if type(value) is hint and (
+            hint is not int or abs(value) < _MAX_INTEGER
+        ):  # most often so, and fast
             pass
         elif field.init and not conforms(value, hint, lists=True):
             raise ParameterError(
-                f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is {abridged(value)}."
+                f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is"
+                f" {abridged(value)}."
             )
         check_within(obj, field)
 
@@ -199,16 +243,19 @@ def check_field_types(obj: Any) -> None:
 def check_whole(owner: str, name: str, value: Any, least: int) -> None:
     """Raise ParameterError if an argument is no integer of at least `least`."""
     if not conforms(value, int) or value < least:
-        raise ParameterError(f"{owner}: {name} is {abridged(value)}; it must be a whole number of at least {least}.")
+        raise ParameterError(
+            f"{owner}: {name} is {abridged(value)}; it must be a whole number of at least {least}."
+        )
 
 
 def check_arguments(
     function: Callable[..., Any], given: Sequence[Any], named: Mapping[str, Any], failure: Exception
 ) -> None:
-    """Name the argument that is wrong where a call failed: it does not conform to its annotation, is empty, or no path.
+    """Name the argument that is wrong where a call failed: it does not conform to its annotation,
+    is empty, or no path.
 
-    Raises ParameterError or FileError, with function and argument; nothing where the failure has a message of its own,
-    where no argument is the cause, or where one is left out, which Python says.
+    Raises ParameterError or FileError, with function and argument; nothing where the failure has a
+    message of its own, where no argument is the cause, or where one is left out, which Python says.
     """
     if isinstance(failure, AirmuscleError):
         return
@@ -216,27 +263,37 @@ def check_arguments(
         bound = inspect.signature(function).bind(*given, **named)
     except TypeError:
         return
-    hints, owner = type_hints(function), function.__name__
+    hints = type_hints(function)
+    owner = function.__name__
     for name, value in bound.arguments.items():
-        declared, hint = bound.signature.parameters[name], hints.get(name)
+        declared = bound.signature.parameters[name]
+        hint = hints.get(name)
         for each in value if declared.kind is declared.VAR_POSITIONAL else (value,):
             if not _suits(each, hint):
-                raise ParameterError(f"{owner}: {name} must be {describe(hint)}; it is {abridged(each)}.") from failure
+                raise ParameterError(
+                    f"{owner}: {name} must be {describe(hint)}; it is {abridged(each)}."
+                ) from failure
         is_several = isinstance(value, Sequence | Mapping) and not isinstance(value, str)
         if is_several and not value and value is not declared.default:
             raise ParameterError(f"{owner}: {name} is empty; give at least one.") from failure
         is_path = Path in typing.get_args(hint) and isinstance(value, str | Path)
         if is_path and (isinstance(failure, OSError) or not Path(value).name or "\0" in str(value)):
             reason = failure.strerror if isinstance(failure, OSError) else failure
-            raise FileError(f"{owner}: {name} is {abridged(value)}, which is no usable path: {reason}.") from failure
+            raise FileError(
+                f"{owner}: {name} is {abridged(value)}, which is no usable path: {reason}."
+            ) from failure
 
 
 def _suits(value: Any, hint: Any) -> bool:
-    """Whether a value conforms to the annotation of an argument, as which an array serves for a sequence."""
+    """Whether a value conforms to the annotation of an argument, as which an array serves for a
+    sequence.
+    """
     if typing.get_origin(hint) is np.ndarray:
         return is_numeric(value) and np.ndim(value) > 0
     if typing.get_origin(hint) is types.UnionType and not set(typing.get_args(hint)) >= _ARRAY_LIKE:
         return any(_suits(value, each) for each in typing.get_args(hint))
     return conforms(value, hint, lists=True) or (
-        isinstance(value, np.ndarray) and value.ndim > 0 and conforms(value.tolist(), hint, lists=True)
+        isinstance(value, np.ndarray)
+        and value.ndim > 0
+        and conforms(value.tolist(), hint, lists=True)
     )

@@ -18,25 +18,33 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 _MAX_NAME = 100
-"""Number of characters of the name of a file that its temporary file has (chosen); file systems limit names to 255."""
+"""Number of characters of the name of a file that its temporary file has (chosen); file systems
+limit names to 255.
+"""
 
 
 _held: dict[Path, tuple[int, list[Path]]] | None = None
-"""Descriptors of the folders that are kept from other processes, and the folders that were created for it."""
+"""Descriptors of the folders that are kept from other processes, and the folders that were created
+for it.
+"""
 
 
 @contextlib.contextmanager
 def atomic_file(path: Path) -> Iterator[Path]:
-    """Yield the path of a temporary file next to `path`, which replaces it when the block ends without an exception.
+    """Yield the path of a temporary file next to `path`, which replaces it when the block ends
+    without an exception.
 
-    If the block raises, `path` is unchanged and the temporary file is removed. Its name is that of the process and the
-    thread, so that several writers do not meet. Errors of the operating system are those of `open` and `os.replace`.
+    If the block raises, `path` is unchanged and the temporary file is removed. Its name is that of
+    the process and the thread, so that several writers do not meet. Errors of the operating system
+    are those of `open` and `os.replace`.
     """
     if not path.name:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if path.is_char_device() or path.is_block_device():  # which would be replaced by a file
         raise OSError(errno.EINVAL, "it is a device, not a file", str(path))
-    temporary = path.with_name(f".{path.name[:_MAX_NAME]}.{os.getpid()}-{threading.get_ident()}.part")
+    temporary = path.with_name(
+        f".{path.name[:_MAX_NAME]}.{os.getpid()}-{threading.get_ident()}.part"
+    )
     try:
         yield temporary
         temporary.replace(path)
@@ -46,7 +54,9 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
 
 _UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
-"""Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""
+"""Beginning of the name of a temporary folder, with the machine, because folders may be shared; a
+process follows.
+"""
 _TEMPORARY = f"airmuscle-{socket.gethostname().replace('/', '')}-"
 """The same for a folder in that of the system."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -56,11 +66,12 @@ REMEDY_WHERE_FULL = "Free space there, or specify another folder."
 
 @contextlib.contextmanager
 def atomic_folder(folder: Path | str) -> Iterator[Path]:
-    """Yield an empty temporary folder whose files are moved into `folder` when the block ends without an exception.
+    """Yield an empty temporary folder whose files are moved into `folder` when the block ends
+    without an exception.
 
-    If the block raises, or the files cannot be written, `folder` remains unchanged, or is not created. Files of the
-    same name are replaced, other files are kept. What a killed process has left in `folder` is removed. Raises
-    FileError.
+    If the block raises, or the files cannot be written, `folder` remains unchanged, or is not
+    created. Files of the same name are replaced, other files are kept. What a killed process has
+    left in `folder` is removed. Raises FileError.
     """
     target = Path(folder)
     with raise_file_errors(target):
@@ -84,7 +95,9 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Yield an empty folder for the block, in that of the system; what a killed process has left there is removed."""
+    """Yield an empty folder for the block, in that of the system; what a killed process has left
+    there is removed.
+    """
     target = Path(tempfile.gettempdir())
     _remove_abandoned(target, _TEMPORARY)
     with tempfile.TemporaryDirectory(
@@ -94,12 +107,19 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def _remove_abandoned(target: Path, prefix: str = _UNFINISHED) -> None:
-    """Remove the temporary folders of processes of this machine, and of this user, that were killed."""
+    """Remove the temporary folders of processes of this machine, and of this user, that were
+    killed.
+    """
     for folder in target.glob(f"{prefix}*"):
         process = folder.name.removeprefix(prefix).partition("-")[0]
         with contextlib.suppress(OSError):  # removed by another process
             own = not hasattr(os, "getuid") or folder.lstat().st_uid == os.getuid()
-            if own and process.isdecimal() and not folder.is_symlink() and not is_running(int(process)):
+            if (
+                own
+                and process.isdecimal()
+                and not folder.is_symlink()
+                and not is_running(int(process))
+            ):
                 shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -117,10 +137,12 @@ def is_running(process: int) -> bool:
 
 
 def check_writable(folder: Path | str, *, shared: bool = False) -> None:
-    """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files.
+    """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves
+    no files.
 
-    Within `exclusive_folders`, no other process may check the same folder until the block ends, unless it is `shared`:
-    it raises FolderInUseError. A shared folder stays, because another process may have begun to use it.
+    Within `exclusive_folders`, no other process may check the same folder until the block ends,
+    unless it is `shared`: it raises FolderInUseError. A shared folder stays, because another
+    process may have begun to use it.
     """
     target = Path(folder)
     with raise_file_errors(target):
@@ -138,23 +160,29 @@ def check_writable(folder: Path | str, *, shared: bool = False) -> None:
 
 @contextlib.contextmanager
 def exclusive_folders() -> Iterator[None]:
-    """Keep other processes from the folders that `check_writable` checks in the block, so that no files are mixed.
+    """Keep other processes from the folders that `check_writable` checks in the block, so that no
+    files are mixed.
 
-    The lock is that of the operating system, which also ends with the process; Windows has none for folders.
+    The lock is that of the operating system, which also ends with the process; Windows has none for
+    folders.
     """
-    global _held
-    outer, _held = _held, {}
+    global _held  # noqa: PLW0603
+    outer = _held
+    _held = {}
     try:
         yield
     finally:
-        held, _held = _held, outer
+        held = _held
+        _held = outer
         for descriptor, created in held.values():
             os.close(descriptor)
             _remove_empty_folders(created)
 
 
 def _hold(target: Path, created: list[Path]) -> None:
-    """Lock a folder until the end of the block; `created` are removed then, where they are empty."""
+    """Lock a folder until the end of the block; `created` are removed then, where they are
+    empty.
+    """
     if fcntl is None or _held is None or target.resolve() in _held:
         return
     with raise_file_errors(target):
@@ -165,7 +193,8 @@ def _hold(target: Path, created: list[Path]) -> None:
     except BlockingIOError:
         os.close(descriptor)
         raise FolderInUseError(
-            f"{target}: another command is writing to this folder. Wait until it ends, or specify another folder."
+            f"{target}: another command is writing to this folder. Wait until it ends, or specify"
+            " another folder."
         ) from None
     except OSError:  # a file system without locks
         os.close(descriptor)
@@ -175,15 +204,21 @@ def _hold(target: Path, created: list[Path]) -> None:
 
 @contextlib.contextmanager
 def raise_file_errors(target: Path, numbers: Collection[int] = ()) -> Iterator[None]:
-    """Raise FileError for an error of the operating system; of these numbers alone, if some are given."""
+    """Raise FileError for an error of the operating system; of these numbers alone, if some are
+    given.
+    """
     try:
         yield
     except OSError as error:
         if numbers and error.errno not in numbers:
             raise
         at = f" ({error.filename})" if error.filename and Path(error.filename) != target else ""
-        remedy = REMEDY_WHERE_FULL if error.errno in FULL else "Specify a folder with write permission."
-        raise FileError(f"{target}: cannot be written to: {error.strerror or error}{at}. {remedy}") from error
+        remedy = (
+            REMEDY_WHERE_FULL if error.errno in FULL else "Specify a folder with write permission."
+        )
+        raise FileError(
+            f"{target}: cannot be written to: {error.strerror or error}{at}. {remedy}"
+        ) from error
 
 
 def _missing_folders(folder: Path) -> list[Path]:

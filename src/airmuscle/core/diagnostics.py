@@ -1,4 +1,6 @@
-"""Status: how a computation ended; diagnostic: remark on a result, with code, subject, rows and hint."""
+"""Status: how a computation ended; diagnostic: remark on a result, with code, subject, rows and
+hint.
+"""
 
 import dataclasses
 import enum
@@ -10,7 +12,9 @@ from .errors import Hint, HintedText
 
 
 class Status(enum.IntEnum):
-    """How a computation ended; `message` is the reason in words. `simulate` never returns PAUSED or NOT_STARTED."""
+    """How a computation ended; `message` is the reason in words. `simulate` never returns PAUSED or
+    NOT_STARTED.
+    """
 
     message: str
     """The reason, as the end of a sentence that begins with "because"."""
@@ -28,9 +32,12 @@ class Status(enum.IntEnum):
     SINGULAR = 10, "the Jacobian is singular"
     NOT_CONVERGED = 11, "Newton's method did not converge"
 
-    def __new__(cls, value: int, message: str = "") -> Self:  # without a message: the member of a value
+    def __new__(
+        cls, value: int, message: str = ""
+    ) -> Self:  # without a message: the member of a value
         status = int.__new__(cls, value)
-        status._value_, status.message = value, message
+        status._value_ = value
+        status.message = message
         return status
 
 
@@ -56,7 +63,8 @@ class Diagnostic:
     subject  what it is about: a muscle, a component, the run
     text     the remark, a sentence without its full stop
     rows     how many rows of the recording it concerns; 0 where it concerns the result as a whole
-    hint     what to do about it, a Hint if it is an argument of a function; empty where there is nothing to do
+    hint     what to do about it, a Hint if it is an argument of a function; empty where there is
+    nothing to do
     """
 
     code: DiagnosticCode
@@ -77,7 +85,9 @@ class Diagnostic:
 
 
 class ColumnLimit(NamedTuple):
-    """Lower and upper limit of a column of a run; `subject` is the muscle or component that it belongs to."""
+    """Lower and upper limit of a column of a run; `subject` is the muscle or component that it
+    belongs to.
+    """
 
     subject: str
     code: DiagnosticCode
@@ -89,14 +99,21 @@ class ColumnLimit(NamedTuple):
 class Columns(Mapping[str, Array]):
     """Columns (N,) of a run by name, with the smallest and largest value of each.
 
-    places, lower, upper   the smallest and largest values that are known, and by column where they stand among them
+    places, lower, upper   the smallest and largest values that are known, and by column where they
+    stand among them
     """
 
     def __init__(
-        self, columns: Mapping[str, Array], places: Mapping[str, int] | None = None, lower: Sequence[float] = (),
+        self,
+        columns: Mapping[str, Array],
+        places: Mapping[str, int] | None = None,
+        lower: Sequence[float] = (),
         upper: Sequence[float] = (),
-    ) -> None:  # fmt: skip
-        self._columns, self._places, self._lower, self._upper = columns, places or {}, lower, upper
+    ) -> None:
+        self._columns = columns
+        self._places = places or {}
+        self._lower = lower
+        self._upper = upper
 
     def __getitem__(self, name: str) -> Array:
         return self._columns[name]

@@ -1,7 +1,9 @@
-"""Display units: units of a user's choice for plots, tables, texts and notebooks; files keep their declared units.
+"""Display units: units of a user's choice for plots, tables, texts and notebooks; files keep their
+declared units.
 
-The choice is, in this order: that of the innermost `with display(...)` block, that of the last call of `display(...)`
-in this process, that of the file config.toml in the user's configuration folder, or else the default of each output.
+The choice is, in this order: that of the innermost `with display(...)` block, that of the last call
+of `display(...)` in this process, that of the file config.toml in the user's configuration folder,
+or else the default of each output.
 """
 
 import functools
@@ -18,8 +20,26 @@ from .annotation import abridged
 from .errors import AirmuscleError, FileError, UnitError
 from .units import conversion, known_factor, known_si_unit
 
-SI_UNITS = ("Pa", "m", "rad", "1", "N", "kg", "s", "m3", "m/s", "m/s^2", "rad/s", "rad/s^2", "kg/s", "m3/s",
-            "m3/(s Pa)", "N/m", "N m", "N m/rad")  # fmt: skip
+SI_UNITS = (
+    "Pa",
+    "m",
+    "rad",
+    "1",
+    "N",
+    "kg",
+    "s",
+    "m3",
+    "m/s",
+    "m/s^2",
+    "rad/s",
+    "rad/s^2",
+    "kg/s",
+    "m3/s",
+    "m3/(s Pa)",
+    "N/m",
+    "N m",
+    "N m/rad",
+)
 """SI units of the quantities whose display unit can be chosen; "1" is that of the contraction."""
 CONFIG_FILE = "config.toml"
 """Name of the configuration file."""
@@ -32,7 +52,8 @@ _NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
 class DisplayUnits:
     """A choice of display units, which is in force in this process, or in a `with` block only.
 
-    units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default of the output
+    units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default
+    of the output
 
     Raises UnitError.
     """
@@ -43,15 +64,21 @@ class DisplayUnits:
         """Factor from SI and text of each unit, by SI unit."""
         for unit in units:
             if not isinstance(unit, str) or not unit.strip():
-                raise UnitError(f"{where}: {abridged(unit)} is not a unit; write texts, such as 'bar', 'mm', 'deg'.")
-            text, (si_unit, factor) = unit.strip(), _si_unit_and_factor(unit.strip(), where)
+                raise UnitError(
+                    f"{where}: {abridged(unit)} is not a unit; write texts, such as 'bar', 'mm',"
+                    " 'deg'."
+                )
+            text = unit.strip()
+            si_unit, factor = _si_unit_and_factor(unit.strip(), where)
             if si_unit in self.by_si:
                 both = f"'{self.by_si[si_unit][1]}' and '{text}'"
                 raise UnitError(f"{where}: {both} are units of the same quantity; choose one.")
             self.by_si[si_unit] = (1.0 / factor, text)
 
     def __enter__(self) -> Self:
-        """Restrict the choice to a block in this thread: the choice of the process is the earlier one again."""
+        """Restrict the choice to a block in this thread: the choice of the process is the earlier
+        one again.
+        """
         with _lock:
             if self in _process:
                 _process.remove(self)
@@ -72,11 +99,13 @@ _blocks: ContextVar[tuple[DisplayUnits, ...]] = ContextVar("display units", defa
 
 
 def display(*units: str) -> DisplayUnits:
-    """Show quantities in these units from now on: `display("bar", "mm", "deg")`; without units, in the default ones.
+    """Show quantities in these units from now on: `display("bar", "mm", "deg")`; without units, in
+    the default ones.
 
-    A call replaces the previous choice. `with display("bar"):` limits it to a block and to the thread of the block. It
-    changes plots, tables, reports, texts and notebooks; values, arguments and files (CSV, TOML, JSON) are not affected.
-    Raises UnitError for an unknown unit, for two units of one quantity, and for an absolute pressure.
+    A call replaces the previous choice. `with display("bar"):` limits it to a block and to the
+    thread of the block. It changes plots, tables, reports, texts and notebooks; values, arguments
+    and files (CSV, TOML, JSON) are not affected. Raises UnitError for an unknown unit, for two
+    units of one quantity, and for an absolute pressure.
     """
     choice = DisplayUnits(units)
     with _lock:
@@ -85,7 +114,9 @@ def display(*units: str) -> DisplayUnits:
 
 
 def current_units() -> tuple[str, ...] | None:
-    """The units chosen in this process or block, for a worker process; None if only the configuration file counts."""
+    """The units chosen in this process or block, for a worker process; None if only the
+    configuration file counts.
+    """
     choice = _choice_here()
     return None if choice is None else choice.units
 
@@ -95,7 +126,8 @@ def _choice_here() -> DisplayUnits | None:
 
 
 def chosen_scale(si_unit: str, factor: float, label: str) -> tuple[float, str]:
-    """Factor from SI and unit in which a quantity is displayed; `factor` and `label` are the default.
+    """Factor from SI and unit in which a quantity is displayed; `factor` and `label` are the
+    default.
 
     Raises FileError or UnitError for an invalid configuration file.
     """
@@ -109,7 +141,9 @@ def quantity_text(value: Any, si_unit: str, default: str, digits: int = 4) -> st
 
 
 def contraction_text(value: Any, decimals: int = 2) -> str:
-    """A contraction as text: in per cent with so many decimals, or to four significant digits in the chosen unit."""
+    """A contraction as text: in per cent with so many decimals, or to four significant digits in
+    the chosen unit.
+    """
     factor, unit = chosen_scale("1", 0.0, "")
     return _scaled(value, factor, unit, 4) if unit else f"{100 * value:.{decimals}f} %"
 
@@ -132,7 +166,8 @@ def level_text(quantity: str, level: float, span: float) -> str:
 
 
 def heading_scale(heading: str) -> tuple[float, str]:
-    """Factor and heading of a column or axis whose heading ends with its unit: 'pressure [kPa]' in the chosen unit.
+    """Factor and heading of a column or axis whose heading ends with its unit: 'pressure [kPa]' in
+    the chosen unit.
 
     The factor is 1 if no other unit is chosen. A ratio is converted only if it is a contraction.
     """
@@ -164,7 +199,9 @@ def _known(unit: str) -> tuple[str, float] | None:
 
 
 def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
-    """SI unit and factor of a unit. Raises UnitError if it is unknown, has an offset, or cannot be chosen."""
+    """SI unit and factor of a unit. Raises UnitError if it is unknown, has an offset, or cannot be
+    chosen.
+    """
     reason = ""
     for si_unit in SI_UNITS:
         try:
@@ -173,17 +210,22 @@ def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
             reason = reason or ("" if "measures another" in error.message else f" {error.message}")
             continue
         if re.search(r"a$|\(a\)|abs", unit) and si_unit == "Pa" and converted.offset:
-            raise UnitError(f"{where}: '{unit}' is absolute, but displayed pressures are gauge pressures; write 'bar'.")
+            raise UnitError(
+                f"{where}: '{unit}' is absolute, but displayed pressures are gauge pressures; write"
+                " 'bar'."
+            )
         if math.isfinite(converted.factor) and converted.factor > 0.0 and not converted.offset:
             return si_unit, converted.factor
     raise UnitError(
-        f"{where}: '{unit}' cannot be chosen.{reason} Allowed are units of {', '.join(SI_UNITS)}, such as 'bar' "
-        "or 'mm'."
+        f"{where}: '{unit}' cannot be chosen.{reason} Allowed are units of {', '.join(SI_UNITS)},"
+        " such as 'bar' or 'mm'."
     )
 
 
 def _of_user() -> DisplayUnits:
-    """The choice of the configuration file in AIRMUSCLE_CONFIG_DIR, or in the user's configuration folder."""
+    """The choice of the configuration file in AIRMUSCLE_CONFIG_DIR, or in the user's configuration
+    folder.
+    """
     try:
         folder = os.environ.get("AIRMUSCLE_CONFIG_DIR") or user_folder("config")
     except RuntimeError:  # a user without a home folder
@@ -192,10 +234,11 @@ def _of_user() -> DisplayUnits:
 
 
 def user_folder(kind: str) -> pathlib.Path:
-    """The folder of the user for "cache" or "config" files of the program. Raises RuntimeError without a home folder.
+    """The folder of the user for "cache" or "config" files of the program. Raises RuntimeError
+    without a home folder.
 
-    A relative path in XDG_CACHE_HOME or XDG_CONFIG_HOME is ignored, as the XDG base directory specification demands: it
-    would be another folder in each working folder.
+    A relative path in XDG_CACHE_HOME or XDG_CONFIG_HOME is ignored, as the XDG base directory
+    specification demands: it would be another folder in each working folder.
     """
     import platformdirs
 
@@ -206,13 +249,17 @@ def user_folder(kind: str) -> pathlib.Path:
 
 @functools.cache
 def _configured(file: str) -> DisplayUnits:
-    """The choice of a configuration file, [display] units = [...], read once. Raises FileError or UnitError."""
+    """The choice of a configuration file, [display] units = [...], read once. Raises FileError or
+    UnitError.
+    """
     try:
         tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8-sig"))
     except (FileNotFoundError, NotADirectoryError):
         return DisplayUnits(())
     except OSError as error:
-        if not os.access(os.path.dirname(file), os.X_OK):  # the folder of another user, as after `su` without a login
+        if not os.access(
+            os.path.dirname(file), os.X_OK
+        ):  # the folder of another user, as after `su` without a login
             return DisplayUnits(())
         raise FileError(f"{file}: cannot be read ({error.strerror}).") from None
     except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8
@@ -223,7 +270,9 @@ def _configured(file: str) -> DisplayUnits:
     unknown += [key for key in table if key != "units"] if isinstance(table, dict) else []
     if unknown or not isinstance(units, list):
         what = f"unknown key '{unknown[0]}'" if unknown else "units must be a list of texts"
-        raise FileError(f'{file}: {what}; write [display] and under it units = ["bar", "mm", "deg"].')
+        raise FileError(
+            f'{file}: {what}; write [display] and under it units = ["bar", "mm", "deg"].'
+        )
     try:
         return DisplayUnits(tuple(units), "[display] units")
     except AirmuscleError as error:

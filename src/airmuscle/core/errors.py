@@ -1,4 +1,6 @@
-"""Exceptions and warnings. A message states the location, the cause, the allowed values and the remedy."""
+"""Exceptions and warnings. A message states the location, the cause, the allowed values and the
+remedy.
+"""
 
 import dataclasses
 import difflib
@@ -8,14 +10,16 @@ import unicodedata
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Self
 
-MAX_LISTED, MAX_LISTED_NAME, MAX_LISTED_TEXT = 40, 60, 400
+MAX_LISTED = 40
+MAX_LISTED_NAME = 60
+MAX_LISTED_TEXT = 400
 """Number of names of a file that a message lists, and of characters of each and of all (chosen)."""
 MAX_WORD = 200
 """Maximum number of characters of an argument that a message quotes (chosen)."""
 MAX_PLACE = 600
 """Maximum number of characters before the first colon, where the path of a file stands (chosen)."""
 _LONG_QUOTATION = re.compile(
-    rf"\A[^:\n]{{{MAX_PLACE + 1},}}(?=:)|\S{{{MAX_WORD + 1},}}|(?<![^\s(\[])'(?=[^\s;,.:)])[^'\n]{{{MAX_WORD + 1},}}'"
+    rf"\A[^:\n]{{{MAX_PLACE + 1},}}(?=:)|\S{{{MAX_WORD + 1},}}|(?<![^\s(\[])'(?=[^\s;,.:)])[^'\n]{{{MAX_WORD + 1},}}'"  # noqa: E501
 )
 
 
@@ -42,13 +46,17 @@ class Hint:
         if not self.argument:
             return f"{self.purpose}, use {self.function}."
         owner = f" of {self.function}" if self.function else ""
-        return f"{self.purpose}, use {self.argument}={self.constant or _notation(self.value)}{owner}."
+        return (
+            f"{self.purpose}, use {self.argument}={self.constant or _notation(self.value)}{owner}."
+        )
 
 
 class HintedText(str):
-    """Text with hints, a string in the words of Python; `written` gives it in the words of another interface.
+    """Text with hints, a string in the words of Python; `written` gives it in the words of another
+    interface.
 
-    parts  texts, and hints as whole sentences; a hint is separated from the text before it by a space
+    parts  texts, and hints as whole sentences; a hint is separated from the text before it by a
+    space
     """
 
     parts: tuple[str | Hint, ...]
@@ -71,12 +79,16 @@ class HintedText(str):
         return tuple(part for part in self.parts if isinstance(part, Hint))
 
     def written(self, write: Callable[[Hint], str]) -> str:
-        """The text with each hint as the sentence that `write` returns; a hint without a sentence is omitted."""
+        """The text with each hint as the sentence that `write` returns; a hint without a sentence
+        is omitted.
+        """
         return _joined(self.parts, write)
 
     def changed(self, change: Callable[[str], str]) -> "HintedText":
         """The text with `change` applied to all parts that are not hints."""
-        return HintedText(*(part if isinstance(part, Hint) else change(part) for part in self.parts))
+        return HintedText(
+            *(part if isinstance(part, Hint) else change(part) for part in self.parts)
+        )
 
 
 def _joined(parts: list[str | Hint] | tuple[str | Hint, ...], write: Callable[[Hint], str]) -> str:
@@ -97,8 +109,15 @@ def _notation(value: Any) -> str:
         return "{" + ", ".join(f"{key!r}: {_notation(item)}" for key, item in value.items()) + "}"
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = [(field, getattr(value, field.name)) for field in dataclasses.fields(value)]
-        given = [_notation(item) if field.default is dataclasses.MISSING else f"{field.name}={_notation(item)}"
-                 for field, item in fields if item != field.default]  # fmt: skip
+        given = [
+            (
+                _notation(item)
+                if field.default is dataclasses.MISSING
+                else f"{field.name}={_notation(item)}"
+            )
+            for field, item in fields
+            if item != field.default
+        ]
         return f"{type(value).__name__}({', '.join(given)})"
     return repr(value)
 
@@ -110,11 +129,17 @@ def printable(text: str) -> str:
 
 def quotable(text: str) -> str:
     """The printable text, without the middle of words, quotations and paths that are too long."""
-    return _LONG_QUOTATION.sub(lambda part: f"{part[0][: MAX_WORD - 40]}…{part[0][-39:]}", printable(text))
+    return _LONG_QUOTATION.sub(
+        lambda part: f"{part[0][: MAX_WORD - 40]}…{part[0][-39:]}", printable(text)
+    )
 
 
-def listed(names: Iterable[str], characters: int = MAX_LISTED_TEXT, longest: int = MAX_LISTED_NAME) -> str:
-    """Names of a file, such as its headings, for a message: the first ones in so many characters, and how many more."""
+def listed(
+    names: Iterable[str], characters: int = MAX_LISTED_TEXT, longest: int = MAX_LISTED_NAME
+) -> str:
+    """Names of a file, such as its headings, for a message: the first ones in so many characters,
+    and how many more.
+    """
     all_names = [name if len(name) <= longest else f"{name[: longest - 1]}…" for name in names]
     ends = itertools.accumulate(len(name) + 2 for name in all_names)
     count = min(MAX_LISTED, max(sum(end <= characters for end in ends), 1))
@@ -123,8 +148,8 @@ def listed(names: Iterable[str], characters: int = MAX_LISTED_TEXT, longest: int
 
 
 def _escape(character: str) -> str:
-    """A character, an escape of one that cannot be printed; a byte that could not be decoded (U+DC80 to U+DCFF, PEP
-    383) is written as that byte."""
+    """A character, an escape of one that cannot be printed; a byte that could not be decoded
+    (U+DC80 to U+DCFF, PEP 383) is written as that byte."""
     if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
         return character
     code = ord(character)
@@ -134,10 +159,12 @@ def _escape(character: str) -> str:
 
 
 class AirmuscleError(Exception):
-    """Base class of all exceptions of airmuscle; a message may quote a file, so control characters are escaped.
+    """Base class of all exceptions of airmuscle; a message may quote a file, so control characters
+    are escaped.
 
     message  location, cause and allowed values; a HintedText keeps its hints
-    hint     the remedy, if it is an argument of a public function; it becomes the last sentence of the message
+    hint     the remedy, if it is an argument of a public function; it becomes the last sentence of
+    the message
     """
 
     def __init__(self, message: str = "", *, hint: Hint | None = None) -> None:
@@ -163,7 +190,9 @@ class AirmuscleError(Exception):
 
 
 class AirmuscleWarning(UserWarning):
-    """Warning about a result that may differ from what the user expects; the message states the cause."""
+    """Warning about a result that may differ from what the user expects; the message states the
+    cause.
+    """
 
 
 class InputError(AirmuscleError):
@@ -207,7 +236,9 @@ class GeometryLimitError(PhysicsError):
 
 
 class RatingError(PhysicsError):
-    """An operating point that the maker of the muscle does not permit, outside the range of the measurements."""
+    """An operating point that the maker of the muscle does not permit, outside the range of the
+    measurements.
+    """
 
 
 class EquilibriumError(PhysicsError):
@@ -232,7 +263,8 @@ class IdentificationError(AirmuscleError):
 class SimulationError(AirmuscleError):
     """A simulation ended early.
 
-    `solution` is the Solution of the partial results, or None; `interrupted` is true if the user stopped the run.
+    `solution` is the Solution of the partial results, or None; `interrupted` is true if the user
+    stopped the run.
     """
 
     def __init__(self, message: str, solution: Any = None, *, interrupted: bool = False) -> None:
@@ -247,27 +279,43 @@ class SimulationError(AirmuscleError):
 
 
 def alternatives(name: str, known: Iterable[str], introduction: str = "there are") -> str:
-    """What follows an unknown name in a message: the known names, abridged if there are many, and the closest one."""
+    """What follows an unknown name in a message: the known names, abridged if there are many, and
+    the closest one.
+    """
     names = list(known)
     stems: dict[str, list[str]] = {}
     for each in names:
         stems.setdefault(re.sub(r"\[\d+\]", "[]", each), []).append(each)
-    shown = [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]
-    return f"; {introduction} {listed(shown, longest=MAX_WORD) or 'none'}.{suggestion(str(name), names)}"
+    shown = [
+        group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()
+    ]
+    return (
+        f"; {introduction}"
+        f" {listed(shown, longest=MAX_WORD) or 'none'}.{suggestion(str(name), names)}"
+    )
 
 
 def check_known(
-    missing: str, names: str | Iterable[str], known: Collection[str], introduction: str = "there are",
+    missing: str,
+    names: str | Iterable[str],
+    known: Collection[str],
+    introduction: str = "there are",
     error: type[AirmuscleError] = ParameterError,
-) -> None:  # fmt: skip
-    """Raise an error, "no input 'x'; there are a, b.", with the nearest name, for the first name that is not known."""
+) -> None:
+    """Raise an error, "no input 'x'; there are a, b.", with the nearest name, for the first name
+    that is not known.
+    """
     for name in names if isinstance(names, Iterable) and not isinstance(names, str) else (names,):
         if name not in known:
             raise error(f"{missing} '{name}'{alternatives(str(name), known, introduction)}")
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return a sentence that suggests the closest known name, or a path that ends with the name, or an empty string."""
+    """Return a sentence that suggests the closest known name, or a path that ends with the name, or
+    an empty string.
+    """
     names = list(known)
-    matches = difflib.get_close_matches(str(name), names, n=1) or [each for each in names if each.endswith(f".{name}")]
+    matches = difflib.get_close_matches(str(name), names, n=1) or [
+        each for each in names if each.endswith(f".{name}")
+    ]
     return f" Did you mean '{matches[0]}'?" if matches else ""

@@ -1,7 +1,8 @@
 """Mathematical functions over floats, NumPy arrays, CasADi symbols and JAX arrays.
 
-Each function selects the library by the type of its operands: floats and NumPy arrays are evaluated at once, CasADi
-symbols are traced, JAX arrays are passed to jax.numpy. Models are written with these functions and + - * / **.
+Each function selects the library by the type of its operands: floats and NumPy arrays are evaluated
+at once, CasADi symbols are traced, JAX arrays are passed to jax.numpy. Models are written with
+these functions and + - * / **.
 """
 
 import math
@@ -21,12 +22,17 @@ Values = Mapping[str, Value]
 
 pi = math.pi
 _PLAIN = frozenset({float, int, bool})
-"""Types of plain numbers, which need no library; a controller calls these functions dozens of times for each sample."""
+"""Types of plain numbers, which need no library; a controller calls these functions dozens of times
+for each sample.
+"""
 
 
-_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
+_SMALLEST = sys.float_info.min
+_LARGEST = sys.float_info.max
 _DOMAINS = {
-    **dict.fromkeys(("sin", "cos", "tan", "arctan", "arcsinh", "tanh", "floor"), (-_LARGEST, _LARGEST)),
+    **dict.fromkeys(
+        ("sin", "cos", "tan", "arctan", "arcsinh", "tanh", "floor"), (-_LARGEST, _LARGEST)
+    ),
     **dict.fromkeys(("exp", "expm1", "sinh", "cosh"), (-700.0, 700.0)),
     **dict.fromkeys(("arcsin", "arccos"), (-1.0, 1.0)),
     "sqrt": (0.0, _LARGEST),
@@ -57,9 +63,10 @@ def _check_double(array: Any) -> None:
     dtype = np.dtype(array.dtype)
     if dtype.kind not in "biuf" or (dtype.kind == "f" and dtype.itemsize < 8):
         raise ParameterError(
-            f"an equation received a JAX array of the type {dtype}; it must be float64, because pressures, lengths and "
-            'rates are differences of nearly equal numbers. Write jax.config.update("jax_enable_x64", True) before the '
-            "first array is made, and omit dtype=float32."
+            f"an equation received a JAX array of the type {dtype}; it must be float64, because"
+            " pressures, lengths and rates are differences of nearly equal numbers. Write"
+            ' jax.config.update("jax_enable_x64", True) before the first array is made, and omit'
+            " dtype=float32."
         )
 
 
@@ -80,14 +87,18 @@ def where(condition: Value, when_true: Value, when_false: Value) -> Value:
 
 
 def maximum(a: Value, b: Value) -> Value:
-    """The larger of two values, or NaN; traced as a comparison whose derivative at equality is that of `a`."""
+    """The larger of two values, or NaN; traced as a comparison whose derivative at equality is that
+    of `a`.
+    """
     if type(a) in _PLAIN and type(b) in _PLAIN:
         return b if b > a or b != b else a
     return np.maximum(a, b) if _library(a, b) is np else where(a >= b, a, b)
 
 
 def minimum(a: Value, b: Value) -> Value:
-    """The smaller of two values, or NaN; traced as a comparison whose derivative at equality is that of `b`."""
+    """The smaller of two values, or NaN; traced as a comparison whose derivative at equality is
+    that of `b`.
+    """
     if type(a) in _PLAIN and type(b) in _PLAIN:
         return b if a >= b or b != b else a
     return np.minimum(a, b) if _library(a, b) is np else where(a >= b, b, a)
@@ -120,7 +131,9 @@ def either(a: Value, b: Value) -> Value:
 
 
 def hypot(x: Value, y: Value) -> Value:
-    """Square root of x^2 + y^2; v/hypot(v, v_0) is a smooth sign of a speed v whose transition is v_0 wide."""
+    """Square root of x^2 + y^2; v/hypot(v, v_0) is a smooth sign of a speed v whose transition is
+    v_0 wide.
+    """
     return sqrt(x * x + y * y)
 
 
@@ -133,7 +146,9 @@ def polynomial(coefficients: Sequence[Value], x: Value) -> Value:
 
 
 def _elementary(name: str, meaning: str) -> Callable[[Value], Value]:
-    """A function of the library of its operand; of a number outside its domain NaN or infinity, without a warning."""
+    """A function of the library of its operand; of a number outside its domain NaN or infinity,
+    without a warning.
+    """
     low, high = _DOMAINS[name]
     of_number = getattr(np, name)
 

@@ -1,4 +1,6 @@
-"""Plot style shared by all figures: size, fonts, colours suited to print and colour blindness; axes of a caller."""
+"""Plot style shared by all figures: size, fonts, colours suited to print and colour blindness; axes
+of a caller.
+"""
 
 import functools
 import io
@@ -11,9 +13,14 @@ from .annotation import abridged
 from .display import heading_scale
 from .errors import ParameterError
 
-BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
-    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
-)  # fmt: skip
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+BLUE = "#0072B2"
+RED = "#D55E00"
+PURPLE = "#CC79A7"
 """Colour palette of Okabe and Ito (2008)."""
 
 LINES = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY, BLACK)
@@ -23,23 +30,40 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)
 MARKERS = ("o", "s", "^", "D", "v", "x", "+")
 """Markers in the order of the curves."""
 MAX_VECTOR_MARKERS = 2000
-"""Number of markers in a figure above which they are an image in SVG files (chosen): as vectors they take most of the
-time of a report, and a browser draws them slowly."""
+"""Number of markers in a figure above which they are an image in SVG files (chosen): as vectors
+they take most of the time of a report, and a browser draws them slowly."""
 
 _STYLE: Any = {
-    "font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "legend.fontsize": 8, "xtick.labelsize": 8,
-    "ytick.labelsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
-    "grid.alpha": 0.25, "grid.linewidth": 0.5, "lines.linewidth": 1.4, "lines.markersize": 4,
-    "legend.frameon": False, "figure.dpi": 110, "savefig.dpi": 200, "svg.hashsalt": "airmuscle",
-    "svg.fonttype": "path", "figure.autolayout": False, "figure.constrained_layout.use": False,
-}  # fmt: skip
+    "font.size": 9,
+    "axes.titlesize": 9,
+    "axes.labelsize": 9,
+    "legend.fontsize": 8,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.4,
+    "lines.markersize": 4,
+    "legend.frameon": False,
+    "figure.dpi": 110,
+    "savefig.dpi": 200,
+    "svg.hashsalt": "airmuscle",
+    "svg.fonttype": "path",
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
+}
 
 
-def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: float = 3.6, **subplots: Any) -> Any:
+def new_figure(
+    rows: int = 1, columns: int = 1, *, width: float = 6.3, height: float = 3.6, **subplots: Any
+) -> Any:
     """Return a Matplotlib figure and its axes in the shared style with constrained layout.
 
-    `width` and `height` are in inches. The figure has no window and no global state; write it with `save`. As the last
-    line of a cell of a notebook it shows its picture.
+    `width` and `height` are in inches. The figure has no window and no global state; write it with
+    `save`. As the last line of a cell of a notebook it shows its picture.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -49,7 +73,9 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: f
         figure: Any = Figure(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(rows, columns, **subplots)
-    figure._repr_png_ = functools.partial(_picture, figure)  # asked for by IPython, which knows figures of pyplot only
+    figure._repr_png_ = functools.partial(
+        _picture, figure
+    )  # asked for by IPython, which knows figures of pyplot only
     return figure, axes
 
 
@@ -75,21 +101,33 @@ def rendered(
 
     relabel_in_display_units(figure.axes)
     _apply_text_style(figure)
-    lines = [line for axes in figure.axes for line in axes.lines if line.get_linestyle() in ("None", "none", "", " ")]
+    lines = [
+        line
+        for axes in figure.axes
+        for line in axes.lines
+        if line.get_linestyle() in ("None", "none", "", " ")
+    ]
     if sum(len(line.get_xdata(orig=False)) for line in lines) > MAX_VECTOR_MARKERS:
         for line in lines:
             line.set_rasterized(True)
     files = {}
     layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
-        if layout is not None and dots_per_inch is None:  # with an engine, `savefig` would draw the figure once more
+        if (
+            layout is not None and dots_per_inch is None
+        ):  # with an engine, `savefig` would draw the figure once more
             figure.draw_without_rendering()
             figure.set_layout_engine(None)
         try:
             for name in formats:
                 buffer = io.BytesIO()
                 options = {"dpi": dots_per_inch} if dots_per_inch else {}
-                figure.savefig(buffer, format=name, metadata={"Date": None} if name == "svg" else None, **options)
+                figure.savefig(
+                    buffer,
+                    format=name,
+                    metadata={"Date": None} if name == "svg" else None,
+                    **options,
+                )
                 files[name] = buffer.getvalue()
         finally:
             if layout is not None and dots_per_inch is None:
@@ -98,8 +136,13 @@ def rendered(
 
 
 def _apply_text_style(figure: Any) -> None:
-    """Set the font sizes of titles and legends, which Matplotlib takes from the global style on creation."""
-    legends = [*figure.legends, *(a.get_legend() for a in figure.axes if a.get_legend() is not None)]
+    """Set the font sizes of titles and legends, which Matplotlib takes from the global style on
+    creation.
+    """
+    legends = [
+        *figure.legends,
+        *(a.get_legend() for a in figure.axes if a.get_legend() is not None),
+    ]
     for legend in legends:
         legend.set_frame_on(False)
         for text in (*legend.get_texts(), legend.get_title()):
@@ -109,9 +152,14 @@ def _apply_text_style(figure: Any) -> None:
 
 
 def legend_outside(axes: Any, **options: Any) -> Any:
-    """Add a legend to the right of the axes, where it covers no data; inside those of a caller without a layout, of
-    whose figure it would be cut off."""
-    style = {"fontsize": 8, "title_fontsize": 8, "frameon": False, **options}  # the shared style ends with `new_figure`
+    """Add a legend to the right of the axes, where it covers no data; inside those of a caller
+    without a layout, of whose figure it would be cut off."""
+    style = {
+        "fontsize": 8,
+        "title_fontsize": 8,
+        "frameon": False,
+        **options,
+    }  # the shared style ends with `new_figure`
     if axes.get_figure(root=True).get_layout_engine() is None:
         return axes.legend(loc="best", **style)
     return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **style)
@@ -120,30 +168,42 @@ def legend_outside(axes: Any, **options: Any) -> Any:
 def legend_below(figure: Any, axes: Any, columns: int = 2) -> Any:
     """Add one legend below all axes of a figure, with the curves of one of them."""
     handles, labels = axes.get_legend_handles_labels()
-    return figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
+    return figure.legend(
+        handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8
+    )
 
 
 def given_axes(ax: Any, count: int, what: str) -> list[Any]:
-    """The Matplotlib axes that a caller gives as `ax`: one Axes, or a sequence or an array of at least `count`.
+    """The Matplotlib axes that a caller gives as `ax`: one Axes, or a sequence or an array of at
+    least `count`.
 
     `what` is named in messages. Raises ParameterError for anything else.
     """
     given = ax.ravel() if isinstance(ax, np.ndarray) else ax
-    axes = list(given) if isinstance(given, np.ndarray | Sequence) and not isinstance(given, str | bytes) else [given]
+    axes = (
+        list(given)
+        if isinstance(given, np.ndarray | Sequence) and not isinstance(given, str | bytes)
+        else [given]
+    )
     if not all(hasattr(item, "plot") and hasattr(item, "set_xlabel") for item in axes):
-        raise ParameterError(f"{what}: ax is {abridged(ax)}; it must be a Matplotlib Axes or a sequence of Axes.")
+        raise ParameterError(
+            f"{what}: ax is {abridged(ax)}; it must be a Matplotlib Axes or a sequence of Axes."
+        )
     if len(axes) < count:
         raise ParameterError(
-            f"{what}: {count} panels need {count} Axes, but {len(axes)} {'is' if len(axes) == 1 else 'are'} given; "
-            f"allowed range: at least {count}. Name fewer columns, or make them with plt.subplots({count}, 1)."
+            f"{what}: {count} panels need {count} Axes, but {len(axes)}"
+            f" {'is' if len(axes) == 1 else 'are'} given; allowed range: at least {count}. Name"
+            f" fewer columns, or make them with plt.subplots({count}, 1)."
         )
     return axes
 
 
 def relabel_in_display_units(many: Iterable[Any]) -> None:
-    """Relabel Matplotlib axes whose label ends with a unit, `pressure [kPa]`, in the chosen display unit.
+    """Relabel Matplotlib axes whose label ends with a unit, `pressure [kPa]`, in the chosen display
+    unit.
 
-    The data stay as they are; ticks are placed at round numbers of the chosen unit. Nothing changes without a choice.
+    The data stay as they are; ticks are placed at round numbers of the chosen unit. Nothing changes
+    without a choice.
     """
     for axes in many:
         for axis in (axes.xaxis, axes.yaxis):
@@ -163,4 +223,6 @@ def _rescale_ticks(axis: Any, factor: float) -> None:
             return np.asarray(self.tick_values(factor * low, factor * high)) / factor
 
     axis.set_major_locator(ScaledLocator(nbins=7, steps=[1, 2, 2.5, 5, 10]))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{round(factor * value, 9) + 0.0:g}".replace("-", "−")))
+    axis.set_major_formatter(
+        FuncFormatter(lambda value, _: f"{round(factor * value, 9) + 0.0:g}".replace("-", "−"))
+    )

@@ -15,7 +15,8 @@ from .errors import ParameterError
 class Reference:
     """A paper, standard or data source.
 
-    `where` is the journal, proceedings, report or standard; `note` states what was taken from it, and its reliability.
+    `where` is the journal, proceedings, report or standard; `note` states what was taken from it,
+    and its reliability.
     """
 
     key: str
@@ -43,7 +44,9 @@ def _bibliography() -> Mapping[str, Mapping[str, Any]]:
 
 
 def published(key: str, note: str = "") -> Reference:
-    """The reference of a key in `references.json`, the bibliography of the program; `note` replaces its note."""
+    """The reference of a key in `references.json`, the bibliography of the program; `note` replaces
+    its note.
+    """
     found = Reference(key, **_bibliography()[key])
     return dataclasses.replace(found, note=note or found.note)
 
@@ -67,15 +70,19 @@ def _walk(obj: Any) -> Iterator[Reference]:
 
 
 def cite(obj: Any) -> list[Reference]:
-    """Return the references of an object and of all its components, without repetitions, sorted by key.
+    """Return the references of an object and of all its components, without repetitions, sorted by
+    key.
 
-    `obj` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a recording, a library entry, or a
-    tuple of them. Recordings have the references of a published data set, or of the models of a simulation.
-    Raises ParameterError for anything else, such as a name.
+    `obj` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a recording, a
+    library entry, or a tuple of them. Recordings have the references of a published data set, or of
+    the models of a simulation. Raises ParameterError for anything else, such as a name.
     """
-    if not (dataclasses.is_dataclass(obj) or isinstance(obj, tuple | list) or hasattr(obj, "references")):
+    if not (
+        dataclasses.is_dataclass(obj) or isinstance(obj, tuple | list) or hasattr(obj, "references")
+    ):
         raise ParameterError(
-            f"cite: {obj!r} is not a model; load a library entry by its name: cite(load('dmsp-20-300'))."
+            f"cite: {obj!r} is not a model; load a library entry by its name:"
+            " cite(load('dmsp-20-300'))."
         )
     by_key = {reference.key: reference for reference in _walk(obj)}
     return [by_key[key] for key in sorted(by_key)]

@@ -1,4 +1,6 @@
-"""Short representation of results: class, fields with values, and the shapes of arrays, on at most ten lines."""
+"""Short representation of results: class, fields with values, and the shapes of arrays, on at most
+ten lines.
+"""
 
 import dataclasses
 import textwrap
@@ -16,18 +18,26 @@ MAX_VALUE = 60
 WIDTH = 100
 """Characters of a line."""
 MAX_DESCRIPTION = 300
-"""Characters above which a description names the parts of a model without their numbers (chosen)."""
+"""Characters above which a description names the parts of a model without their numbers
+(chosen).
+"""
 
 
 class ShortRepr:
-    """Base of results whose complete content would fill pages: their `repr` names each field on at most ten lines."""
+    """Base of results whose complete content would fill pages: their `repr` names each field on at
+    most ten lines.
+    """
 
     def __repr__(self) -> str:
         fields = [f.name for f in dataclasses.fields(self) if f.repr]  # type: ignore[arg-type]
         items = [f"{name}={_value(getattr(self, name))}" for name in fields]
         text = f"{type(self).__name__}({', '.join(items)})"
-        lines = textwrap.wrap(text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-        return "\n".join(lines if len(lines) <= MAX_LINES else [*lines[: MAX_LINES - 1], "    ...)"])
+        lines = textwrap.wrap(
+            text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+        )
+        return "\n".join(
+            lines if len(lines) <= MAX_LINES else [*lines[: MAX_LINES - 1], "    ...)"]
+        )
 
 
 def _value(value: Any) -> str:
@@ -43,7 +53,11 @@ def _value(value: Any) -> str:
     if isinstance(value, tuple | list):
         return _sequence(value)
     if is_model(value):
-        return f"{type(value).__name__}(...)" if dataclasses.fields(value) else f"{type(value).__name__}()"
+        return (
+            f"{type(value).__name__}(...)"
+            if dataclasses.fields(value)
+            else f"{type(value).__name__}()"
+        )
     return textwrap.shorten(" ".join(repr(value).split()), MAX_VALUE, placeholder=" ...")
 
 
@@ -58,8 +72,10 @@ def _sequence(value: tuple[Any, ...] | list[Any]) -> str:
 
 
 def describe_model(model: Any) -> str:
-    """A model in one line: its class and the fields that differ from their defaults, or only the classes of its parts
-    if that line were too long; reports have all numbers. Floats have twelve digits, without the rounding of units."""
+    """A model in one line: its class and the fields that differ from their defaults, or only the
+    classes of its parts if that line were too long; reports have all numbers. Floats have twelve
+    digits, without the rounding of units.
+    """
     text = _described(model)
     return text if len(text) <= MAX_DESCRIPTION else _structure(model)
 
@@ -73,8 +89,13 @@ def _described(value: Any) -> str:
         return repr(value)
     texts = []
     for field in dataclasses.fields(value):
-        each, default = getattr(value, field.name), field.default
-        is_default = type(each) is type(default) and not isinstance(each, np.ndarray) and bool(each == default)
+        each = getattr(value, field.name)
+        default = field.default
+        is_default = (
+            type(each) is type(default)
+            and not isinstance(each, np.ndarray)
+            and bool(each == default)
+        )
         if field.repr and not is_default:
             texts.append(f"{field.name}={_described(each)}")
     return f"{type(value).__name__}({', '.join(texts)})"
@@ -83,5 +104,10 @@ def _described(value: Any) -> str:
 def _structure(model: Any) -> str:
     """The class of a model with those of its parts."""
     values = [getattr(model, field.name) for field in dataclasses.fields(model)]
-    parts = [item for each in values for item in (each if isinstance(each, tuple) else (each,)) if is_model(item)]
+    parts = [
+        item
+        for each in values
+        for item in (each if isinstance(each, tuple) else (each,))
+        if is_model(item)
+    ]
     return type(model).__name__ + (f"({', '.join(map(_structure, parts))})" if parts else "")

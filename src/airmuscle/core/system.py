@@ -1,4 +1,6 @@
-"""System: ordinary differential equations with named states, inputs and outputs, written over `ops`."""
+"""System: ordinary differential equations with named states, inputs and outputs, written over
+`ops`.
+"""
 
 import abc
 import dataclasses
@@ -19,7 +21,9 @@ T = TypeVar("T", "StateVariable", "Input")
 
 @dataclasses.dataclass(frozen=True)
 class StateVariable:
-    """A state: its name, its unit, and the nominal size below which its relative error does not matter."""
+    """A state: its name, its unit, and the nominal size below which its relative error does not
+    matter.
+    """
 
     name: str
     unit: str
@@ -40,12 +44,18 @@ class Input:
 
 def add_prefix(prefix: str, variables: tuple[T, ...]) -> tuple[T, ...]:
     """Return the variables with a prefix before each name."""
-    return tuple(dataclasses.replace(variable, name=f"{prefix}{variable.name}") for variable in variables)
+    return tuple(
+        dataclasses.replace(variable, name=f"{prefix}{variable.name}") for variable in variables
+    )
 
 
 def select_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return the values whose names begin with the prefix, keyed by the remaining names."""
-    return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}
+    return {
+        name.removeprefix(prefix): value
+        for name, value in values.items()
+        if name.startswith(prefix)
+    }
 
 
 def with_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -59,10 +69,11 @@ def united(*names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 class System(abc.ABC):
-    """Ordinary differential equations x' = f(x, u, t) of a frozen model; its declared parameters are the program's.
+    """Ordinary differential equations x' = f(x, u, t) of a frozen model; its declared parameters
+    are the program's.
 
-    Every mapping is keyed by the names that `states` and `inputs` list. Rates must be continuous in the states.
-    A system of your own declares the four abstract members; the others have defaults.
+    Every mapping is keyed by the names that `states` and `inputs` list. Rates must be continuous in
+    the states. A system of your own declares the four abstract members; the others have defaults.
     """
 
     @property
@@ -84,7 +95,9 @@ class System(abc.ABC):
         """Output quantities at a state."""
 
     def rates_and_outputs(self, state: Values, inputs: Values) -> tuple[Values, Values]:
-        """The rates and the outputs; a system in which they share quantities computes these once."""
+        """The rates and the outputs; a system in which they share quantities computes these
+        once.
+        """
         return self.rates(state, inputs), self.outputs(state, inputs)
 
     @property
@@ -110,7 +123,9 @@ class System(abc.ABC):
 
     @property
     def column_limits(self) -> Sequence[ColumnLimit]:
-        """Limits of states and outputs beyond which the model is not valid, or a component is not permitted."""
+        """Limits of states and outputs beyond which the model is not valid, or a component is not
+        permitted.
+        """
         return ()
 
     @property
@@ -123,8 +138,8 @@ class System(abc.ABC):
         return None
 
     def default_states(self, parameters: Array) -> Array | None:
-        """The default initial states (N, n) of systems of this structure with parameters (N, P); NaN where there is
-        none, None where a run must be given one."""
+        """The default initial states (N, n) of systems of this structure with parameters (N, P);
+        NaN where there is none, None where a run must be given one."""
         return None
 
     def affects_default_state(self, path: str) -> bool:
@@ -132,14 +147,18 @@ class System(abc.ABC):
         return True
 
     def check_state(self, state: Mapping[str, float]) -> None:  # noqa: B027 - every state is possible by default
-        """Raise ParameterError or GeometryLimitError for a state that is impossible; names and signs were checked."""
+        """Raise ParameterError or GeometryLimitError for a state that is impossible; names and
+        signs were checked.
+        """
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """Assumptions of the model that limit the use of a result."""
         return ()
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
-        """Diagnostics of the rows of a run, columns (N,) by name, in which the model is not valid."""
+        """Diagnostics of the rows of a run, columns (N,) by name, in which the model is not
+        valid.
+        """
         return []
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
@@ -148,9 +167,11 @@ class System(abc.ABC):
 
 
 class SensitivitySystem(System):
-    """A system with the states of another one, followed by their derivatives along columns, state by state.
+    """A system with the states of another one, followed by their derivatives along columns, state
+    by state.
 
-    It is a System like any other; its program is generated from the inner one, which costs less than its own rates.
+    It is a System like any other; its program is generated from the inner one, which costs less
+    than its own rates.
     """
 
     inner: System
@@ -165,7 +186,8 @@ class SensitivitySystem(System):
     def input_indices(self) -> tuple[int, ...]:
         """The indices of the inner inputs that depend on the columns; none by default.
 
-        Their derivatives by every column, input by input, are further inputs behind those of the inner system.
+        Their derivatives by every column, input by input, are further inputs behind those of the
+        inner system.
         """
         return ()
 
@@ -183,20 +205,22 @@ class SensitivitySystem(System):
 def check_system(what: str, given: object) -> None:
     """Raise ParameterError for anything that is not a System, such as a muscle or a class."""
     if not isinstance(given, System):
-        raise ParameterError(f"{what}: {one_line(given)} is no plant; give Plant(muscle, circuit, mechanism).")
+        raise ParameterError(
+            f"{what}: {one_line(given)} is no plant; give Plant(muscle, circuit, mechanism)."
+        )
 
 
 def state_vector(system: System, state: Mapping[str, float]) -> Array:
     """The values (n,) of a state, in the order of the system's states.
 
-    Raises ParameterError for an unknown or missing name, a value that is no finite number, and a value below the lower
-    bound of its state, such as a negative air mass.
+    Raises ParameterError for an unknown or missing name, a value that is no finite number, and a
+    value below the lower bound of its state, such as a negative air mass.
     """
     names = [s.name for s in system.states]
     if not isinstance(state, Mapping):
         raise ParameterError(
-            f"the initial state is {abridged(state)}; give a value for each name, as plant.state_at(...) and "
-            "find_equilibrium(...) do."
+            f"the initial state is {abridged(state)}; give a value for each name, as"
+            " plant.state_at(...) and find_equilibrium(...) do."
         )
     if len(state) != len(names) or any(name not in state for name in names):
         for name in (n for n in state if n not in names):
@@ -206,16 +230,20 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
             )
         missing = ", ".join(name for name in names if name not in state)
         raise ParameterError(
-            f"the initial state lacks {missing}; use plant.state_at(pressure=...) or find_equilibrium."
+            f"the initial state lacks {missing}; use plant.state_at(pressure=...) or"
+            " find_equilibrium."
         )
-    values = np.array([as_float(f"the initial state's {name}", state[name]) for name in names], dtype=float)
+    values = np.array(
+        [as_float(f"the initial state's {name}", state[name]) for name in names], dtype=float
+    )
     if not np.isfinite(values).all():
         raise ParameterError(
-            f"the initial state must be finite; it is {dict(zip(names, values.tolist(), strict=True))}."
+            "the initial state must be finite; it is"
+            f" {dict(zip(names, values.tolist(), strict=True))}."
         )
     for i in np.flatnonzero(values < np.asarray(system.state_lower_bounds)):
         raise ParameterError(
-            f"the initial state's {names[i]} is {values[i]:.4g} {system.states[i].unit}; it must not be negative. Use "
-            "plant.state_at(pressure=...)."
+            f"the initial state's {names[i]} is {values[i]:.4g} {system.states[i].unit}; it must"
+            " not be negative. Use plant.state_at(pressure=...)."
         )
     return values

@@ -1,8 +1,9 @@
-"""Parameter trees: leaves, flatten and unflatten of frozen models (pytrees); fingerprints of models and of the program.
+"""Parameter trees: leaves, flatten and unflatten of frozen models (pytrees); fingerprints of models
+and of the program.
 
-A declared field of a model is a leaf (a float or a tuple of floats); any other field is structure: another model, a
-tuple of models, a whole number, a name. What is derived from a model is stored with the object, so that a variant made
-by `dataclasses.replace` derives anew only what changed.
+A declared field of a model is a leaf (a float or a tuple of floats); any other field is structure:
+another model, a tuple of models, a whole number, a name. What is derived from a model is stored
+with the object, so that a variant made by `dataclasses.replace` derives anew only what changed.
 """
 
 import dataclasses
@@ -36,7 +37,9 @@ class Leaf:
 
 
 class Structure:
-    """Everything about a model but the values of its parameters; models of equal structure share one object."""
+    """Everything about a model but the values of its parameters; models of equal structure share
+    one object.
+    """
 
     __slots__ = ("_parts",)
 
@@ -81,7 +84,10 @@ def _node(obj: Any) -> _Node:
     """The node of a model, which is stored with it, or of any other value of a structural field."""
     if isinstance(obj, tuple):
         nodes = [_node(item) for item in obj]
-        return _Node(_intern((tuple, *(n.structure for n in nodes))), tuple(v for n in nodes for v in n.values))
+        return _Node(
+            _intern((tuple, *(n.structure for n in nodes))),
+            tuple(v for n in nodes for v in n.values),
+        )
     kind: Any = type(obj)
     if not is_model(obj):
         try:
@@ -91,7 +97,8 @@ def _node(obj: Any) -> _Node:
     stored: _Node | None = obj.__dict__.get(_STORED)
     if stored is not None:
         return stored
-    parts, values = [kind], list[Any]()
+    parts = [kind]
+    values = list[Any]()
     for name, declared in _fields(kind) or ():
         value = getattr(obj, name)
         if declared is None:
@@ -107,7 +114,9 @@ def _node(obj: Any) -> _Node:
 
 
 def structure(obj: Any) -> Structure:
-    """Return the structure of a model; models of equal structure share one object, which is a fast key."""
+    """Return the structure of a model; models of equal structure share one object, which is a fast
+    key.
+    """
     return _node(obj).structure
 
 
@@ -124,7 +133,8 @@ def leaves(obj: Any, path: str = "") -> Iterator[Leaf]:
     else:
         kind: Any = type(obj)
         for name, declared in _fields(kind) or ():
-            value, inner = getattr(obj, name), f"{path}.{name}" if path else name
+            value = getattr(obj, name)
+            inner = f"{path}.{name}" if path else name
             if declared is None:
                 yield from leaves(value, inner)
             elif isinstance(value, tuple):
@@ -134,7 +144,9 @@ def leaves(obj: Any, path: str = "") -> Iterator[Leaf]:
 
 
 def unflatten(obj: T, values: Sequence[Any]) -> T:
-    """Return the model with other leaf values, in the order of `leaves`; values, such as symbols, are not validated."""
+    """Return the model with other leaf values, in the order of `leaves`; values, such as symbols,
+    are not validated.
+    """
     rebuilt: T = _unflatten(obj, iter(values))
     return rebuilt
 
@@ -169,24 +181,33 @@ def _unflatten(obj: Any, values: Iterator[Any]) -> Any:
 
 
 def absolute_pressures(obj: Any, varied: Mapping[str, Any]) -> dict[str, Any]:
-    """Gauge pressures [Pa] of the leaves that were stated as absolute, by path, where the ambient pressure is varied.
+    """Gauge pressures [Pa] of the leaves that were stated as absolute, by path, where the ambient
+    pressure is varied.
 
-    `varied` are the values of the varied leaves by path, numbers or columns; a leaf in it is not among the result.
+    `varied` are the values of the varied leaves by path, numbers or columns; a leaf in it is not
+    among the result.
     """
     known = list(leaves(obj))
-    ambient = next((varied[x.path] for x in known if x.declared.unit == ABSOLUTE and x.path in varied), None)
+    ambient = next(
+        (varied[x.path] for x in known if x.declared.unit == ABSOLUTE and x.path in varied), None
+    )
     stated = [x for x in known if isinstance(x.value, AbsolutePressure) and x.path not in varied]
     return {} if ambient is None else {x.path: x.value.absolute - ambient for x in stated}
 
 
 def with_parameters(obj: T, values: Sequence[float]) -> T:
-    """Return the model with other leaf values, validated like a new object. Raises ParameterError."""
-    checked: T = _revalidate(unflatten(obj, [v if isinstance(v, AbsolutePressure) else float(v) for v in values]))
+    """Return the model with other leaf values, validated like a new object. Raises
+    ParameterError.
+    """
+    checked: T = _revalidate(
+        unflatten(obj, [v if isinstance(v, AbsolutePressure) else float(v) for v in values])
+    )
     return checked
 
 
 def with_ambient(obj: T, ambient: float) -> T:
-    """Return the model with its absolute pressures converted with an ambient pressure [Pa]; `obj` if that is so.
+    """Return the model with its absolute pressures converted with an ambient pressure [Pa]; `obj`
+    if that is so.
 
     Raises ParameterError for a gauge pressure that is out of bounds.
     """
@@ -201,7 +222,10 @@ def _revalidate(obj: Any) -> Any:
         return tuple(_revalidate(item) for item in obj)
     if is_model(obj):
         return dataclasses.replace(
-            obj, **{f.name: _revalidate(getattr(obj, f.name)) for f in dataclasses.fields(obj) if f.init}
+            obj,
+            **{
+                f.name: _revalidate(getattr(obj, f.name)) for f in dataclasses.fields(obj) if f.init
+            },
         )
     return obj
 
@@ -213,8 +237,12 @@ NUMERICAL_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
 
 
 def fingerprint(*objects: Any) -> str:
-    """A SHA-256 digest (64 hexadecimal digits) of numbers, texts, tables and models; any change changes it."""
-    text = json.dumps([_to_json(each) for each in objects], ensure_ascii=False, separators=(",", ":"))
+    """A SHA-256 digest (64 hexadecimal digits) of numbers, texts, tables and models; any change
+    changes it.
+    """
+    text = json.dumps(
+        [_to_json(each) for each in objects], ensure_ascii=False, separators=(",", ":")
+    )
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -225,7 +253,11 @@ def _to_json(value: Any) -> Any:
     if isinstance(value, float):
         return float(value).hex()
     if isinstance(value, np.ndarray):
-        return [str(value.dtype), value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest()]
+        return [
+            str(value.dtype),
+            value.shape,
+            hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest(),
+        ]
     if isinstance(value, Mapping):
         return {"keys": [[_to_json(k), _to_json(v)] for k, v in value.items()]}
     if isinstance(value, list | tuple):
@@ -233,18 +265,28 @@ def _to_json(value: Any) -> Any:
     if is_model(value):
         fields = {f.name: _to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
         module = type(value).__module__
-        package = "airmuscle" if module.startswith("airmuscle.") else module  # whose public names are unique
+        package = (
+            "airmuscle" if module.startswith("airmuscle.") else module
+        )  # whose public names are unique
         return [f"{package}.{type(value).__qualname__}", fields]
     return repr(value)  # such as a date in a TOML file
 
 
 @functools.cache
 def program_fingerprint(excluded: tuple[str, ...] = EXCLUDED_ROOMS) -> str:
-    """The fingerprint of the program: its version, its source files, and the versions of the numerical packages.
+    """The fingerprint of the program: its version, its source files, and the versions of the
+    numerical packages.
 
     excluded  rooms of the program that do not affect the results; by default those of a simulation
     """
-    files = [p for p in sorted(PACKAGE_ROOT.rglob("*.py")) if p.relative_to(PACKAGE_ROOT).parts[0] not in excluded]
-    contents = [(p.relative_to(PACKAGE_ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest()) for p in files]
+    files = [
+        p
+        for p in sorted(PACKAGE_ROOT.rglob("*.py"))
+        if p.relative_to(PACKAGE_ROOT).parts[0] not in excluded
+    ]
+    contents = [
+        (p.relative_to(PACKAGE_ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest())
+        for p in files
+    ]
     versions = [(name, metadata.version(name)) for name in NUMERICAL_PACKAGES]
     return fingerprint(metadata.version("airmuscle"), contents, versions)

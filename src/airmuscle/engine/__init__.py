@@ -1,4 +1,6 @@
-"""Engine: compiled systems, input signals and sampled loops, runs, batches and sensitivities of any System."""
+"""Engine: compiled systems, input signals and sampled loops, runs, batches and sensitivities of any
+System.
+"""
 
 from ..core.stubs import attach_stub
 

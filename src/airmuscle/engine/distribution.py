@@ -1,4 +1,6 @@
-"""Distribution of independent calls by an executor, and claims of a process on the tasks of a shared folder."""
+"""Distribution of independent calls by an executor, and claims of a process on the tasks of a
+shared folder.
+"""
 
 import contextlib
 import functools
@@ -22,14 +24,17 @@ Call = Callable[[Any, Any], Any]
 
 
 class Claims:
-    """The claims of a process in a shared folder: files that it creates, renews by their time stamp, and removes.
+    """The claims of a process in a shared folder: files that it creates, renews by their time
+    stamp, and removes.
 
-    A claim that is not renewed for `EXPIRY`, by the clock of this process, is renamed and thereby taken over. If two
-    processes compute a task nevertheless, after a suspension, their results are equal and the file is replaced.
+    A claim that is not renewed for `EXPIRY`, by the clock of this process, is renamed and thereby
+    taken over. If two processes compute a task nevertheless, after a suspension, their results are
+    equal and the file is replaced.
     """
 
     def __init__(self, folder: Path, owner: str) -> None:
-        self._folder, self._owner = folder, owner
+        self._folder = folder
+        self._owner = owner
         self._held: set[str] = set()
         self._seen: dict[str, tuple[int, float]] = {}
         self._renewed = time.monotonic()
@@ -89,21 +94,27 @@ class Claims:
 
 
 class DistributedCalls:
-    """Calls `function(common, task)` by an executor, or one after the other in this process without one.
+    """Calls `function(common, task)` by an executor, or one after the other in this process without
+    one.
 
-    `common` is pickled once, when the first call is sent, and loaded once by each worker. The function is one of a
-    module; its result must not depend on which worker computes it, nor on the calls before.
+    `common` is pickled once, when the first call is sent, and loaded once by each worker. The
+    function is one of a module; its result must not depend on which worker computes it, nor on the
+    calls before.
     """
 
     def __init__(self, executor: Executor | None, function: Call, common: Any) -> None:
-        self._executor, self._function, self._common = executor, function, common
+        self._executor = executor
+        self._function = function
+        self._common = common
 
     @functools.cached_property
     def _pickled(self) -> bytes:
         return pickle.dumps(self._common, protocol=5)
 
     def completed(self, tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """Index and result of each task, as completed. Raises what a call raises; SimulationError at a crash."""
+        """Index and result of each task, as completed. Raises what a call raises; SimulationError
+        at a crash.
+        """
         if self._executor is None:
             yield from ((i, self._function(self._common, task)) for i, task in enumerate(tasks))
             return
@@ -112,17 +123,25 @@ class DistributedCalls:
             for i, task in enumerate(tasks):
                 futures[self._executor.submit(_call, self._function, self._pickled, task)] = i
             for future in as_completed(futures):
-                yield futures.pop(future), future.result()  # removed at once, to bound the memory of a long study
+                yield (
+                    futures.pop(future),
+                    future.result(),
+                )  # removed at once, to bound the memory of a long study
         except BrokenExecutor:
             raise SimulationError(
-                "a worker process died, possibly for lack of memory. Run the same command again, with fewer workers."
+                "a worker process died, possibly for lack of memory. Run the same command again,"
+                " with fewer workers."
             ) from None
         finally:
             for future in futures:
                 future.cancel()
 
-    def results(self, tasks: Sequence[Any], done: Callable[[int], object] = lambda count: None) -> list[Any]:
-        """The results in the order of the tasks; `done` is called with the number of those that are completed."""
+    def results(
+        self, tasks: Sequence[Any], done: Callable[[int], object] = lambda count: None
+    ) -> list[Any]:
+        """The results in the order of the tasks; `done` is called with the number of those that are
+        completed.
+        """
         found: list[Any] = [None] * len(tasks)
         for count, (i, result) in enumerate(self.completed(tasks), 1):
             found[i] = result

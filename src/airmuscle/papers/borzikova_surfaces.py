@@ -1,4 +1,6 @@
-"""Figures of the chapter on Borzíková et al.: Figs. 2 to 5 of the paper, residuals and monotonicity violations."""
+"""Figures of the chapter on Borzíková et al.: Figs. 2 to 5 of the paper, residuals and monotonicity
+violations.
+"""
 
 import dataclasses
 import warnings
@@ -12,7 +14,17 @@ import airmuscle as am
 from ..bench.identify import LoadRange, fit_monotone
 from ..bench.identify.statistics import CorrelationIndex, correlation_index
 from ..core import AirmuscleWarning, Array, autodiff, bar
-from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
+from ..core.plotting import (
+    BLACK,
+    BLUE,
+    DASHES,
+    LINES,
+    MARKERS,
+    ORANGE,
+    RED,
+    legend_outside,
+    new_figure,
+)
 from ..files.library.loading import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 from ..report.chapter import Plot
@@ -43,9 +55,12 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, am.characteristic.Co
     assert isinstance(printed, am.characteristic.BorzikovaDirect)
     assert isinstance(corrected, am.characteristic.BorzikovaDirect)
     assert isinstance(exponential, am.characteristic.BorzikovaExponential)
-    k_max, limits = curves.curves[0].saturation, LoadRange.from_law(printed)
+    k_max = curves.curves[0].saturation
+    limits = LoadRange.from_law(printed)
     return {
-        AS_EXPONENT: am.characteristic.BorzikovaExponential(printed.coefficients, *limits, saturation=k_max),
+        AS_EXPONENT: am.characteristic.BorzikovaExponential(
+            printed.coefficients, *limits, saturation=k_max
+        ),
         PRINTED: printed,
         MISPRINT_CORRECTED: with_a02(printed, CORRECTED_A02),
         CORRECTED: corrected,
@@ -55,7 +70,9 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, am.characteristic.Co
 
 
 def sample(curves: PlaneCurves, points: int = 15) -> am.Recording:
-    """Return a recording of `points` equidistant pressures from zero on every curve, curve after curve."""
+    """Return a recording of `points` equidistant pressures from zero on every curve, curve after
+    curve.
+    """
     pressures = np.linspace(0.0, curves.max_pressure, points)
     return am.Recording(
         {
@@ -69,14 +86,22 @@ def sample(curves: PlaneCurves, points: int = 15) -> am.Recording:
     )
 
 
-def with_a02(law: am.characteristic.BorzikovaDirect, a02: float) -> am.characteristic.BorzikovaDirect:
+def with_a02(
+    law: am.characteristic.BorzikovaDirect, a02: float
+) -> am.characteristic.BorzikovaDirect:
     """Return the surface with another coefficient of F^2."""
-    coefficients = (*law.coefficients[:MISPRINT_INDEX], a02, *law.coefficients[MISPRINT_INDEX + 1 :])
+    coefficients = (
+        *law.coefficients[:MISPRINT_INDEX],
+        a02,
+        *law.coefficients[MISPRINT_INDEX + 1 :],
+    )
     return dataclasses.replace(law, coefficients=coefficients)
 
 
 def index_on_curves(law: am.characteristic.ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
-    """Return the correlation index of a surface at 15 evenly spaced pressures of each plane curve."""
+    """Return the correlation index of a surface at 15 evenly spaced pressures of each plane
+    curve.
+    """
     data = sample(curves)
     return correlation_index(data["contraction"], law.contraction(data["pressure"], data["force"]))
 
@@ -87,20 +112,31 @@ def round_contraction(recording: am.Recording, step: float = 0.005) -> am.Record
 
 
 def add_noise(recording: am.Recording, seed: int, deviation: float = 0.005) -> am.Recording:
-    """Return the recording with normally distributed noise on the contractions, of standard deviation [1]."""
+    """Return the recording with normally distributed noise on the contractions, of standard
+    deviation [1].
+    """
     noise = deviation * np.random.default_rng(seed).standard_normal(len(recording))
     return recording.with_columns(contraction=recording["contraction"] + noise)
 
 
-PRESSURE, FORCE, CONTRACTION = "gauge pressure [bar]", "force [N]", "contraction [%]"
+PRESSURE = "gauge pressure [bar]"
+FORCE = "force [N]"
+CONTRACTION = "contraction [%]"
 
 
 def plots(curves: PlaneCurves, laws: Laws) -> tuple[Plot, ...]:
     """Return all figures of the chapter."""
-    pressures, rows = np.linspace(0.0, curves.max_pressure, 351), curves.curves
-    plane = {f"{c.force:g} N, printed index {c.printed_index:g}": c.contraction(pressures) for c in rows}
-    fitted = {f"{c.force:g} N, monotone fit": laws[MONOTONE].contraction(pressures, c.force) for c in rows}
-    monotone = Plot("borzikova_monotone_fit", _monotone_caption(curves, laws[MONOTONE]), _points(curves, fitted))
+    pressures = np.linspace(0.0, curves.max_pressure, 351)
+    rows = curves.curves
+    plane = {
+        f"{c.force:g} N, printed index {c.printed_index:g}": c.contraction(pressures) for c in rows
+    }
+    fitted = {
+        f"{c.force:g} N, monotone fit": laws[MONOTONE].contraction(pressures, c.force) for c in rows
+    }
+    monotone = Plot(
+        "borzikova_monotone_fit", _monotone_caption(curves, laws[MONOTONE]), _points(curves, fitted)
+    )
     return (
         dead_zone(curves, pressures),
         captioned("borzikova_points", _points(curves, {})),
@@ -115,33 +151,54 @@ def plots(curves: PlaneCurves, laws: Laws) -> tuple[Plot, ...]:
 def dead_zone(curves: PlaneCurves, pressures: Array) -> Plot:
     """Return Fig. 2: dead zone and saturation."""
     figure, axes = new_figure()
-    light, heavy = curves.curves[0], curves.curves[-1]
+    light = curves.curves[0]
+    heavy = curves.curves[-1]
     for curve, colour, dash in ((light, LINES[0], DASHES[0]), (heavy, LINES[1], DASHES[1])):
-        axes.plot(pressures / bar, 100 * curve.contraction(pressures), dash, color=colour, label=f"{curve.force:g} N")
+        axes.plot(
+            pressures / bar,
+            100 * curve.contraction(pressures),
+            dash,
+            color=colour,
+            label=f"{curve.force:g} N",
+        )
     saturation = 100 * light.saturation
-    axes.axhline(saturation, color=BLACK, linewidth=0.8, linestyle=":", label=rf"$k_\mathrm{{max}}$ = {saturation:g} %")
+    axes.axhline(
+        saturation,
+        color=BLACK,
+        linewidth=0.8,
+        linestyle=":",
+        label=rf"$k_\mathrm{{max}}$ = {saturation:g} %",
+    )
     dead = pressures[np.flatnonzero(heavy.contraction(pressures) > 0.01)[0]] / bar
-    axes.axvspan(0, dead, color=ORANGE, alpha=0.2, linewidth=0, label=f"dead zone at {heavy.force:g} N")
+    axes.axvspan(
+        0, dead, color=ORANGE, alpha=0.2, linewidth=0, label=f"dead zone at {heavy.force:g} N"
+    )
     axes.set(xlabel=PRESSURE, ylabel=CONTRACTION, xlim=(0, pressures[-1] / bar))
     legend_outside(axes)
     caption = (
-        "Dead zone and saturation, as in Fig. 2 of the paper, from its plane curves. The dead zone is the pressure "
-        f"range in which the contraction at {heavy.force:g} N is below 1 % (chosen): up to {dead:.2f} bar."
+        "Dead zone and saturation, as in Fig. 2 of the paper, from its plane curves. The dead zone"
+        f" is the pressure range in which the contraction at {heavy.force:g} N is below 1 %"
+        f" (chosen): up to {dead:.2f} bar."
     )
     return Plot("borzikova_dead_zone", caption, figure)
 
 
 def _points(curves: PlaneCurves, lines: Mapping[str, Any]) -> Any:
-    """Draw the points of Fig. 3, and a line of contractions over the pressure for each curve, by its label."""
+    """Draw the points of Fig. 3, and a line of contractions over the pressure for each curve, by
+    its label.
+    """
     figure, axes = new_figure()
     data = sample(curves)
     for curve, colour, marker in zip(curves.curves, LINES, MARKERS, strict=False):
         rows = data.rows(data["force"] == curve.force)
-        x, y = rows["pressure"] / bar, 100 * rows["contraction"]
+        x = rows["pressure"] / bar
+        y = 100 * rows["contraction"]
         axes.plot(x, y, marker, color=colour, label=f"{curve.force:g} N, points of the curve")
     for (label, contraction), colour, dash in zip(lines.items(), LINES, DASHES, strict=False):
         pressures = np.linspace(0.0, curves.max_pressure, len(contraction)) / bar
-        axes.plot(pressures, 100 * np.asarray(contraction), color=colour, linestyle=dash, label=label)
+        axes.plot(
+            pressures, 100 * np.asarray(contraction), color=colour, linestyle=dash, label=label
+        )
     if lines:
         axes.axhline(0.0, color=BLACK, linewidth=0.6)
     axes.set(xlabel=PRESSURE, ylabel=CONTRACTION)
@@ -155,10 +212,11 @@ def _monotone_caption(curves: PlaneCurves, law: am.characteristic.ContractionLaw
     errors = np.asarray(law.contraction(data["pressure"], data["force"])) - data["contraction"]
     worst = int(np.abs(errors).argmax())
     return (
-        f"Monotone fit and plane curves: rms error {100 * np.sqrt(np.mean(errors**2)):.2f} %, maximum error "
-        f"{100 * abs(errors[worst]):.1f} % ({data['pressure'][worst] / bar:.2f} bar, {data['force'][worst]:g} N). A "
-        "polynomial of degree 2 in force cannot follow the curves from 45 to 130 N and remain monotone up to 260 N; "
-        "below 0.28 bar the curves themselves are not monotone."
+        f"Monotone fit and plane curves: rms error {100 * np.sqrt(np.mean(errors**2)):.2f} %,"
+        f" maximum error {100 * abs(errors[worst]):.1f} % ({data['pressure'][worst] / bar:.2f} bar,"
+        f" {data['force'][worst]:g} N). A polynomial of degree 2 in force cannot follow the curves"
+        " from 45 to 130 N and remain monotone up to 260 N; below 0.28 bar the curves themselves"
+        " are not monotone."
     )
 
 
@@ -167,12 +225,24 @@ def surface(curves: PlaneCurves, law: am.characteristic.ContractionLaw, pressure
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
     pressure, force = LoadRange.from_law(law).grid(36, 31)
     contraction = 100 * np.asarray(law.contraction(pressure, force))
-    style: dict[str, Any] = {"cmap": "cividis", "alpha": 0.85, "linewidth": 0.15, "edgecolor": BLACK}
+    style: dict[str, Any] = {
+        "cmap": "cividis",
+        "alpha": 0.85,
+        "linewidth": 0.15,
+        "edgecolor": BLACK,
+    }
     axes.plot_surface(pressure / bar, force, contraction, rstride=1, cstride=1, zorder=1, **style)
     for curve in curves.curves:
         # slightly above the surface, which would otherwise hide half of each line
         height = 100 * curve.contraction(pressures) + 0.4
-        axes.plot(pressures / bar, np.full_like(pressures, curve.force), height, color=RED, linewidth=2, zorder=2)
+        axes.plot(
+            pressures / bar,
+            np.full_like(pressures, curve.force),
+            height,
+            color=RED,
+            linewidth=2,
+            zorder=2,
+        )
     axes.set(xlabel=PRESSURE, ylabel=FORCE, zlabel=CONTRACTION)
     axes.set_box_aspect((1.3, 1.2, 0.9), zoom=0.97)
     axes.view_init(elev=24, azim=-128)
@@ -182,18 +252,25 @@ def surface(curves: PlaneCurves, law: am.characteristic.ContractionLaw, pressure
 def residuals(curves: PlaneCurves, laws: Laws, pressures: Array) -> Plot:
     """Return the residuals on the curves, and the difference of the two surfaces between them."""
     figure, (left, right) = new_figure(1, 2, width=7.6, height=3.3)
-    corrected, misprint = laws[CORRECTED], laws[MISPRINT_CORRECTED]
+    corrected = laws[CORRECTED]
+    misprint = laws[MISPRINT_CORRECTED]
     for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
         error = corrected.contraction(pressures, curve.force) - curve.contraction(pressures)
-        left.plot(pressures / bar, 100 * error, color=colour, linestyle=dash, label=f"{curve.force:g} N")
+        left.plot(
+            pressures / bar, 100 * error, color=colour, linestyle=dash, label=f"{curve.force:g} N"
+        )
         right.axhline(curve.force, color=BLACK, linewidth=0.8, linestyle=":")
     left.set(xlabel=PRESSURE, ylabel="corrected direct surface $-$ plane curve [%]")
     left.set_title("on the plane curves", fontsize=9)
     left.legend(loc="upper right", frameon=False, fontsize=8)
     pressure, force = LoadRange.from_law(corrected).grid(141, 141)
-    difference = 100 * (corrected.contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
+    difference = 100 * (
+        corrected.contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force)
+    )
     limit = float(np.ceil(np.abs(difference).max()))
-    filled = right.contourf(pressure / bar, force, difference, np.linspace(-limit, limit, 17), cmap="PuOr")
+    filled = right.contourf(
+        pressure / bar, force, difference, np.linspace(-limit, limit, 17), cmap="PuOr"
+    )
     right.set(xlabel=PRESSURE, ylabel=FORCE)
     right.set_title("corrected direct $-$ exponential surface", fontsize=9)
     right.grid(visible=False)
@@ -202,8 +279,10 @@ def residuals(curves: PlaneCurves, laws: Laws, pressures: Array) -> Plot:
     scale.ax.tick_params(labelsize=8)
     errors = misprint.contraction(pressures, 260.0) - curves.curve_at(260.0).contraction(pressures)
     caption = (
-        r"Left: error of the corrected direct surface on the plane curves (with only \(a_{02}\) corrected, up to "
-        f"{100 * np.abs(errors).max():.0f} % at 260 N). Right: difference of the two surfaces; dotted: loads of the "
+        r"Left: error of the corrected direct surface on the plane curves (with only \(a_{02}\)"
+        r" corrected, up to "
+        f"{100 * np.abs(errors).max():.0f} % at 260 N). Right: difference of the two surfaces;"
+        " dotted: loads of the "
         "plane curves."
     )
     return Plot("borzikova_residuals", caption, figure)
@@ -221,8 +300,12 @@ def violations(laws: Laws) -> Plot:
         for argument, sign, colour in ((1, 1.0, RED), (0, -1.0, BLUE)):
             slope = sign * autodiff.derivative(law, "contraction", pressure, force, wrt=argument)
             if (slope > 0).any():
-                axes.contourf(pressure / bar, force, slope, [0.0, np.inf], colors=[colour], alpha=0.3)
-        lines = axes.contour(pressure / bar, force, contraction, np.arange(-5, 41, 5), colors=BLACK, linewidths=0.7)
+                axes.contourf(
+                    pressure / bar, force, slope, [0.0, np.inf], colors=[colour], alpha=0.3
+                )
+        lines = axes.contour(
+            pressure / bar, force, contraction, np.arange(-5, 41, 5), colors=BLACK, linewidths=0.7
+        )
         axes.clabel(lines, fmt="%g", fontsize=7)
         axes.set(xlabel=PRESSURE)
         axes.set_title(name, fontsize=9)

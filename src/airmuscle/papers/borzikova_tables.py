@@ -6,7 +6,13 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify import Chebyshev, LoadRange, Monomials, conditioning, find_monotonicity_violations
+from ..bench.identify import (
+    Chebyshev,
+    LoadRange,
+    Monomials,
+    conditioning,
+    find_monotonicity_violations,
+)
 from ..bench.identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
 from ..core import bar, percent
 from ..physics.muscle.characteristic.borzikova import PlaneCurves
@@ -16,11 +22,14 @@ from .borzikova_surfaces import Laws, add_noise, index_on_curves, round_contract
 from .run import titled
 
 SEEDS = range(100)
-"""Seeds of the noise in the comparison of the fitting procedures; the first one is also shown separately."""
+"""Seeds of the noise in the comparison of the fitting procedures; the first one is also shown
+separately.
+"""
 USABLE = (surfaces.CORRECTED, surfaces.EXPONENTIAL, surfaces.MONOTONE)
 """Surfaces that are suitable for computations."""
 
-CATALOGUE_TABLE, CATALOGUE_TEXT = titled("borzikova_catalogue_table"), titled("borzikova_catalogue_text")
+CATALOGUE_TABLE = titled("borzikova_catalogue_table")
+CATALOGUE_TEXT = titled("borzikova_catalogue_text")
 """Catalogue of the paper as its table and as its text print it."""
 
 
@@ -49,13 +58,18 @@ def tables(curves: PlaneCurves, laws: Laws) -> tuple[Table, ...]:
 
 def curve_table(curves: PlaneCurves) -> Table:
     """Return the end points and turning points of the plane curves."""
-    rows, end = curves.curves, curves.max_pressure
+    rows = curves.curves
+    end = curves.max_pressure
     columns = {
         "force [N]": [c.force for c in rows],
         "printed index [1]": [c.printed_index for c in rows],
         "contraction at 0 bar [%]": [round(100 * float(c.contraction(0.0)), 3) for c in rows],
-        f"contraction at {end / bar:g} bar [%]": [round(100 * float(c.contraction(end)), 3) for c in rows],
-        "turning points [bar]": [", ".join(f"{p / bar:.3f}" for p in c.turning_pressures()) for c in rows],
+        f"contraction at {end / bar:g} bar [%]": [
+            round(100 * float(c.contraction(end)), 3) for c in rows
+        ],
+        "turning points [bar]": [
+            ", ".join(f"{p / bar:.3f}" for p in c.turning_pressures()) for c in rows
+        ],
     }
     return titled("borzikova_curves", columns)
 
@@ -67,12 +81,17 @@ def surface_table(curves: PlaneCurves, laws: Laws) -> Table:
     """Return the errors and correlation indices of all surfaces on the plane curves."""
     data = sample(curves, 141)
     upper = data.rows(data["pressure"] >= 0.25 * bar)
-    errors = [law.contraction(upper["pressure"], upper["force"]) - upper["contraction"] for law in laws.values()]
+    errors = [
+        law.contraction(upper["pressure"], upper["force"]) - upper["contraction"]
+        for law in laws.values()
+    ]
     indices = [index_on_curves(law, curves) for law in laws.values()]
     at_load = {f"rms error at {c.force:g} N [%]": upper["force"] == c.force for c in curves.curves}
     columns = {
         "surface": list(laws),
-        **{heading: [_rms_text(each[rows]) for each in errors] for heading, rows in at_load.items()},
+        **{
+            heading: [_rms_text(each[rows]) for each in errors] for heading, rows in at_load.items()
+        },
         "rms error [%]": [_rms_text(each) for each in errors],
         "maximum error [%]": [f"{100 * np.abs(each).max():.3g}" for each in errors],
         EXPLAINED: [f"{index.r_squared:.5g}" for index in indices],
@@ -86,14 +105,21 @@ def _rms_text(errors: np.ndarray) -> str:
 
 
 def exponent_table(curves: PlaneCurves, laws: Laws) -> Table:
-    """Return the range of the exponent of equation (1) on the curves, and its range by the printed matrix."""
+    """Return the range of the exponent of equation (1) on the curves, and its range by the printed
+    matrix.
+    """
     pressures = np.linspace(0.0, curves.max_pressure, 351)
     columns: dict[str, Any] = {
         "force [N]": [c.force for c in curves.curves],
-        r"\(v\) of the plane curve [1]": [_range_text(c.exponent(pressures)) for c in curves.curves],
+        r"\(v\) of the plane curve [1]": [
+            _range_text(c.exponent(pressures)) for c in curves.curves
+        ],
     }
     # the direct surface is this polynomial in per cent, so its contraction in per cent is the sum
-    for matrix, law in (("printed", laws[surfaces.PRINTED]), ("corrected", laws[surfaces.CORRECTED])):
+    for matrix, law in (
+        ("printed", laws[surfaces.PRINTED]),
+        ("corrected", laws[surfaces.CORRECTED]),
+    ):
         exponents = [law.contraction(pressures, c.force) / percent for c in curves.curves]
         columns[rf"\(v\) by the {matrix} matrix [1]"] = list(map(_range_text, exponents))
     return titled("borzikova_exponent", columns)
@@ -104,22 +130,34 @@ def _range_text(values: np.ndarray) -> str:
 
 
 def coefficient_table(curves: PlaneCurves) -> Table:
-    """Return the exact coefficients of equation (1), and the deviations of both fitting procedures from them."""
+    """Return the exact coefficients of equation (1), and the deviations of both fitting procedures
+    from them.
+    """
     exact = curves.interpolate()
-    fits = [each.model.coefficients for each in _fit_both(sample(curves), curves.curves[0].saturation)]
-    powers = [(i, j) for i in range(exact.pressure_degree + 1) for j in range(exact.force_degree + 1)]
+    fits = [
+        each.model.coefficients for each in _fit_both(sample(curves), curves.curves[0].saturation)
+    ]
+    powers = [
+        (i, j) for i in range(exact.pressure_degree + 1) for j in range(exact.force_degree + 1)
+    ]
     columns = {
         r"\(i\) (power of \(p\) in bar)": [i for i, _ in powers],
         r"\(j\) (power of \(F\) in N)": [j for _, j in powers],
         r"\(a_{ij}\)": [f"{a:.10e}" for a in exact.coefficients],
-        "linearised fit minus exact": [f"{a - b:.1e}" for a, b in zip(fits[0], exact.coefficients, strict=True)],
-        "least squares minus exact": [f"{a - b:.1e}" for a, b in zip(fits[1], exact.coefficients, strict=True)],
+        "linearised fit minus exact": [
+            f"{a - b:.1e}" for a, b in zip(fits[0], exact.coefficients, strict=True)
+        ],
+        "least squares minus exact": [
+            f"{a - b:.1e}" for a, b in zip(fits[1], exact.coefficients, strict=True)
+        ],
     }
     return titled("borzikova_coefficients", columns)
 
 
 def procedure_table(data: am.Recording, saturation: float) -> Table:
-    """Return the errors of the paper's linearised fit and of least squares on k, for disturbed data."""
+    """Return the errors of the paper's linearised fit and of least squares on k, for disturbed
+    data.
+    """
     cases = {
         "undisturbed": data,
         "rounded to 0.5 %": round_contraction(data),
@@ -135,9 +173,10 @@ def procedure_table(data: am.Recording, saturation: float) -> Table:
         "rms error, linearised [%]": [f"{100 * r:.4f}" for r in rms[0]],
         "rms error, least squares [%]": [f"{100 * r:.4f}" for r in rms[1]],
         "points excluded from the linearised fit": [
-            *dropped, f"{sum(pair[0].points_dropped for pair in noise_fits)} in total"
+            *dropped,
+            f"{sum(pair[0].points_dropped for pair in noise_fits)} in total",
         ],
-    }  # fmt: skip
+    }
     return titled("borzikova_procedures", columns)
 
 
@@ -146,7 +185,9 @@ def _fit_both(recording: am.Recording, saturation: float) -> tuple[SurfaceFit, S
 
 
 def conditioning_table(data: am.Recording) -> Table:
-    """Return the rank and condition number of the 15 coefficients, in four scalings and without the largest load."""
+    """Return the rank and condition number of the 15 coefficients, in four scalings and without the
+    largest load.
+    """
     limits = LoadRange.from_recording(data)
     scalings: dict[str, Monomials | Chebyshev] = {
         "bar, N": Monomials(bar, 1.0),
@@ -156,10 +197,17 @@ def conditioning_table(data: am.Recording) -> Table:
     }
     designs = {name: conditioning(data, basis) for name, basis in scalings.items()}
     two_loads = data.rows(data["force"] < limits.max_force)
-    designs["Chebyshev polynomials, without the largest load"] = conditioning(two_loads, Chebyshev(limits))
+    designs["Chebyshev polynomials, without the largest load"] = conditioning(
+        two_loads, Chebyshev(limits)
+    )
     numbers = [each.condition for each in designs.values()]
-    columns: dict[str, Any] = {"scaling": list(designs), "rank of 15": [each.rank for each in designs.values()]}
-    columns["condition number [1]"] = ["infinite" if np.isinf(number) else f"{number:.1e}" for number in numbers]
+    columns: dict[str, Any] = {
+        "scaling": list(designs),
+        "rank of 15": [each.rank for each in designs.values()],
+    }
+    columns["condition number [1]"] = [
+        "infinite" if np.isinf(number) else f"{number:.1e}" for number in numbers
+    ]
     return titled("borzikova_conditioning", columns)
 
 
@@ -170,8 +218,12 @@ def violation_table(laws: Laws) -> Table:
     columns = {
         "surface": [name for name, _ in found],
         "violated constraint": [b.rule.description for _, b in found],
-        "pressure [bar]": [f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in found],
-        "force [N]": [f"{b.second_argument[0]:.0f} to {b.second_argument[1]:.0f}" for _, b in found],
+        "pressure [bar]": [
+            f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in found
+        ],
+        "force [N]": [
+            f"{b.second_argument[0]:.0f} to {b.second_argument[1]:.0f}" for _, b in found
+        ],
         "fraction of the validity range [%]": [f"{100 * b.area_fraction:.1f}" for _, b in found],
         "worst point [bar]": [f"{b.worst_point[0] / bar:.2f}" for _, b in found],
         "worst point [N]": [f"{b.worst_point[1]:.0f}" for _, b in found],

@@ -1,4 +1,6 @@
-"""Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358; Figures 1 and 2."""
+"""Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358; Figures
+1 and 2.
+"""
 
 from collections.abc import Iterator
 from typing import Any
@@ -18,7 +20,9 @@ from .hosovsky_plant import FORCE_MAPS, surface, surface_fit
 from .run import captioned, chapter_texts, titled
 
 MAX_CONTRACTION = 0.26
-"""Largest contraction of the figures of the surface [1] (chosen: the free contraction at the largest pressure)."""
+"""Largest contraction of the figures of the surface [1] (chosen: the free contraction at the
+largest pressure).
+"""
 
 
 def coefficient_table() -> Table:
@@ -36,11 +40,13 @@ def coefficient_table() -> Table:
 
 def chapter() -> Chapter:
     """Return the chapter of the report, with the chosen values of what the paper does not print."""
-    parameters, suspected = rig.UnpublishedParameters(), causing.SuspectedCauses()
+    parameters = rig.UnpublishedParameters()
+    suspected = causing.SuspectedCauses()
     fill = filling.run_fill(parameters)
     effects = causing.compute_effects(parameters, suspected)
     low, high = releasing.release_pair(parameters)
-    ranges, joint = releasing.range_table(parameters), releasing.joint_variation(parameters)
+    ranges = releasing.range_table(parameters)
+    joint = releasing.joint_variation(parameters)
     ratios = causing.ratio_ranges(parameters, suspected)
     explanation = f"{causing.describe_effects(effects)} {causing.describe_ranges(ratios)}"
     valve = filling.valve_figure(rig.MATRIX, fill.plant.ambient.temperature)
@@ -74,40 +80,73 @@ def chapter() -> Chapter:
 def maxwell_table(parameters: rig.UnpublishedParameters) -> Table:
     """Return the Maxwell defects of the fitted surfaces and of the law of the measured muscles."""
     shape = rig.muscle(parameters).geometry
-    fitted = [(f"surface fitted to {name}, without the limits", surface_fit(name).model, shape,
-               surface(name).validity_range) for name in FORCE_MAPS]  # fmt: skip
+    fitted = [
+        (
+            f"surface fitted to {name}, without the limits",
+            surface_fit(name).model,
+            shape,
+            surface(name).validity_range,
+        )
+        for name in FORCE_MAPS
+    ]
     entries = {name: load_law(name) for name in ("dmsp-20-300", "dmsp-10-250")}
-    measured = [(f"Martens-Boblan 2017, {name}", entry.characteristic, entry.muscle.geometry, entry.validity_range)
-                for name, entry in entries.items()]  # fmt: skip
+    measured = [
+        (
+            f"Martens-Boblan 2017, {name}",
+            entry.characteristic,
+            entry.muscle.geometry,
+            entry.validity_range,
+        )
+        for name, entry in entries.items()
+    ]
     laws = [*fitted, *measured]
     defects = [maxwell_defect(law, volume, limits) for _, law, volume, limits in laws if limits]
     columns: dict[str, list[Any]] = {
         "muscle": [name for name, *_ in laws],
-        r"largest \(\left|\frac{\partial F}{\partial p} + \frac{\text{d}V}{\text{d}L}\right|\) [mm2]": [
+        r"largest \(\left|\frac{\partial F}{\partial p} + \frac{\text{d}V}{\text{d}L}\right|\) [mm2]": [  # noqa: E501
             d.worst * 1e6 for d in defects
         ],
-        r"relative to the largest \(\frac{\text{d}V}{\text{d}L}\) [%]": [d.relative * 100 for d in defects],
+        r"relative to the largest \(\frac{\text{d}V}{\text{d}L}\) [%]": [
+            d.relative * 100 for d in defects
+        ],
         "at pressure [kPa]": [d.pressure / 1e3 for d in defects],
         "at contraction [%]": [d.contraction * 100 for d in defects],
     }
     return titled("hosovsky_maxwell", columns)
 
 
-def run_tables(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Iterator[Table]:
-    """Yield the extrapolations beyond the data of the surface, by run, and the time series, which only files have."""
+def run_tables(
+    fill: filling.FillRun, low: releasing.Release, high: releasing.Release
+) -> Iterator[Table]:
+    """Yield the extrapolations beyond the data of the surface, by run, and the time series, which
+    only files have.
+    """
     runs = {"fill and discharge": ("hosovsky_fill", fill.adaptive)}
     for key, each in (("hosovsky_release_low", low), ("hosovsky_release_high", high)):
         runs[f"release from {each.pressure / 1e3:g} kPa"] = key, each.run
     notes = [(name, note) for name, (_, run) in runs.items() for note in run.notes]
     found = [(name, note) for name, note in notes if "outside the validity range" in note]
-    yield titled("hosovsky_boxes", {"run": [name for name, _ in found], "extrapolation": [note for _, note in found]})
-    names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))
+    yield titled(
+        "hosovsky_boxes",
+        {"run": [name for name, _ in found], "extrapolation": [note for _, note in found]},
+    )
+    names = (
+        ("time", "s"),
+        ("pressure", "Pa"),
+        ("contraction", "1"),
+        ("position", "m"),
+        ("force", "N"),
+    )
     for key, run in runs.values():
-        yield Table(key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False)
+        yield Table(
+            key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False
+        )
 
 
 def hill_model() -> Plot:
-    """Return Fig. 1: contractile element, damper and parallel spring side by side, nonlinear spring in series."""
+    """Return Fig. 1: contractile element, damper and parallel spring side by side, nonlinear spring
+    in series.
+    """
     from matplotlib.patches import Rectangle
 
     figure, axes = new_figure(height=2.6)
@@ -145,24 +184,38 @@ def _spring(axes: Any, begin: float, end: float, height: float, colour: str) -> 
 
 def _damper(axes: Any, begin: float, end: float, height: float) -> None:
     """Draw a damper: a cylinder that is open to the right, and a piston."""
-    middle, half = 0.5 * (begin + end), 0.35
+    middle = 0.5 * (begin + end)
+    half = 0.35
     line = {"color": BLACK, "linewidth": 1.4}
     axes.plot([begin, middle - 0.5], [height] * 2, **line)
-    axes.plot(middle + np.array([0.6, -0.5, -0.5, 0.6]), height + half * np.array([1, 1, -1, -1]), **line)
+    axes.plot(
+        middle + np.array([0.6, -0.5, -0.5, 0.6]), height + half * np.array([1, 1, -1, -1]), **line
+    )
     axes.plot([middle + 0.1] * 2, [height - 0.8 * half, height + 0.8 * half], **line)
     axes.plot([middle + 0.1, end], [height] * 2, **line)
 
 
 def surface_in_space() -> Plot:
     """Return Fig. 2: force over contraction and pressure, with the measured points."""
-    law, data = surface(), load_data(FORCE_MAPS[0])
+    law = surface()
+    data = load_data(FORCE_MAPS[0])
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
-    contraction, pressure = np.meshgrid(np.linspace(0.0, MAX_CONTRACTION, 40), np.linspace(0.0, 675e3, 40))
+    contraction, pressure = np.meshgrid(
+        np.linspace(0.0, MAX_CONTRACTION, 40), np.linspace(0.0, 675e3, 40)
+    )
     force = np.asarray(law.force(pressure, contraction))
-    style: dict[str, Any] = {"cmap": "cividis", "alpha": 0.85, "linewidth": 0.15, "edgecolor": BLACK}
-    axes.plot_surface(100 * contraction, pressure / 1e3, force, rstride=1, cstride=1, zorder=1, **style)
+    style: dict[str, Any] = {
+        "cmap": "cividis",
+        "alpha": 0.85,
+        "linewidth": 0.15,
+        "edgecolor": BLACK,
+    }
+    axes.plot_surface(
+        100 * contraction, pressure / 1e3, force, rstride=1, cstride=1, zorder=1, **style
+    )
     points = data.rows((data["force"] > 0) & (data["force"] <= 1200) & (data["contraction"] >= 0))
-    x, y = 100 * points["contraction"], points["pressure"] / 1e3
+    x = 100 * points["contraction"]
+    y = points["pressure"] / 1e3
     axes.plot(x, y, points["force"], ".", color=RED, markersize=3, zorder=2)
     axes.set(xlabel="contraction [%]", ylabel="gauge pressure [kPa]", zlabel="force [N]")
     axes.set_box_aspect((1.3, 1.2, 0.9), zoom=0.95)
@@ -172,12 +225,18 @@ def surface_in_space() -> Plot:
 
 def isobars() -> Plot:
     """Return the isobars of the surface and the measured points."""
-    law, data = surface(), load_data(FORCE_MAPS[0])
+    law = surface()
+    data = load_data(FORCE_MAPS[0])
     figure, axes = new_figure()
     contraction = np.linspace(0.0, MAX_CONTRACTION, 200)
     for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
         rows = np.isclose(data["pressure"], pressure)
-        axes.plot(contraction * 100, law.force(pressure, contraction), color=LINES[i], label=f"{pressure / 1e3:g} kPa")
+        axes.plot(
+            contraction * 100,
+            law.force(pressure, contraction),
+            color=LINES[i],
+            label=f"{pressure / 1e3:g} kPa",
+        )
         axes.plot(data["contraction"][rows] * 100, data["force"][rows], "o", color=LINES[i])
     axes.axhline(1200.0, color="0.4", linewidth=0.8, linestyle=":")
     axes.set(xlabel="contraction [%]", ylabel="force [N]", xlim=(0, 27), ylim=(-30, 1700))

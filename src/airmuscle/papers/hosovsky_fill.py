@@ -1,4 +1,6 @@
-"""Fill and discharge, Fig. 3 of Hošovský et al.: simulation, figures, and claims on surface, valve and fill."""
+"""Fill and discharge, Fig. 3 of Hošovský et al.: simulation, figures, and claims on surface, valve
+and fill.
+"""
 
 import dataclasses
 
@@ -47,7 +49,9 @@ def run_fill(parameters: UnpublishedParameters, valve: am.Valve = MATRIX) -> Fil
 
 
 def figure_3(fill: FillRun) -> Plot:
-    """Return Fig. 3: muscle pressure and displacement over time; the paper gives no values of its curve."""
+    """Return Fig. 3: muscle pressure and displacement over time; the paper gives no values of its
+    curve.
+    """
     run = fill.adaptive
     figure, axes = new_figure(2, 1, height=4.6, sharex=True)
     axes[0].plot(run["time"], (run["pressure"] + fill.plant.ambient.pressure) / 1e3, color=LINES[0])
@@ -72,16 +76,27 @@ def valve_figure(valve: am.Valve, temperature: float) -> Plot:
     axes.axvline(valve.critical_ratio, color=BLACK, linewidth=0.8, linestyle=":")
     axes.annotate("choked", (valve.critical_ratio / 2, 0.35), ha="center")
     axes.annotate("subsonic", ((1 + valve.critical_ratio) / 2, 0.35), ha="center")
-    axes.set(xlabel="pressure ratio $p_2/p_1$", ylabel="mass flow [g/s]", ylim=(0, None), xlim=(0, 1))
+    axes.set(
+        xlabel="pressure ratio $p_2/p_1$", ylabel="mass flow [g/s]", ylim=(0, None), xlim=(0, 1)
+    )
     return captioned("hosovsky_valve", figure)
 
 
 def end_of_choked_flow(plant: am.Plant) -> tuple[float, float]:
-    """Return the absolute muscle pressure [Pa] at which the choked flow ends, and the pressure step of a row [Pa]."""
+    """Return the absolute muscle pressure [Pa] at which the choked flow ends, and the pressure step
+    of a row [Pa].
+    """
     instants = np.append(np.arange(rig.FILLING[0], rig.FILLING[0] + 1.0, 1e-4), rig.DURATION)
-    run = am.simulate(plant, rig.SCHEDULE, duration=rig.DURATION, integrator=am.Rodas4(1e-8), output_times=instants)
+    run = am.simulate(
+        plant,
+        rig.SCHEDULE,
+        duration=rig.DURATION,
+        integrator=am.Rodas4(1e-8),
+        output_times=instants,
+    )
     filling = (run["time"] >= rig.FILLING[0]) & (run["time"] < rig.FILLING[0] + 1.0)
-    flow, pressure = run["mass_flow"][filling], run["pressure"][filling] + plant.ambient.pressure
+    flow = run["mass_flow"][filling]
+    pressure = run["pressure"][filling] + plant.ambient.pressure
     subsonic = int(np.argmax(flow < flow.max() * (1 - 1e-9)))
     return float(pressure[subsonic]), float(np.diff(pressure).max())
 
@@ -90,12 +105,17 @@ def determined_coefficients(fit: am.Fit) -> tuple[float, str]:
     """Return the rank of the fit at its positive forces [1]."""
     notes = " ".join(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in fit.notes)
     rank = uncensored_rank(fit.problem, fit.problem.jacobian(fit.values))
-    return rank, f"Condition number {fit.condition:.3g} (scaled); rms error {fit.rmse:.3g} N. {notes}"
+    return (
+        rank,
+        f"Condition number {fit.condition:.3g} (scaled); rms error {fit.rmse:.3g} N. {notes}",
+    )
 
 
 def limited_forces() -> np.ndarray:
     """Return the forces [N] of the limited surface over pressure and contraction."""
-    return np.asarray(surface().force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :]))
+    return np.asarray(
+        surface().force(np.linspace(0, 1e6, 51)[:, None], np.linspace(-0.05, 0.4, 46)[None, :])
+    )
 
 
 SURFACE = (
@@ -113,15 +133,23 @@ FILL = (
 STEP = {"step absolute": (rig.SUPPLY_PRESSURE / 1e6,), "step gauge": (0.65,)}
 """Readings of the step of 650 kPa as gauge pressures [MPa]."""
 MEASUREMENT = (claim_row(PAPER, "sensor", lambda step: step, STEP), claim_row(PAPER, "hysteresis"))
-GAS = {name: claim_row(PAPER, name, lambda change: change) for name in ("second virial", "volume flow")}
+GAS = {
+    name: claim_row(PAPER, name, lambda change: change) for name in ("second virial", "volume flow")
+}
 """Claims on a substitution, by the beginning of its name."""
 
 
 def fill_claims(fill: FillRun, explanation: str = "") -> tuple[Claim, ...]:
-    """Return the claims on valve, solver and fill; `explanation` describes the causes of the deviations."""
+    """Return the claims on valve, solver and fill; `explanation` describes the causes of the
+    deviations.
+    """
     choke_end, step = end_of_choked_flow(fill.plant)
-    choked = claim_row(PAPER, "choked flow", printed=Equal(0.433 * 650.0, 2e-3 * step, derived=True))
-    valve = claim_row(PAPER, "conductance", lambda fill: fill.plant.circuits[0].fill.conductance * 1e5 * 60e3)
+    choked = claim_row(
+        PAPER, "choked flow", printed=Equal(0.433 * 650.0, 2e-3 * step, derived=True)
+    )
+    valve = claim_row(
+        PAPER, "conductance", lambda fill: fill.plant.circuits[0].fill.conductance * 1e5 * 60e3
+    )
     return (
         valve.claim("", fill),
         choked.claim("", choke_end / 1e3, ""),
@@ -131,8 +159,12 @@ def fill_claims(fill: FillRun, explanation: str = "") -> tuple[Claim, ...]:
 
 
 def gas_findings(effects: tuple[Effect, ...]) -> tuple[Claim, ...]:
-    """Return the effects of the ideal gas and of the reference density, compared with a negligible change."""
-    changes = {each.substitution.component: each.largest("pressure", rig.FILLING) for each in effects}
+    """Return the effects of the ideal gas and of the reference density, compared with a negligible
+    change.
+    """
+    changes = {
+        each.substitution.component: each.largest("pressure", rig.FILLING) for each in effects
+    }
     return tuple(
         row.claim("", abs(change) / 1e3)
         for component, change in changes.items()

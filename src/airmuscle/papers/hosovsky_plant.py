@@ -13,29 +13,40 @@ from ..report.formatting import format_number, format_quantity, typographic
 
 PAPER = "hosovsky"
 FORCE_MAPS = ("dmsp-20-300", "festo-tool-dmsp-20")
-"""Data of the contractile surface, which the paper does not print: a measured force map and the sizing-tool table."""
+"""Data of the contractile surface, which the paper does not print: a measured force map and the
+sizing-tool table.
+"""
 
 MATRIX = am.Valve(2.6167e-9, 0.433)
-"""MATRIX EMX821.104C224: b = 0.433 and the digits of C are printed; the exponent e-9 is lost in our copy."""
+"""MATRIX EMX821.104C224: b = 0.433 and the digits of C are printed; the exponent e-9 is lost in our
+copy.
+"""
 REFERENCE_PRESSURE = 100e3
 """Pressure P0 of the reference atmosphere of ISO 8778 [Pa]."""
 VOLUME_FLOW_RATIO = REFERENCE_PRESSURE / (
     am.physics.GAS_CONSTANT * am.physics.REFERENCE_TEMPERATURE * am.physics.REFERENCE_DENSITY
 )
-"""Ratio P0/(R T0 rho0) of the pressure rates by the volume flow of equation (11) and by the mass flow of ISO 6358 [1].
+"""Ratio P0/(R T0 rho0) of the pressure rates by the volume flow of equation (11) and by the mass
+flow of ISO 6358 [1].
 
-The density rho0 of ISO 8778 is that of humid air and R that of dry air, so that R T0 rho0 = 99 716 Pa."""
+The density rho0 of ISO 8778 is that of humid air and R that of dry air, so that R T0 rho0 = 99 716
+Pa."""
 MATRIX_BY_VOLUME = dataclasses.replace(MATRIX, conductance=MATRIX.conductance * VOLUME_FLOW_RATIO)
 """The valve as equation (11) takes its volume flow: as air whose density is P0/(R T0)."""
 SUPPLY_PRESSURE = 650e3 - 101_325.0
-"""The step of 650 kPa, assumed to be absolute (inferred from the sensor range of 0 to 0.6 MPa); gauge [Pa]."""
+"""The step of 650 kPa, assumed to be absolute (inferred from the sensor range of 0 to 0.6 MPa);
+gauge [Pa].
+"""
 RELEASED_MASS = 30.0
 """Load of the quick release [kg], printed."""
 SCHEDULE = am.Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0), (25.0, 0.0))})
-"""Schedule of Fig. 3, printed: the fill valve opens at 5 s and closes at 15 s, the discharge valve at 19 s and 25 s."""
+"""Schedule of Fig. 3, printed: the fill valve opens at 5 s and closes at 15 s, the discharge valve
+at 19 s and 25 s.
+"""
 DURATION = 25.0
 """Duration of the experiment of Fig. 3 [s]."""
-FILLING, DISCHARGING = (5.0, 15.0), (19.0, 25.0)
+FILLING = (5.0, 15.0)
+DISCHARGING = (19.0, 25.0)
 """Beginning and end of both phases of Fig. 3 [s]."""
 
 MATRIX_CATALOGUE = published("matrix-821")
@@ -43,7 +54,9 @@ MATRIX_CATALOGUE = published("matrix-821")
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """A parameter that the paper does not print: value, range for the verdicts, unit, meaning and source."""
+    """A parameter that the paper does not print: value, range for the verdicts, unit, meaning and
+    source.
+    """
 
     value: float
     low: float
@@ -58,18 +71,33 @@ class UnpublishedParameters:
     """All parameters of the simulated figures that the paper does not print."""
 
     load: Choice = Choice(10.0, 2.0, 20.0, "kg", "load during fill and discharge")
-    stiffness: Choice = Choice(1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper")
-    damping: Choice = Choice(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
-    length: Choice = Choice(0.300, 0.200, 0.400, "m", "resting length", "measured specimen; range chosen")
-    braid_angle: Choice = Choice(
-        0.42616, 0.38, 0.50, "rad", "braid angle, for the volume", "Martens and Boblan 2017; range chosen"
+    stiffness: Choice = Choice(
+        1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper"
     )
-    low_pressure: Choice = Choice(200e3, 150e3, 250e3, "Pa", "lower initial gauge pressure of the release")
-    high_pressure: Choice = Choice(400e3, 350e3, 500e3, "Pa", "higher initial gauge pressure of the release")
+    damping: Choice = Choice(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
+    length: Choice = Choice(
+        0.300, 0.200, 0.400, "m", "resting length", "measured specimen; range chosen"
+    )
+    braid_angle: Choice = Choice(
+        0.42616,
+        0.38,
+        0.50,
+        "rad",
+        "braid angle, for the volume",
+        "Martens and Boblan 2017; range chosen",
+    )
+    low_pressure: Choice = Choice(
+        200e3, 150e3, 250e3, "Pa", "lower initial gauge pressure of the release"
+    )
+    high_pressure: Choice = Choice(
+        400e3, 350e3, 500e3, "Pa", "higher initial gauge pressure of the release"
+    )
 
     def with_value(self, name: str, value: float) -> "UnpublishedParameters":
         """Return the parameters with another value of one of them."""
-        return dataclasses.replace(self, **{name: dataclasses.replace(getattr(self, name), value=value)})
+        return dataclasses.replace(
+            self, **{name: dataclasses.replace(getattr(self, name), value=value)}
+        )
 
 
 def chosen_values(parameters: Any) -> dict[str, Choice]:
@@ -78,15 +106,23 @@ def chosen_values(parameters: Any) -> dict[str, Choice]:
 
 
 def chosen_rows(parameters: Any) -> Iterator[tuple[str, str, str]]:
-    """Return (meaning, value with unit and range, source) of every chosen value of a dataclass for the report."""
+    """Return (meaning, value with unit and range, source) of every chosen value of a dataclass for
+    the report.
+    """
     for each in chosen_values(parameters).values():
         low, high = (typographic(format_number(end)) for end in (each.low, each.high))
-        yield each.meaning, f"{format_quantity(each.value, each.unit)} (range {low} to {high})", each.source
+        yield (
+            each.meaning,
+            f"{format_quantity(each.value, each.unit)} (range {low} to {high})",
+            each.source,
+        )
 
 
 @functools.cache
 def surface_fit(data: str = FORCE_MAPS[0]) -> am.Fit:
-    """Return the fit of the 21 coefficients to a force map of the library; rows clamped at zero force are censored."""
+    """Return the fit of the 21 coefficients to a force map of the library; rows clamped at zero
+    force are censored.
+    """
     return am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), load_data(data))
 
 
@@ -100,16 +136,24 @@ def surface(data: str = FORCE_MAPS[0]) -> am.characteristic.ContractileSurface:
 def muscle(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0]) -> am.Muscle:
     """Return the Hill muscle of equation (1)."""
     braid = am.geometry.Braid(0.010, parameters.braid_angle.value, parameters.length.value)
-    spring, damper = am.LinearSpring(parameters.stiffness.value), am.LinearDamper(parameters.damping.value)
+    spring = am.LinearSpring(parameters.stiffness.value)
+    damper = am.LinearDamper(parameters.damping.value)
     return am.Muscle(surface(data), braid, spring, damper)
 
 
 def plant(
-    parameters: UnpublishedParameters, mechanism: am.Mechanism, *, gas: am.physics.Gas = am.Isothermal(),
-    valve: am.physics.Orifice = MATRIX, tube: am.physics.TubeModel | None = None, data: str = FORCE_MAPS[0],
+    parameters: UnpublishedParameters,
+    mechanism: am.Mechanism,
+    *,
+    gas: am.physics.Gas = am.Isothermal(),
+    valve: am.physics.Orifice = MATRIX,
+    tube: am.physics.TubeModel | None = None,
+    data: str = FORCE_MAPS[0],
     **elements: Any,
-) -> am.Plant:  # fmt: skip
-    """Return the plant of the paper, isothermal and without a line; `elements` replace spring, wall or series."""
+) -> am.Plant:
+    """Return the plant of the paper, isothermal and without a line; `elements` replace spring, wall
+    or series.
+    """
     valves = am.FillDischarge(am.Supply(SUPPLY_PRESSURE), valve, valve)
     actuator = dataclasses.replace(muscle(parameters, data), **elements)
     circuit = valves if tube is None else am.physics.WithTubes(valves, tube)

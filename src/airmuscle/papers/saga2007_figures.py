@@ -13,7 +13,13 @@ from ..report.formatting import to_mathtext
 from . import saga2007_muscle as values
 from .run import captioned
 from .saga2007_joint import feed_forward_figure
-from .saga2007_muscle import DEFAULT, INTERPRETATIONS, circular_meridian, exact_meridian, pressure_along
+from .saga2007_muscle import (
+    DEFAULT,
+    INTERPRETATIONS,
+    circular_meridian,
+    exact_meridian,
+    pressure_along,
+)
 from .saga2007_muscle import LINES as RUBBER
 from .saga2007_pairs import errors, ideal_errors
 from .saga2007_previous import previous_model_figure
@@ -47,7 +53,9 @@ def outlines() -> Plot:
             label = f"{100 * c:g} %" if dash == "-" else None
             axes.plot(1e3 * x, 1e3 * r, dash, color=LINES[i % len(LINES)], label=label)
     axes.plot([], [], ":", color=BLACK, label="exact,\nwithout rubber")
-    axes.set(xlabel="position along the axis [mm]", ylabel="radius [mm]", xlim=(-40, 40), ylim=(0, 30))
+    axes.set(
+        xlabel="position along the axis [mm]", ylabel="radius [mm]", xlim=(-40, 40), ylim=(0, 30)
+    )
     legend_outside(axes, title="contraction")
     return captioned("saga2007_outlines", figure)
 
@@ -56,7 +64,10 @@ def rubber() -> Plot:
     """Return Fig. 4: the two possible lines of the rubber."""
     figure, axes = new_figure(width=5.2, height=3.0)
     for i, (name, line) in enumerate(RUBBER.items()):
-        for strain, dash in ((np.array([0.0, RUBBER_TEST_STRAIN]), "-"), (np.array([RUBBER_TEST_STRAIN, 4.0]), ":")):
+        for strain, dash in (
+            (np.array([0.0, RUBBER_TEST_STRAIN]), "-"),
+            (np.array([RUBBER_TEST_STRAIN, 4.0]), ":"),
+        ):
             formula = rf"$({line.slope * MPA:g}\,\varepsilon + {line.intercept * MPA:g})$ MPa"
             label = f"line {name}: {formula}" if dash == "-" else None
             axes.plot(strain, line.stress(strain) * MPA, dash, color=LINES[i], label=label)
@@ -65,8 +76,12 @@ def rubber() -> Plot:
     return captioned("saga2007_rubber", figure)
 
 
-def _draw_contraction(axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str) -> None:
-    """Draw contraction over pressure at one load: thin where the pressure falls with contraction (unstable)."""
+def _draw_contraction(
+    axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str
+) -> None:
+    """Draw contraction over pressure at one load: thin where the pressure falls with contraction
+    (unstable).
+    """
     required = pressure_along(law, CONTRACTION, force) * MPA
     rising = np.append(np.diff(required) > 0, True)
     stable = np.where(rising, required, np.nan)
@@ -80,11 +95,19 @@ def contraction_over_pressure() -> Plot:
     figure, (left, right) = new_figure(1, 2, width=7.2, height=3.4, sharey=True)
     for i, (force, load) in enumerate(((100.0, "100 N"), (0.0, "no load"))):
         for n, rings in enumerate(("no rings", "1 ring", "2 rings")):
-            _draw_contraction(left, values.with_rings(DEFAULT, n), force, 3 * i + n, f"{rings}, {load}")
+            _draw_contraction(
+                left, values.with_rings(DEFAULT, n), force, 3 * i + n, f"{rings}, {load}"
+            )
     for i, force in enumerate((0.0, 50.0, 100.0, 200.0)):
         _draw_contraction(right, DEFAULT, force, i, f"{force:g} N")
     ticks = (0.0, 0.05, 0.1, 0.15)
-    left.set(xlabel="gauge pressure [MPa]", ylabel="contraction [%]", xlim=(0, 0.16), ylim=(0, 40), xticks=ticks)
+    left.set(
+        xlabel="gauge pressure [MPa]",
+        ylabel="contraction [%]",
+        xlim=(0, 0.16),
+        ylim=(0, 40),
+        xticks=ticks,
+    )
     right.set(xlabel="gauge pressure [MPa]", xlim=(0, 0.16), xticks=ticks)
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title="no rings")
@@ -124,7 +147,9 @@ def snap_through() -> Plot:
     return captioned("saga2007_snap", figure)
 
 
-def _draw_pressure(axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str) -> None:
+def _draw_pressure(
+    axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str
+) -> None:
     contraction = np.concatenate([np.geomspace(1e-5, 0.01, 40), np.linspace(0.011, 0.5, 200)])
     required = law.equilibrium_pressure(contraction, force) * MPA
     axes.plot(100 * contraction, required, ls=DASHES[i], color=LINES[i], label=label)
@@ -163,9 +188,17 @@ def pairs() -> Plot:
                 continue
             color = ("parabola (3)", "parabola, true arc", "catenary", "circle").index(outline)
             dash = (":", "--", "-")[closures.index(closure)]
-            axes.plot(100 * contraction, 100 * error, ls=dash, color=LINES[color], label=f"{outline}, {closure}")
+            axes.plot(
+                100 * contraction,
+                100 * error,
+                ls=dash,
+                color=LINES[color],
+                label=f"{outline}, {closure}",
+            )
         axes.axhline(0, color=BLACK, lw=0.6)
         axes.set(xlabel="contraction [%]", title=title, xlim=(0, 40), ylim=(-60, 60))
     panels[0].set_ylabel("error relative to the exact meridian [%]")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=7)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=7
+    )
     return captioned("saga2007_pairs", figure)

@@ -1,4 +1,6 @@
-"""Display in notebooks: a card with a chart and a short table, as HTML that is readable on light and dark grounds."""
+"""Display in notebooks: a card with a chart and a short table, as HTML that is readable on light
+and dark grounds.
+"""
 
 import abc
 import base64
@@ -9,10 +11,15 @@ from typing import Any
 
 from ..core import AirmuscleError, ShortRepr, rendered
 
-MAX_ROWS, MAX_NOTES, MAX_TEXT = 14, 5, 600
+MAX_ROWS = 14
+MAX_NOTES = 5
+MAX_TEXT = 600
 """Maximum number of rows of a table, of notes, and of characters of a text in a card."""
-MAX_CHART, RESOLUTIONS = 130_000, (100, 70, 45)
-"""Maximum number of bytes of a chart, and its resolutions [dots per inch]: the first that keeps to it is taken."""
+MAX_CHART = 130_000
+RESOLUTIONS = (100, 70, 45)
+"""Maximum number of bytes of a chart, and its resolutions [dots per inch]: the first that keeps to
+it is taken.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,12 +50,22 @@ class NotebookDisplay(ShortRepr, abc.ABC):
 
 
 def render_card(card: Card) -> str:
-    """A card as well-formed HTML without scripts: all texts are escaped, and the chart is an image in the page."""
-    parts = [f'<div style="max-width: 62em"><p style="margin: 0.3em 0"><b>{_text(card.title)}</b></p>']
+    """A card as well-formed HTML without scripts: all texts are escaped, and the chart is an image
+    in the page.
+    """
+    parts = [
+        f'<div style="max-width: 62em"><p style="margin: 0.3em 0"><b>{_text(card.title)}</b></p>'
+    ]
     parts += [_chart(card), _table(card.table) if card.table else ""]
-    parts += [f'<p style="margin: 0.3em 0; font-size: 90%">{_text(note)}</p>' for note in card.notes[:MAX_NOTES]]
+    parts += [
+        f'<p style="margin: 0.3em 0; font-size: 90%">{_text(note)}</p>'
+        for note in card.notes[:MAX_NOTES]
+    ]
     if len(card.notes) > MAX_NOTES:
-        parts.append(f'<p style="margin: 0.3em 0; font-size: 90%">and {len(card.notes) - MAX_NOTES} more notes</p>')
+        parts.append(
+            f'<p style="margin: 0.3em 0; font-size: 90%">and {len(card.notes) - MAX_NOTES} more'
+            " notes</p>"
+        )
     return "".join([*parts, "</div>"])
 
 
@@ -58,19 +75,28 @@ def _text(text: object) -> str:
 
 
 def _table(table: Sequence[Sequence[str]]) -> str:
-    """The rows as an HTML table in the colours of the notebook; those beyond `MAX_ROWS` are counted."""
-    head, rows = table[0], table[1:]
+    """The rows as an HTML table in the colours of the notebook; those beyond `MAX_ROWS` are
+    counted.
+    """
+    head = table[0]
+    rows = table[1:]
     shown = rows[:MAX_ROWS]
-    style = "text-align: left; padding: 0.15em 0.8em 0.15em 0; background: transparent; color: inherit"
+    style = (
+        "text-align: left; padding: 0.15em 0.8em 0.15em 0; background: transparent; color: inherit"
+    )
     lines = ["".join(f'<th style="{style}">{_text(cell)}</th>' for cell in head)]
     lines += ["".join(f'<td style="{style}">{_text(cell)}</td>' for cell in row) for row in shown]
     if len(rows) > len(shown):
-        lines.append(f'<td style="{style}" colspan="{len(head)}">and {len(rows) - len(shown)} more</td>')
+        lines.append(
+            f'<td style="{style}" colspan="{len(head)}">and {len(rows) - len(shown)} more</td>'
+        )
     return f"<table>{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
 
 
 def _chart(card: Card) -> str:
-    """The chart as an image on a white ground, which is readable on a dark page too; a reason if there is none."""
+    """The chart as an image on a white ground, which is readable on a dark page too; a reason if
+    there is none.
+    """
     if card.draw is None:
         return ""
     try:
@@ -85,4 +111,7 @@ def _chart(card: Card) -> str:
     data = base64.b64encode(content).decode("ascii")
     style = "background: #fff; border-radius: 4px; max-width: 100%; height: auto"
     width = round(90 * float(figure.get_figwidth()))
-    return f'<img alt="{_text(card.title)}" width="{width}" style="{style}" src="data:image/png;base64,{data}"/>'
+    return (
+        f'<img alt="{_text(card.title)}" width="{width}" style="{style}"'
+        f' src="data:image/png;base64,{data}"/>'
+    )

@@ -1,4 +1,6 @@
-"""Plot of a recording over time: one panel for each physical quantity, with set point and measurement."""
+"""Plot of a recording over time: one panel for each physical quantity, with set point and
+measurement.
+"""
 
 import dataclasses
 import itertools
@@ -14,10 +16,26 @@ from .columns import QUANTITIES, display_scale, quantity_of
 ROLES = {"setpoint.": "set point", "measured.": "measured", "command.": "command"}
 """Prefixes of the columns of a control loop, and their names in a legend."""
 ORDER = (
-    "position", "angle", "pressure", "contraction", "length", "shortening", "force", "torque", "stiffness", "opening",
-    "mass_flow", "friction", "speed", "angular_speed", "acceleration", "angular_acceleration", "temperature", "volume",
+    "position",
+    "angle",
+    "pressure",
+    "contraction",
+    "length",
+    "shortening",
+    "force",
+    "torque",
+    "stiffness",
+    "opening",
+    "mass_flow",
+    "friction",
+    "speed",
+    "angular_speed",
+    "acceleration",
+    "angular_acceleration",
+    "temperature",
+    "volume",
     "air_mass",
-)  # fmt: skip
+)
 """Quantities in the order of their panels; others follow."""
 MAX_TITLE_LINE = 16
 """Characters of a line of the title of a panel."""
@@ -26,17 +44,24 @@ _PRESSURE_SETPOINTS = {"setpoint": "set point", "lagged_setpoint": "lagged set p
 PANELS_IN_A_COLUMN = 7
 """Maximum number of panels below each other; more are plotted in two columns."""
 MAX_LEGEND = 6
-"""Maximum number of curves that a legend names one by one; of more it names the colours and the line styles."""
-MAX_PULSES, BINS = 40, 150
-"""Number of alternations above which the duty cycle is drawn with the envelope, and of its intervals (chosen)."""
+"""Maximum number of curves that a legend names one by one; of more it names the colours and the
+line styles.
+"""
+MAX_PULSES = 40
+BINS = 150
+"""Number of alternations above which the duty cycle is drawn with the envelope, and of its
+intervals (chosen).
+"""
 _SUPERSCRIPTS = {ord("^"): None, ord("2"): "²", ord("3"): "³"}
 
 
 @dataclasses.dataclass(frozen=True)
 class Curve:
-    """A column in a panel: its name, its label, its part of the plant, such as 'left', and its role in a control loop.
+    """A column in a panel: its name, its label, its part of the plant, such as 'left', and its role
+    in a control loop.
 
-    `role` is empty for a state, an output or an input; `variant` is that of the columns of the part in this panel.
+    `role` is empty for a state, an output or an input; `variant` is that of the columns of the part
+    in this panel.
     """
 
     name: str
@@ -56,7 +81,9 @@ class Panel:
 
     @property
     def title(self) -> str:
-        """Name of the quantity, or of the column if the panel has a single one; long names are on several lines."""
+        """Name of the quantity, or of the column if the panel has a single one; long names are on
+        several lines.
+        """
         name = self.curves[0].name if len(self.curves) == 1 else self.quantity
         return textwrap.fill(name.replace("_", " "), MAX_TITLE_LINE, break_long_words=False)
 
@@ -65,20 +92,29 @@ def panels_of(names: Iterable[str], units: Mapping[str, str], *, ordered: bool) 
     """The panels of columns with these names.
 
     units    SI units of columns that are no known quantity, by name
-    ordered  whether the panels are in the usual order of the quantities; otherwise in that of the columns
+    ordered  whether the panels are in the usual order of the quantities; otherwise in that of the
+    columns
     """
     groups: dict[tuple[str, str], list[str]] = {}
     known = list(names)
     for name in known:
         groups.setdefault(_quantity_and_unit(name, known, units), []).append(name)
-    panels = [Panel(quantity, unit, _curves(quantity, columns)) for (quantity, unit), columns in groups.items()]
+    panels = [
+        Panel(quantity, unit, _curves(quantity, columns))
+        for (quantity, unit), columns in groups.items()
+    ]
     if not ordered:
         return panels
-    return sorted(panels, key=lambda panel: ORDER.index(panel.quantity) if panel.quantity in ORDER else len(ORDER))
+    return sorted(
+        panels,
+        key=lambda panel: ORDER.index(panel.quantity) if panel.quantity in ORDER else len(ORDER),
+    )
 
 
 def _parts_of(name: str) -> tuple[str, str, str, str]:
-    """The prefix of a control loop, the name without it, its part of the plant, and the last part of the name."""
+    """The prefix of a control loop, the name without it, its part of the plant, and the last part
+    of the name.
+    """
     prefix = next((prefix for prefix in ROLES if name.startswith(prefix)), "")
     base = name.removeprefix(prefix)
     part, _, tail = base.rpartition(".")
@@ -87,8 +123,11 @@ def _parts_of(name: str) -> tuple[str, str, str, str]:
 
 def _quantity_and_unit(name: str, known: list[str], units: Mapping[str, str]) -> tuple[str, str]:
     _, base, part, tail = _parts_of(name)
-    quantity, unit = quantity_of(base), units.get(name) or units.get(base, "")
-    if tail in _PRESSURE_SETPOINTS and (unit == "Pa" or (not unit and f"{part}.pressure".lstrip(".") in known)):
+    quantity = quantity_of(base)
+    unit = units.get(name) or units.get(base, "")
+    if tail in _PRESSURE_SETPOINTS and (
+        unit == "Pa" or (not unit and f"{part}.pressure".lstrip(".") in known)
+    ):
         return "pressure", "Pa"
     if tail in _OPENINGS:
         return "opening", "1"
@@ -105,7 +144,9 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
     roles = {}
     for name in names:  # that of the prefix, or of the set point of a pressure regulator
         prefix, _, _, tail = _parts_of(name)
-        roles[name] = ROLES.get(prefix, "") or (_PRESSURE_SETPOINTS.get(tail, "") if quantity == "pressure" else "")
+        roles[name] = ROLES.get(prefix, "") or (
+            _PRESSURE_SETPOINTS.get(tail, "") if quantity == "pressure" else ""
+        )
     for name, role in sorted(roles.items(), key=lambda item: item[1] != ""):
         _, base, part, tail = _parts_of(name)
         own = role or (tail != quantity and quantity == "opening")
@@ -120,9 +161,15 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
 
 
 def plot_columns(
-    columns: Mapping[str, Array], time: Array | None, title: str, *, ax: Any = None,
-    units: Mapping[str, str] | None = None, ordered: bool = True, limit: int | None = None,
-) -> Any:  # fmt: skip
+    columns: Mapping[str, Array],
+    time: Array | None,
+    title: str,
+    *,
+    ax: Any = None,
+    units: Mapping[str, str] | None = None,
+    ordered: bool = True,
+    limit: int | None = None,
+) -> Any:
     """Plot columns (N,) over `time` (N,) [s], or over the row number if there is no time.
 
     ax       Axes for the panels: one, or a sequence; None makes a figure
@@ -150,8 +197,12 @@ def plot_columns(
     return figure
 
 
-def _draw(panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | None, axes: Sequence[Any]) -> None:
-    """Draw each panel into its axes; the lowest axes of each column have the label of the abscissa."""
+def _draw(
+    panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | None, axes: Sequence[Any]
+) -> None:
+    """Draw each panel into its axes; the lowest axes of each column have the label of the
+    abscissa.
+    """
     parts = dict.fromkeys(curve.part for panel in panels for curve in panel.curves)
     colours = dict(zip(parts, itertools.cycle(LINES), strict=False))
     for panel, axis in zip(panels, axes, strict=False):
@@ -162,12 +213,23 @@ def _draw(panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | N
             style = _style(curve, colours, time is not None)
             if time is not None and is_pulsed(values):
                 abscissa, values, low, high = duty_cycle(time, values)
-                axis.fill_between(abscissa, low * factor, high * factor, color=style["color"], alpha=0.18, linewidth=0)
+                axis.fill_between(
+                    abscissa,
+                    low * factor,
+                    high * factor,
+                    color=style["color"],
+                    alpha=0.18,
+                    linewidth=0,
+                )
             axis.plot(abscissa, values * factor, label=curve.label, **style)
-        axis.set_ylabel(f"{panel.title}\n[{unit.translate(_SUPERSCRIPTS)}]" if unit else panel.title)
+        axis.set_ylabel(
+            f"{panel.title}\n[{unit.translate(_SUPERSCRIPTS)}]" if unit else panel.title
+        )
         if len(panel.curves) > 1:
             handles = (
-                axis.get_lines()[-len(panel.curves) :] if len(panel.curves) <= MAX_LEGEND else _key(panel, colours)
+                axis.get_lines()[-len(panel.curves) :]
+                if len(panel.curves) <= MAX_LEGEND
+                else _key(panel, colours)
             )
             legend_outside(axis, handles=handles, fontsize=7, handlelength=1.6, labelspacing=0.25)
         subplot = axis.get_subplotspec()
@@ -183,9 +245,11 @@ def is_pulsed(values: Array) -> bool:
 
 
 def duty_cycle(time: Array, values: Array) -> tuple[Array, Array, Array, Array]:
-    """Middle of each of BINS equal intervals of time, and mean over it, minimum and maximum of a pulsed column.
+    """Middle of each of BINS equal intervals of time, and mean over it, minimum and maximum of a
+    pulsed column.
 
-    The mean holds each value until the next row, as a pulsed input does; intervals without a row are left out.
+    The mean holds each value until the next row, as a pulsed input does; intervals without a row
+    are left out.
     """
     edges = np.linspace(time[0], time[-1], BINS + 1)
     integral = np.concatenate(([0.0], np.cumsum(values[:-1] * np.diff(time))))
@@ -194,11 +258,18 @@ def duty_cycle(time: Array, values: Array) -> tuple[Array, Array, Array, Array]:
     filled = np.flatnonzero(np.diff(np.append(starts, len(time))) > 0)
     rows = starts[filled]
     middles = 0.5 * (edges[1:] + edges[:-1])
-    return middles[filled], means[filled], np.minimum.reduceat(values, rows), np.maximum.reduceat(values, rows)
+    return (
+        middles[filled],
+        means[filled],
+        np.minimum.reduceat(values, rows),
+        np.maximum.reduceat(values, rows),
+    )
 
 
 def _key(panel: Panel, colours: Mapping[str, str]) -> list[Any]:
-    """Handles of a legend of many curves: the colour of each part, and the line style of each kind of curve."""
+    """Handles of a legend of many curves: the colour of each part, and the line style of each kind
+    of curve.
+    """
     from matplotlib.lines import Line2D
 
     labels = {c.part: (c.part or "plant").replace("_", " ") for c in panel.curves}
@@ -206,7 +277,9 @@ def _key(panel: Panel, colours: Mapping[str, str]) -> list[Any]:
     styles: dict[str, Any] = {}
     for curve in panel.curves:
         name = curve.role or curve.name.rpartition(".")[2].replace("_", " ")
-        styles.setdefault(name, Line2D([], [], label=name, **{**_style(curve, colours, True), "color": BLACK}))
+        styles.setdefault(
+            name, Line2D([], [], label=name, **{**_style(curve, colours, True), "color": BLACK})
+        )
     return [*lines, *(styles.values() if len(styles) > 1 else ())]
 
 
@@ -216,18 +289,33 @@ def _scale(panel: Panel) -> tuple[float, str]:
     if unit or not panel.unit:
         return factor, unit
     usual = {"Pa": (1e-3, "kPa"), "1": (1.0, "-")}
-    return chosen_scale(panel.unit, *usual.get(panel.unit, (1.0, panel.unit))) if panel.unit != "1" else usual["1"]
+    return (
+        chosen_scale(panel.unit, *usual.get(panel.unit, (1.0, panel.unit)))
+        if panel.unit != "1"
+        else usual["1"]
+    )
 
 
 def _style(curve: Curve, colours: Mapping[str, str], has_time: bool) -> dict[str, Any]:
-    """Line style: one colour for each part; a set point is dashed, a measurement and a command are thin."""
+    """Line style: one colour for each part; a set point is dashed, a measurement and a command are
+    thin.
+    """
     colour = colours[curve.part]
     if not has_time:
         return {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": colour}
     if curve.role == "lagged set point":
         return {"color": colour, "linestyle": ":", "linewidth": 1.0}
     if curve.role == "set point":
-        return {"color": BLACK if len(colours) == 1 else colour, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+        return {
+            "color": BLACK if len(colours) == 1 else colour,
+            "linestyle": (0, (4, 2)),
+            "linewidth": 1.0,
+        }
     if curve.role:
-        return {"color": colour, "linewidth": 0.7, "alpha": 0.6, "linestyle": DASHES[curve.variant % len(DASHES)]}
+        return {
+            "color": colour,
+            "linewidth": 0.7,
+            "alpha": 0.6,
+            "linestyle": DASHES[curve.variant % len(DASHES)],
+        }
     return {"color": colour, "linestyle": DASHES[curve.variant % len(DASHES)], "linewidth": 1.4}

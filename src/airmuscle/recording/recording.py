@@ -1,4 +1,6 @@
-"""Recording: SI columns with common rows, constants and origin, its notes on rows, and its display in a notebook."""
+"""Recording: SI columns with common rows, constants and origin, its notes on rows, and its display
+in a notebook.
+"""
 
 import dataclasses
 import textwrap
@@ -8,7 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core import Array, Reference, check_field_types, conversion, one_line
-from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, alternatives, listed
+from ..core.errors import (
+    AirmuscleError,
+    ColumnError,
+    HintedText,
+    ParameterError,
+    alternatives,
+    listed,
+)
 from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
@@ -16,7 +25,8 @@ from .plot import plot_columns
 if TYPE_CHECKING:
     import pandas as pd
 
-MAX_PANELS, MAX_POINTS = 4, 20_000
+MAX_PANELS = 4
+MAX_POINTS = 20_000
 """Maximum number of panels, and of rows of the chart; of more, every n-th row is drawn."""
 ROUNDING = 1e-12
 """Values below this fraction of the largest one of a column are shown as 0 (chosen)."""
@@ -30,10 +40,10 @@ class Recording(NotebookDisplay):
 
     columns    values by column name
     origin     name of the file, or description of the simulation
-    constants  constants of the run: resting_length [m], ambient [Pa], ambient_temperature [K], specimen
-    notes      notes for the user, such as assumptions made by the reader
-    units      units stated in the file, before conversion to SI
-    references sources: of published measurements, or of the models of a simulation
+    constants  constants of the run: resting_length [m], ambient [Pa], ambient_temperature [K],
+    specimen notes      notes for the user, such as assumptions made by the reader units      units
+    stated in the file, before conversion to SI references sources: of published measurements, or of
+    the models of a simulation
     """
 
     columns: Mapping[str, Array]
@@ -51,32 +61,47 @@ class Recording(NotebookDisplay):
                 arrays[name] = np.asarray(values, dtype=float).view()
             except (TypeError, ValueError, OverflowError):
                 raise ColumnError(
-                    f"{self.origin}: column '{one_line(name)}' is {one_line(values)}; it must be an array of numbers."
+                    f"{self.origin}: column '{one_line(name)}' is {one_line(values)}; it must be an"
+                    " array of numbers."
                 ) from None
         sizes = {name: vector.shape for name, vector in arrays.items()}
         if len(set(sizes.values())) > 1 or any(len(shape) != 1 for shape in sizes.values()):
-            raise ColumnError(f"{self.origin}: columns must be vectors of equal length; their shapes are {sizes}.")
+            raise ColumnError(
+                f"{self.origin}: columns must be vectors of equal length; their shapes are {sizes}."
+            )
         for vector in arrays.values():
             vector.setflags(write=False)
         object.__setattr__(self, "columns", arrays)
 
     @classmethod
     def from_arrays(
-        cls, columns: Mapping[str, Array], origin: str, constants: Mapping[str, float | str], notes: tuple[str, ...],
+        cls,
+        columns: Mapping[str, Array],
+        origin: str,
+        constants: Mapping[str, float | str],
+        notes: tuple[str, ...],
         references: tuple[Reference, ...],
-    ) -> "Recording":  # fmt: skip
+    ) -> "Recording":
         """A recording of read-only vectors of one length, which are not checked again."""
         recording = object.__new__(cls)
         recording.__dict__.update(
-            columns=columns, origin=origin, constants=constants, notes=notes, units={}, references=references
+            columns=columns,
+            origin=origin,
+            constants=constants,
+            notes=notes,
+            units={},
+            references=references,
         )
         return recording
 
     def __getitem__(self, name: str) -> Array:
-        """A column by its name, shape (N,). `contraction` and `length` are converted into each other if the resting
-        length is known. Raises ColumnError for an unknown column."""
+        """A column by its name, shape (N,). `contraction` and `length` are converted into each
+        other if the resting length is known. Raises ColumnError for an unknown column."""
         if not isinstance(name, str):
-            raise ColumnError(f"{self.origin}: no column '{one_line(name)}'; the columns are {listed(self.columns)}.")
+            raise ColumnError(
+                f"{self.origin}: no column '{one_line(name)}'; the columns are"
+                f" {listed(self.columns)}."
+            )
         values = self._column(name)
         if values is not None:
             return values
@@ -86,7 +111,10 @@ class Recording(NotebookDisplay):
             remedy = f" Specify the resting length to convert the {moved} to a contraction."
         elif name == "contraction" and "position" in self.columns:
             remedy = HintedText(" ", ZERO_NOT_STATED)
-        text = f"{self.origin}: no column '{name}'{alternatives(name, list(self.columns), 'the columns are')}"
+        text = (
+            f"{self.origin}: no column"
+            f" '{name}'{alternatives(name, list(self.columns), 'the columns are')}"
+        )
         raise ColumnError(HintedText(text, remedy))
 
     def _column(self, name: str) -> Array | None:
@@ -100,7 +128,11 @@ class Recording(NotebookDisplay):
         contraction = self.columns.get("contraction")
         if contraction is None and "shortening" in self.columns:
             contraction = self.columns["shortening"] / length
-        return contraction if contraction is None or name == "contraction" else length * (1.0 - contraction)
+        return (
+            contraction
+            if contraction is None or name == "contraction"
+            else length * (1.0 - contraction)
+        )
 
     def __contains__(self, name: str) -> bool:
         return isinstance(name, str) and self._column(name) is not None
@@ -114,21 +146,30 @@ class Recording(NotebookDisplay):
     def in_unit(self, name: str, unit: str | None) -> Array:
         """A column in the given SI unit, shape (N,).
 
-        A column of an unknown quantity, such as `height [mm]`, is stored without conversion. It is converted here from
-        the unit in its heading, unless `unit` is None; its name may be 'height'. Raises ColumnError or UnitError.
+        A column of an unknown quantity, such as `height [mm]`, is stored without conversion. It is
+        converted here from the unit in its heading, unless `unit` is None; its name may be
+        'height'. Raises ColumnError or UnitError.
         """
         for heading, values in self.columns.items():
             plain, heading_unit = split_unit(heading)
             if heading_unit is not None and name in (heading, plain):
-                convert = conversion(heading_unit, unit, where=f"{self.origin}, {heading}") if unit else np.asarray
+                convert = (
+                    conversion(heading_unit, unit, where=f"{self.origin}, {heading}")
+                    if unit
+                    else np.asarray
+                )
                 return np.asarray(convert(values))
         return self[name]
 
     def rows(self, selection: Any) -> "Recording":
-        """The recording reduced to the rows that a mask, slice or index array selects; itself for a mask of all."""
+        """The recording reduced to the rows that a mask, slice or index array selects; itself for a
+        mask of all.
+        """
         if isinstance(selection, np.ndarray) and selection.dtype == bool and selection.all():
             return self
-        return dataclasses.replace(self, columns={name: values[selection] for name, values in self.columns.items()})
+        return dataclasses.replace(
+            self, columns={name: values[selection] for name, values in self.columns.items()}
+        )
 
     def with_columns(self, **columns: Any) -> "Recording":
         """The recording with added or replaced columns in SI units."""
@@ -143,32 +184,43 @@ class Recording(NotebookDisplay):
         try:
             import pandas as pd
         except ImportError:
-            raise AirmuscleError("to_pandas needs the package pandas. Install it: pip install airmuscle[lab]") from None
+            raise AirmuscleError(
+                "to_pandas needs the package pandas. Install it: pip install airmuscle[lab]"
+            ) from None
 
         return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})
 
     def plot(self, *names: str, ax: Any = None) -> Any:
-        """Plot the named columns, or all, over time or else the row number, each quantity in one panel.
+        """Plot the named columns, or all, over time or else the row number, each quantity in one
+        panel.
 
-        `ax` is a Matplotlib Axes, or a sequence of one for each panel; it is returned. Without it, a new figure is
-        returned. Raises ColumnError for an unknown column, ParameterError if `ax` contains too few Axes.
+        `ax` is a Matplotlib Axes, or a sequence of one for each panel; it is returned. Without it,
+        a new figure is returned. Raises ColumnError for an unknown column, ParameterError if `ax`
+        contains too few Axes.
         """
-        columns = {name: self[name] for name in (names or self) if name != "time"}
-        return plot_columns(columns, self.columns.get("time"), self.origin, ax=ax, ordered=not names)
+        columns = {name: self[name] for name in names or self if name != "time"}
+        return plot_columns(
+            columns, self.columns.get("time"), self.origin, ax=ax, ordered=not names
+        )
 
     def animate(self, plant: Any, speed: float = 1.0) -> Any:
         """An animation of this run of a plant: a joint of two muscles, or a load on one muscle.
 
-        The muscles bulge as their geometry does and are coloured by their pressure. `speed` is that of the display, 1
-        for real time. `animation.save("run.gif")` writes it (.gif, .mp4, .html), `animation.still(time)` is the figure
-        at a time [s]; a notebook shows it. Raises ParameterError for another plant, ColumnError for a missing column.
+        The muscles bulge as their geometry does and are coloured by their pressure. `speed` is that
+        of the display, 1 for real time. `animation.save("run.gif")` writes it (.gif, .mp4, .html),
+        `animation.still(time)` is the figure at a time [s]; a notebook shows it. Raises
+        ParameterError for another plant, ColumnError for a missing column.
         """
         if not hasattr(plant, "animate"):
-            raise ParameterError(f"animate: {one_line(plant)} is no plant; give the Plant of the run.")
+            raise ParameterError(
+                f"animate: {one_line(plant)} is no plant; give the Plant of the run."
+            )
         return plant.animate(self, speed)
 
     def __repr__(self) -> str:
-        shown = textwrap.shorten(", ".join(self.columns), MAX_REPR, placeholder=f" ... ({len(self.columns)} columns)")
+        shown = textwrap.shorten(
+            ", ".join(self.columns), MAX_REPR, placeholder=f" ... ({len(self.columns)} columns)"
+        )
         return f"Recording({self.origin}: {len(self)} rows of {shown})"
 
     def _card(self) -> Card:
@@ -202,14 +254,20 @@ def recording_card(recording: Any, units: Mapping[str, str]) -> Card:
 
 
 class RowNote(str):
-    """Note on rows that were left out or filled, which the commands print and the reports contain."""
+    """Note on rows that were left out or filled, which the commands print and the reports
+    contain.
+    """
 
     __slots__ = ()
 
 
 def row_notes(recordings: Iterable[Recording]) -> list[str]:
     """The notes of the recordings on rows that were left out or filled, each once."""
-    return list(dict.fromkeys(note for each in recordings for note in each.notes if isinstance(note, RowNote)))
+    return list(
+        dict.fromkeys(
+            note for each in recordings for note in each.notes if isinstance(note, RowNote)
+        )
+    )
 
 
 def list_rows(label: str, rows: Sequence[Any] | Any, most: int) -> str:

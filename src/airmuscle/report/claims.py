@@ -1,4 +1,6 @@
-"""Claims of a report: statements of papers with the expected and the computed value; every verdict is computed."""
+"""Claims of a report: statements of papers with the expected and the computed value; every verdict
+is computed.
+"""
 
 import abc
 import dataclasses
@@ -9,23 +11,32 @@ from typing import Any, ClassVar
 
 from .formatting import DIGITS, MISSING, format_number, to_plain
 
-HOLDS, DIFFERS, DEPENDS = "holds", "differs", "depends"
-NOT_TESTABLE, NOT_PRINTED = "not testable", "not printed"
+HOLDS = "holds"
+DIFFERS = "differs"
+DEPENDS = "depends"
+NOT_TESTABLE = "not testable"
+NOT_PRINTED = "not printed"
 MARKS = {HOLDS: "✓", DIFFERS: "✗", DEPENDS: "±", NOT_TESTABLE: "?", NOT_PRINTED: "–"}
 """A sign next to each verdict, so that it does not depend on colour."""
 
 MEANINGS = {
-    HOLDS: "The reproduced value agrees with the expected one within the tolerance, in every reading.",
+    HOLDS: (
+        "The reproduced value agrees with the expected one within the tolerance, in every reading."
+    ),
     DIFFERS: "The reproduced value does not agree with the expected one, in any reading.",
     DEPENDS: "It agrees in some readings of the paper and not in others.",
-    NOT_TESTABLE: "Its measurements are lost, its condition is not printed, or every law fulfils it.",
+    NOT_TESTABLE: (
+        "Its measurements are lost, its condition is not printed, or every law fulfils it."
+    ),
     NOT_PRINTED: "The paper gives no value to compare with, or no value can be computed.",
 }
 """Meaning of each verdict."""
 
 
 class Kind(enum.Enum):
-    """Kind of an entry in the list of claims; each kind is listed and counted apart from the others."""
+    """Kind of an entry in the list of claims; each kind is listed and counted apart from the
+    others.
+    """
 
     CLAIM = "claim"
     FINDING = "comparison"
@@ -52,9 +63,10 @@ _DESCRIPTIONS = {
 class PublishedValue(abc.ABC):
     """The value that a paper prints for a claim, and the criterion for the reproduced number.
 
-    Where a paper says only "low" or "comparable", the bound is `chosen`: then `claims.json` gives no published
-    value, and the bound as the tolerance. A value that follows from printed ones, or from a word such as "higher", is
-    `derived`: it is not published either, and `claims.json` gives it as the expected value.
+    Where a paper says only "low" or "comparable", the bound is `chosen`: then `claims.json` gives
+    no published value, and the bound as the tolerance. A value that follows from printed ones, or
+    from a word such as "higher", is `derived`: it is not published either, and `claims.json` gives
+    it as the expected value.
     """
 
     value: float
@@ -103,11 +115,12 @@ class AtMost(PublishedValue):
 class Claim:
     """One statement of a paper, in one case, with the printed and the reproduced value.
 
-    `case` names the interpretation, load or range for which the statement is evaluated; a statement with several cases
-    counts once. `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be
-    computed; in both cases the verdict is "not printed". `untestable` marks a statement that no computation can decide,
-    because its measurements are lost, its condition is not printed or every law fulfils it: it is "not testable".
-    `place` is where the paper states it, `note` gives the reason of a difference, or the values chosen.
+    `case` names the interpretation, load or range for which the statement is evaluated; a statement
+    with several cases counts once. `printed` is None if the paper gives no value to compare with,
+    `reproduced` is None if no value can be computed; in both cases the verdict is "not printed".
+    `untestable` marks a statement that no computation can decide, because its measurements are
+    lost, its condition is not printed or every law fulfils it: it is "not testable". `place` is
+    where the paper states it, `note` gives the reason of a difference, or the values chosen.
     """
 
     paper: str
@@ -148,7 +161,9 @@ class Claim:
             "expected": printed.value if printed and printed.derived else None,
             "reproduced": self.reproduced,
             "unit": self.unit,
-            "tolerance": None if printed is None else printed.value if printed.chosen else printed.tolerance,
+            "tolerance": (
+                None if printed is None else printed.value if printed.chosen else printed.tolerance
+            ),
             "verdict": self.verdict,
             "note": to_plain(self.note),
         }
@@ -156,10 +171,12 @@ class Claim:
 
 @dataclasses.dataclass(frozen=True)
 class ClaimRow:
-    """One row of a table of claims: a claim without its value, the function that reproduces the value, and the cases.
+    """One row of a table of claims: a claim without its value, the function that reproduces the
+    value, and the cases.
 
-    `reproduce` returns the value, or the value with a further sentence of the note; without it these are the arguments,
-    and without arguments no value can be computed. `cases` maps the name of each case to its arguments.
+    `reproduce` returns the value, or the value with a further sentence of the note; without it
+    these are the arguments, and without arguments no value can be computed. `cases` maps the name
+    of each case to its arguments.
     """
 
     blank: Claim
@@ -174,8 +191,12 @@ class ClaimRow:
         return dataclasses.replace(self.blank, reproduced=value, note=note, case=case)
 
     def claims(self, *subject: Any) -> tuple[Claim, ...]:
-        """Return the claims of all cases; the function is given the subject before the arguments of the case."""
-        return tuple(self.claim(case, *subject, *arguments) for case, arguments in self.cases.items())
+        """Return the claims of all cases; the function is given the subject before the arguments of
+        the case.
+        """
+        return tuple(
+            self.claim(case, *subject, *arguments) for case, arguments in self.cases.items()
+        )
 
 
 def claims_of(rows: Iterable[ClaimRow], *subject: Any) -> tuple[Claim, ...]:
@@ -200,19 +221,27 @@ class Statement:
     def reproduced(self) -> list[float]:
         """The values of the cases that have the expected value and the unit of the first one."""
         first = self.cases[0]
-        alike = (case.reproduced for case in self.cases if (case.printed, case.unit) == (first.printed, first.unit))
+        alike = (
+            case.reproduced
+            for case in self.cases
+            if (case.printed, case.unit) == (first.printed, first.unit)
+        )
         return [value for value in alike if value is not None and math.isfinite(value)]
 
     @property
     def verdict(self) -> str:
-        """The common verdict of the cases; "depends" if the statement holds in some and differs in others."""
+        """The common verdict of the cases; "depends" if the statement holds in some and differs in
+        others.
+        """
         verdicts = [case.verdict for case in self.cases]
         decided = {verdict for verdict in verdicts if verdict in (HOLDS, DIFFERS)}
         return DEPENDS if len(decided) > 1 else decided.pop() if decided else verdicts[0]
 
 
 def statements(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> tuple[Statement, ...]:
-    """Return the statements of one kind in the order of their first case, each with all its cases."""
+    """Return the statements of one kind in the order of their first case, each with all its
+    cases.
+    """
     cases: dict[tuple[str, str], list[Claim]] = {}
     for claim in claims:
         if claim.kind is kind:
@@ -221,16 +250,24 @@ def statements(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> tuple[Statem
 
 
 def format_published(claim: Claim, *, with_tolerance: bool = True) -> str:
-    """Return the published value with its relation and tolerance: `≥ 4`, `20 ± 0.5`; an en dash if there is none."""
+    """Return the published value with its relation and tolerance: `≥ 4`, `20 ± 0.5`; an en dash if
+    there is none.
+    """
     if claim.printed is None:
         return MISSING
-    tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance and with_tolerance else ""
+    tolerance = (
+        f" ± {format_number(claim.printed.tolerance)}"
+        if claim.printed.tolerance and with_tolerance
+        else ""
+    )
     origin = " (chosen)" if claim.printed.chosen else " (derived)" if claim.printed.derived else ""
     return f"{claim.printed.relation}{format_number(claim.printed.value)}{tolerance}{origin}"
 
 
 def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str, int]:
-    """Return the number of statements of one kind with each verdict; the cases of a statement count once."""
+    """Return the number of statements of one kind with each verdict; the cases of a statement count
+    once.
+    """
     verdicts = [statement.verdict for statement in statements(claims, kind)]
     return {verdict: verdicts.count(verdict) for verdict in MARKS}
 

@@ -1,11 +1,13 @@
-"""Chapters as plain data: for JSON all quantities and tables, for the page in the browser as they are shown.
+"""Chapters as plain data: for JSON all quantities and tables, for the page in the browser as they
+are shown.
 
     {chapter: {"title", "summary": [...], "problems": [...], "notes": [...],
                quantity: value, ..., table: [{column: value, ...}, ...], ...,
                "settings": [...], "references": [...], "units": {...}}}
 
-Keys are the names with underscores: `rms error` is `rms_error`. `units` gives the SI unit of each value, `rms_error`,
-and of each column of a table, `parameters.value`; "by row" is that of the column `unit`. A long series is in its file.
+Keys are the names with underscores: `rms error` is `rms_error`. `units` gives the SI unit of each
+value, `rms_error`, and of each column of a table, `parameters.value`; "by row" is that of the
+column `unit`. A long series is in its file.
 """
 
 import csv
@@ -40,19 +42,30 @@ def _chapter(chapter: Chapter) -> dict[str, Any]:
         "notes": list(map(to_plain, chapter.notes)),
         **{_key(each.name): each.value for each in chapter.values},
         **{_key(table.key): _rows(table) for table in tables},
-        "settings": [{"quantity": what, "value": value, "source": source} for what, value, source in chapter.chosen],
+        "settings": [
+            {"quantity": what, "value": value, "source": source}
+            for what, value, source in chapter.chosen
+        ],
         "references": list(map(str, chapter.references)),
         "units": {
             **{_key(each.name): each.unit for each in chapter.values if each.unit},
-            **{f"{_key(table.key)}.{_key(name)}": column.unit
-               for table in tables for name, column in table.columns.items() if column.unit},
+            **{
+                f"{_key(table.key)}.{_key(name)}": column.unit
+                for table in tables
+                for name, column in table.columns.items()
+                if column.unit
+            },
         },
-    }  # fmt: skip
+    }
 
 
 def _rows(table: Table) -> list[dict[str, Any]]:
-    keys, columns = [_key(name) for name in table.columns], table.columns.values()
-    return [dict(zip(keys, row, strict=True)) for row in zip(*(each.values for each in columns), strict=True)]
+    keys = [_key(name) for name in table.columns]
+    columns = table.columns.values()
+    return [
+        dict(zip(keys, row, strict=True))
+        for row in zip(*(each.values for each in columns), strict=True)
+    ]
 
 
 def _key(name: str) -> str:
@@ -60,7 +73,9 @@ def _key(name: str) -> str:
 
 
 def as_json(content: Any) -> str:
-    """Return standard JSON: NumPy values become plain ones, values that are not finite become null."""
+    """Return standard JSON: NumPy values become plain ones, values that are not finite become
+    null.
+    """
     return json.dumps(_json_value(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -81,7 +96,10 @@ def in_words(chapter: Chapter, words: Callable[[str], str]) -> Chapter:
         return words(value) if isinstance(value, str) else value
 
     def table(each: Table) -> Table:
-        worded = {name: dataclasses.replace(c, values=list(map(cell, c.values))) for name, c in each.columns.items()}
+        worded = {
+            name: dataclasses.replace(c, values=list(map(cell, c.values)))
+            for name, c in each.columns.items()
+        }
         return dataclasses.replace(each, columns=worded)
 
     return dataclasses.replace(
@@ -95,7 +113,9 @@ def in_words(chapter: Chapter, words: Callable[[str], str]) -> Chapter:
 
 
 def as_sheet(chapter: Chapter) -> dict[str, Any]:
-    """The chapter as plain data: title, paragraphs, problems, notes, values and tables by name; numbers as texts."""
+    """The chapter as plain data: title, paragraphs, problems, notes, values and tables by name;
+    numbers as texts.
+    """
     return {
         "title": to_plain(chapter.title),
         "paragraphs": list(map(to_plain, chapter.paragraphs)),
@@ -107,19 +127,25 @@ def as_sheet(chapter: Chapter) -> dict[str, Any]:
 
 
 def table_sheet(table: Table) -> dict[str, Any]:
-    """A table as plain data: title, note, headings with whether their column is numeric, and rows of texts."""
+    """A table as plain data: title, note, headings with whether their column is numeric, and rows
+    of texts.
+    """
     columns = shown_columns(table)
     cells = [[to_plain(each.cell_text(cell)) for cell in each.cells] for each in columns]
     return {
         "title": to_plain(table.title),
         "note": to_plain(table.note),
-        "headings": [{"text": to_plain(each.heading), "number": each.is_numeric} for each in columns],
+        "headings": [
+            {"text": to_plain(each.heading), "number": each.is_numeric} for each in columns
+        ],
         "rows": [list(row) for row in zip(*cells, strict=True)],
     }
 
 
 def csv_text(table: Table) -> str:
-    """A table as CSV: headers with units, numbers with all digits, an empty cell for NaN and infinity."""
+    """A table as CSV: headers with units, numbers with all digits, an empty cell for NaN and
+    infinity.
+    """
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     columns = shown_columns(table, chosen=False)

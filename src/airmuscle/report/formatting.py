@@ -1,8 +1,9 @@
 r"""Formatting of numbers, units and formulas for the page and the terminal.
 
-A text of a chapter (claim, caption, table title, column header, cell) may contain formulas: LaTeX between \( and \),
-such as \(k_\text{max}\). The page shows them as MathML, which browsers render without scripts, a figure as Matplotlib
-mathtext; CSV and JSON files, the terminal and alternative texts of figures contain the plain form, k_max.
+A text of a chapter (claim, caption, table title, column header, cell) may contain formulas: LaTeX
+between \( and \), such as \(k_\text{max}\). The page shows them as MathML, which browsers render
+without scripts, a figure as Matplotlib mathtext; CSV and JSON files, the terminal and alternative
+texts of figures contain the plain form, k_max.
 """
 
 import functools
@@ -18,7 +19,8 @@ import numpy as np
 DIGITS = 4
 """Significant digits of a number in a report."""
 MISSING = "–"
-P_VALUE, SMALLEST_P = "p-value", 1e-3
+P_VALUE = "p-value"
+SMALLEST_P = 1e-3
 """Header of a column of p-values, and the value below which one is shown as a bound."""
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _EXPONENT = re.compile(r"(?:\b1|(\d(?:\.\d+)?))e([-+]?)0*(\d+)\b")
@@ -29,9 +31,11 @@ _SUPERSCRIPTS = str.maketrans("0123456789ij", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁱʲ"
 
 
 def format_number(value: Any, digits: int = DIGITS) -> str:
-    """Return a number rounded to significant digits; integers and text unchanged, an en dash for None and NaN.
+    """Return a number rounded to significant digits; integers and text unchanged, an en dash for
+    None and NaN.
 
-    Magnitudes from 1e-4 to 1e6 have no exponent, zero has no sign. A truth value is yes or no, a pair `1 to 2`.
+    Magnitudes from 1e-4 to 1e6 have no exponent, zero has no sign. A truth value is yes or no, a
+    pair `1 to 2`.
     """
     if value is None:
         return MISSING
@@ -53,13 +57,16 @@ def format_number(value: Any, digits: int = DIGITS) -> str:
 
 
 def format_cell(value: Any, digits: int = DIGITS) -> str:
-    """Return a table cell: as `format_number` does, also numbers stored as text, in typographic form."""
+    """Return a table cell: as `format_number` does, also numbers stored as text, in typographic
+    form.
+    """
     if isinstance(value, str) and not _NUMBERS.fullmatch(value):
         return value
     if is_number_text(value) and not value.lstrip("-+").isdigit():
         mantissa = value.partition("e")[0].lstrip("-+0.")
         if "e" in value or sum(map(str.isdigit, mantissa)) > DIGITS:
-            value, digits = float(value), DIGITS
+            value = float(value)
+            digits = DIGITS
     return typographic(_NEGATIVE_ZERO.sub("", format_number(value, digits)))
 
 
@@ -69,7 +76,9 @@ def is_number_text(value: Any) -> bool:
 
 
 def format_p_value(value: float | None) -> str:
-    """Return a p-value to two significant digits, `< 0.001` if it is smaller; an en dash for None and NaN."""
+    """Return a p-value to two significant digits, `< 0.001` if it is smaller; an en dash for None
+    and NaN.
+    """
     if value is not None and value < SMALLEST_P:
         return f"< {SMALLEST_P:g}"
     return format_number(value, 2)
@@ -82,11 +91,17 @@ def format_quantity(value: float, unit: str) -> str:
 
 def format_unit(unit: str) -> str:
     """Return a unit with superscripts, `m³/(s Pa)`; empty for the unit 1."""
-    return "" if unit == "1" else _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), unit)
+    return (
+        ""
+        if unit == "1"
+        else _POWER.sub(lambda match: (match[1] or match[2]).translate(_SUPERSCRIPTS), unit)
+    )
 
 
 def typographic(text: str) -> str:
-    """Return a formatted number with a minus sign and a power of ten: `-2.5e-07` as `−2.5 × 10⁻⁷`."""
+    """Return a formatted number with a minus sign and a power of ten: `-2.5e-07` as `−2.5 ×
+    10⁻⁷`.
+    """
 
     def power(match: re.Match[str]) -> str:
         sign = "⁻" if match[2] == "-" else ""
@@ -106,9 +121,31 @@ _NAME = re.compile(r"(?P<base>[A-Za-z]+)(?:_(?P<index>[A-Za-z0-9]+(?:_[A-Za-z0-9
 _UNIT_SPACE = re.compile(r"(?<=\d) (?=%|(?:k?N|[kM]?Pa|[mc]?m|k?g|m?s|bar|K|rad|Hz)\b)")
 _GREEK = {
     name: rf"\{name}"
-    for name in ("alpha", "beta", "gamma", "delta", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "pi", "rho",
-                 "sigma", "tau", "phi", "psi", "omega", "Delta", "Gamma", "Omega", "Phi")
-} | {"eps": r"\varepsilon"}  # fmt: skip
+    for name in (
+        "alpha",
+        "beta",
+        "gamma",
+        "delta",
+        "zeta",
+        "eta",
+        "theta",
+        "kappa",
+        "lambda",
+        "mu",
+        "nu",
+        "pi",
+        "rho",
+        "sigma",
+        "tau",
+        "phi",
+        "psi",
+        "omega",
+        "Delta",
+        "Gamma",
+        "Omega",
+        "Phi",
+    )
+} | {"eps": r"\varepsilon"}
 _SYMBOL = re.compile(r"[\w^() '-]+")
 """Characters of a symbol; a label with others, `geometry.radius`, is a name and no formula."""
 _INDICES = re.compile(r"[0-9ijk]+")
@@ -119,11 +156,14 @@ _SPACED = "=+-<>≤≥≈≠"
 
 def to_mathml(text: str) -> str:
     r"""Return HTML: the text escaped, every formula \(...\) replaced by a MathML element."""
-    result, end = "", 0
+    result = ""
+    end = 0
     for match in _FORMULA_WITH_PUNCTUATION.finditer(text):
         before, latex, after = match.groups()
         formula = _escape(before) + _mathml(latex) + _escape(after)
-        result += _escape(text[end : match.start()]) + (_NO_WRAP.format(formula) if before or after else formula)
+        result += _escape(text[end : match.start()]) + (
+            _NO_WRAP.format(formula) if before or after else formula
+        )
         end = match.end()
     return result + _escape(text[end:])
 
@@ -134,7 +174,9 @@ def _escape(text: str) -> str:
 
 
 def to_plain(text: str) -> str:
-    r"""Return the text with every formula \(...\) replaced by its plain form, for example k_max (1 - e^v)."""
+    r"""Return the text with every formula \(...\) replaced by its plain form, for example k_max (1
+    - e^v).
+    """
     return _FORMULA.sub(lambda match: _plain_formula(match[1]), text)
 
 
@@ -144,7 +186,9 @@ def to_mathtext(text: str) -> str:
 
 
 def symbol_formula(symbol: str) -> str:
-    r"""Return a declared symbol such as eps_0 as a formula, \(\varepsilon_{0}\), and any other label unchanged."""
+    r"""Return a declared symbol such as eps_0 as a formula, \(\varepsilon_{0}\), and any other
+    label unchanged.
+    """
     if not _SYMBOL.fullmatch(symbol):
         return symbol
     products = re.sub(r"(?<=\w) (?=\w)", r"\\,", symbol)
@@ -152,14 +196,21 @@ def symbol_formula(symbol: str) -> str:
 
 
 def _symbol_latex(match: re.Match[str]) -> str:
-    base, index = match["base"], match["index"]
-    latex = _GREEK.get(base, rf"\text{{{base}}}" if len(base) > 2 else base)  # words are set upright
+    base = match["base"]
+    index = match["index"]
+    latex = _GREEK.get(
+        base, rf"\text{{{base}}}" if len(base) > 2 else base
+    )  # words are set upright
     if base == "qm":  # mass flow, ISO 80000-4
         return r"q_\text{m}"
     if index is None:
         return latex
     parts = [each if _INDICES.fullmatch(each) else rf"\text{{{each}}}" for each in index.split("_")]
-    return f"{latex}_{parts[0]}" if len(parts) == 1 and parts[0] != index else f"{latex}_{{{', '.join(parts)}}}"
+    return (
+        f"{latex}_{parts[0]}"
+        if len(parts) == 1 and parts[0] != index
+        else f"{latex}_{{{', '.join(parts)}}}"
+    )
 
 
 def to_display_mathml(latex: str) -> str:
@@ -171,7 +222,9 @@ def to_display_mathml(latex: str) -> str:
 def _mathml(latex: str, display: Literal["block", "inline"] = "inline") -> str:
     from latex2mathml.converter import convert  # needed by reports only
 
-    return convert(latex, display=display).replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">&#x0002F;</mo>')
+    return convert(latex, display=display).replace(
+        "<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">&#x0002F;</mo>'
+    )
 
 
 @functools.cache
@@ -197,7 +250,9 @@ def _plain(element: ElementTree.Element) -> str:
         return " "
     if not parts:
         return (element.text or "").replace("\u2212", "-")
-    text, after_operator = "", True  # of a row; a sign at its beginning or after an operator has no space behind it
+    # of a row; a sign at its beginning or after an operator has no space behind it
+    text = ""
+    after_operator = True
     for child, part in zip(element, parts, strict=True):
         operator = child.tag.endswith("}mo")
         text += f" {part} " if operator and part in _SPACED and not after_operator else part

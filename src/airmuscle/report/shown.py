@@ -1,4 +1,6 @@
-"""Tables and quantities as they are shown, with headings and units; tables of parameters and of estimates."""
+"""Tables and quantities as they are shown, with headings and units; tables of parameters and of
+estimates.
+"""
 
 import dataclasses
 import itertools
@@ -6,11 +8,28 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from ..core import Leaf, chosen_scale, conversion, heading_scale, known_factor, leaves, scaled_numbers
+from ..core import (
+    Leaf,
+    chosen_scale,
+    conversion,
+    heading_scale,
+    known_factor,
+    leaves,
+    scaled_numbers,
+)
 from .chapter import BY_ROW, NamedValue, Table, TableColumn
-from .formatting import P_VALUE, format_cell, format_number, format_p_value, format_unit, is_number_text
+from .formatting import (
+    P_VALUE,
+    format_cell,
+    format_number,
+    format_p_value,
+    format_unit,
+    is_number_text,
+)
 
-UNIT, MEANING, SYMBOL = "unit", "meaning", "symbol"
+UNIT = "unit"
+MEANING = "meaning"
+SYMBOL = "symbol"
 """Names of columns with a special form."""
 _ANR = " (ANR)"
 """End of the unit of a volume of air at the reference atmosphere of ISO 8778."""
@@ -44,7 +63,8 @@ class ShownColumn:
 
 
 def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> list[ShownColumn]:
-    """The columns of a table as they are shown, in the units of the user's choice or, for a file, in the declared ones.
+    """The columns of a table as they are shown, in the units of the user's choice or, for a file,
+    in the declared ones.
 
     A meaning that is that of the row above, as of the coefficients of a polynomial, is shown once.
     """
@@ -56,7 +76,9 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
     for name, column in table.columns.items():
         if brief and not column.brief:
             continue
-        cells, heading, factor = [column.values[i] for i in rows], (brief and column.short) or name, 1.0
+        cells = [column.values[i] for i in rows]
+        heading = (brief and column.short) or name
+        factor = 1.0
         if column.unit == BY_ROW:
             cells = [_times(cell, scale) for cell, (scale, _) in zip(cells, scales, strict=True)]
         elif name == UNIT:
@@ -74,11 +96,14 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
 
 
 def scale_of(name: str, unit: str, shown: str = "", *, chosen: bool = True) -> tuple[float, str]:
-    """Factor from SI, and the unit in which a quantity is shown. A ratio has a unit of choice only as contraction."""
+    """Factor from SI, and the unit in which a quantity is shown. A ratio has a unit of choice only
+    as contraction.
+    """
     label = shown or unit
     factor = 1.0
     if label != unit:
-        plain, si_unit = label.removesuffix(_ANR), unit.removesuffix(_ANR)
+        plain = label.removesuffix(_ANR)
+        si_unit = unit.removesuffix(_ANR)
         factor = 1.0 / (known_factor(plain, 0.0) or conversion(plain, si_unit).factor)
     if chosen and (unit != "1" or "contraction" in name.lower()):
         return chosen_scale(unit, factor, label)
@@ -87,7 +112,11 @@ def scale_of(name: str, unit: str, shown: str = "", *, chosen: bool = True) -> t
 
 def value_cells(named: NamedValue) -> tuple[str, str]:
     """A named value as text, and its unit in the choice of the user."""
-    if not named.unit or not isinstance(named.value, int | float | tuple) or isinstance(named.value, bool):
+    if (
+        not named.unit
+        or not isinstance(named.value, int | float | tuple)
+        or isinstance(named.value, bool)
+    ):
         return format_number(named.value, named.digits), ""
     factor, unit = scale_of(named.name, named.unit, named.shown)
     return format_number(_times(named.value, factor), named.digits), "" if unit == "1" else unit
@@ -122,14 +151,23 @@ MAX_VALUES = 30
 
 
 def parameter_table(model: Any, name: str, title: str, *, brief: bool = False) -> Table:
-    """Return a table of all declared parameters of a model: path, symbol, value, unit and meaning."""
+    """Return a table of all declared parameters of a model: path, symbol, value, unit and
+    meaning.
+    """
     return leaf_table(((leaf.path, leaf) for leaf in leaves(model)), name, title, brief=brief)
 
 
 def leaf_table(
-    rows: Iterable[tuple[str, Leaf]], name: str, title: str, *, bounds: bool = False, brief: bool = False
+    rows: Iterable[tuple[str, Leaf]],
+    name: str,
+    title: str,
+    *,
+    bounds: bool = False,
+    brief: bool = False,
 ) -> Table:
-    """Return a table of parameters under the given paths; the brief view has all but the middle of long lists."""
+    """Return a table of parameters under the given paths; the brief view has all but the middle of
+    long lists.
+    """
     listed = list(rows)
     columns: dict[str, Any] = {
         "parameter": [path for path, _ in listed],
@@ -144,18 +182,25 @@ def leaf_table(
         columns["bounds"] = TableColumn(finite, BY_ROW, digits=6)
         columns["fitted"] = TableColumn([leaf.declared.fitted for _, leaf in listed], brief=False)
     stems = [path.partition("[")[0] for path, _ in listed]
-    ends = [i for i, stem in enumerate(stems)  # without the middle of long lists
-            if (count := stems.count(stem)) <= MAX_VALUES or i - stems.index(stem) in (0, 1, count - 1)]  # fmt: skip
+    ends = [
+        i
+        for i, stem in enumerate(stems)  # without the middle of long lists
+        if (count := stems.count(stem)) <= MAX_VALUES or i - stems.index(stem) in (0, 1, count - 1)
+    ]
     return Table(name, title, columns, brief=ends if brief else 0)
 
 
 def estimate_table(estimates: Sequence[Any], name: str, title: str, *, brief: int = 0) -> Table:
-    """Return a table of the estimates of a fit with their standard errors; a parameter on a bound has none.
+    """Return a table of the estimates of a fit with their standard errors; a parameter on a bound
+    has none.
 
     Each estimate has `name`, `label`, `value`, `stderr`, `unit`, `meaning` and `on_bound`.
     """
     bound = ["on bound" if each.on_bound else "" for each in estimates]
-    errors = [None if each.on_bound or not math.isfinite(each.stderr) else each.stderr for each in estimates]
+    errors = [
+        None if each.on_bound or not math.isfinite(each.stderr) else each.stderr
+        for each in estimates
+    ]
     columns = {
         "parameter": [each.name for each in estimates],
         "symbol": [each.label for each in estimates],

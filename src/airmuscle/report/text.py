@@ -1,4 +1,6 @@
-"""Brief view of chapters as plain text: for each the title, the result, its quantities and tables, and the notes."""
+"""Brief view of chapters as plain text: for each the title, the result, its quantities and tables,
+and the notes.
+"""
 
 import re
 import textwrap
@@ -13,15 +15,20 @@ from .shown import shown_columns, value_cells
 MAX_WORD = 14
 """Length of a word that may be broken, such as a path [characters] (chosen)."""
 GAP = 3
-"""Space between two columns of a table [characters]; one less where the table does not fit otherwise (chosen)."""
+"""Space between two columns of a table [characters]; one less where the table does not fit
+otherwise (chosen).
+"""
 MAX_NOTES = 8
 """Maximum number of notes of a chapter (chosen)."""
 _UNIT = re.compile(r"\[[^\]]*\]")
 
 
 def as_text(chapters: Sequence[Chapter], width: int, rest: str = "the report") -> str:
-    """The brief view of the chapters, each result once; `rest` names the place of what it leaves out."""
-    texts, stated = list[str](), tuple[str, ...]()
+    """The brief view of the chapters, each result once; `rest` names the place of what it leaves
+    out.
+    """
+    texts = list[str]()
+    stated = tuple[str, ...]()
     for chapter in (each for each in chapters if each.brief):
         result = chapter.paragraphs[:1]
         texts.append("\n".join(_lines(chapter, () if result == stated else result, width, rest)))
@@ -39,8 +46,15 @@ def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> It
         yield f"{_padded(name, widths[0])}   {_padded(value, widths[1])}   {remark}".rstrip()
     for table in chapter.tables:
         if table.brief_rows:
-            yield from ["", *([to_plain(table.title)] if table.title else []), *table_lines(table, width, rest)]
-    remarks = [*(f"PROBLEM: {text}" for text in chapter.problems), *(f"note: {text}" for text in chapter.notes)]
+            yield from [
+                "",
+                *([to_plain(table.title)] if table.title else []),
+                *table_lines(table, width, rest),
+            ]
+    remarks = [
+        *(f"PROBLEM: {text}" for text in chapter.problems),
+        *(f"note: {text}" for text in chapter.notes),
+    ]
     if remarks and any(table.brief_rows for table in chapter.tables):
         yield ""
     yield from map(to_plain, remarks[:MAX_NOTES])
@@ -49,10 +63,15 @@ def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> It
 
 
 def table_lines(table: Table, width: int, rest: str) -> Iterator[str]:
-    """The brief rows of a table, and the number of those that are left out between or after them."""
+    """The brief rows of a table, and the number of those that are left out between or after
+    them.
+    """
     columns = shown_columns(table, brief=True)
     headings = [
-        _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), printable(to_plain(each.heading)))
+        _UNIT.sub(
+            lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"),
+            printable(to_plain(each.heading)),
+        )
         for each in columns
     ]
     cells = [[printable(to_plain(text)) for text in each.texts] for each in columns]
@@ -72,24 +91,41 @@ def table_lines(table: Table, width: int, rest: str) -> Iterator[str]:
 
 def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], gap: int) -> list[str]:
     """The lines of a row; a text that is wider than its column is wrapped."""
-    wrapped = [[cell] if cell_width(cell) <= size else
-               textwrap.wrap(cell, size, break_on_hyphens=False, break_long_words=True)
-               for cell, size in zip(cells, widths, strict=True)]  # fmt: skip
+    wrapped = [
+        (
+            [cell]
+            if cell_width(cell) <= size
+            else textwrap.wrap(cell, size, break_on_hyphens=False, break_long_words=True)
+        )
+        for cell, size in zip(cells, widths, strict=True)
+    ]
     lines = []
     for i in range(max(map(len, wrapped), default=0)):
-        parts = [_padded(column[i] if i < len(column) else "", size, to_right)
-                 for column, size, to_right in zip(wrapped, widths, right, strict=True)]  # fmt: skip
+        parts = [
+            _padded(column[i] if i < len(column) else "", size, to_right)
+            for column, size, to_right in zip(wrapped, widths, right, strict=True)
+        ]
         lines.append((" " * gap).join(parts).rstrip())
     return lines
 
 
-def _widths(headings: Sequence[str], cells: Sequence[Sequence[str]], width: int) -> tuple[list[int], int]:
-    """The widths of the columns and the space between them: headings are wrapped first, then cells between words."""
+def _widths(
+    headings: Sequence[str], cells: Sequence[Sequence[str]], width: int
+) -> tuple[list[int], int]:
+    """The widths of the columns and the space between them: headings are wrapped first, then cells
+    between words.
+    """
     of_cells = [max(map(cell_width, texts), default=1) for texts in cells]
-    widths = [max(cell_width(heading), size) for heading, size in zip(headings, of_cells, strict=True)]
+    widths = [
+        max(cell_width(heading), size) for heading, size in zip(headings, of_cells, strict=True)
+    ]
     words = [_longest_word(heading) for heading in headings]
-    least = [max([word, *map(_longest_word, texts)]) for word, texts in zip(words, cells, strict=True)]
-    wrapped = [max(pair) for pair in zip(words, of_cells, strict=True)]  # headings alone are wrapped
+    least = [
+        max([word, *map(_longest_word, texts)]) for word, texts in zip(words, cells, strict=True)
+    ]
+    wrapped = [
+        max(pair) for pair in zip(words, of_cells, strict=True)
+    ]  # headings alone are wrapped
     if max(wrapped[0], least[0]) <= width / 2:  # the names of the first column can be copied
         least[0] = wrapped[0] = max(wrapped[0], least[0])
     gap = GAP if sum(wrapped) + GAP * (len(widths) - 1) <= width else GAP - 1

@@ -1,4 +1,6 @@
-"""Files of a report: report.html with embedded figures and formulas, claims.json, figures/ and data/."""
+"""Files of a report: report.html with embedded figures and formulas, claims.json, figures/ and
+data/.
+"""
 
 import base64
 import contextlib
@@ -15,7 +17,15 @@ from ..core import FileError, atomic_folder, plotting
 from . import claims as claiming
 from .chapter import Chapter, Plot, Table
 from .data import as_json, csv_text
-from .formatting import format_cell, format_unit, symbol_formula, to_display_mathml, to_mathml, to_plain, typographic
+from .formatting import (
+    format_cell,
+    format_unit,
+    symbol_formula,
+    to_display_mathml,
+    to_mathml,
+    to_plain,
+    typographic,
+)
 from .shown import SYMBOL, ShownColumn, shown_columns, value_table
 
 MAX_SVG_BYTES = 600_000
@@ -28,12 +38,16 @@ REPORT_FILE = "report.html"
 
 
 def write_report(
-    chapters: Sequence[Chapter], folder: Path | str, *, title: str = "Report", date: datetime.date | None = None
+    chapters: Sequence[Chapter],
+    folder: Path | str,
+    *,
+    title: str = "Report",
+    date: datetime.date | None = None,
 ) -> Path:
     """Write the report, either completely or not at all, and return the path of its page.
 
-    `date` is shown on the page; None stands for today. The same chapters give the same bytes in claims.json, data/
-    and figures/. Raises FileError if the folder cannot be written to.
+    `date` is shown on the page; None stands for today. The same chapters give the same bytes in
+    claims.json, data/ and figures/. Raises FileError if the folder cannot be written to.
     """
     with atomic_folder(folder) as staging:
         write_into(staging, chapters, title=title, date=date)
@@ -41,14 +55,24 @@ def write_report(
 
 
 def write_into(
-    staging: Path, chapters: Sequence[Chapter], *, title: str = "Report", date: datetime.date | None = None
+    staging: Path,
+    chapters: Sequence[Chapter],
+    *,
+    title: str = "Report",
+    date: datetime.date | None = None,
 ) -> None:
-    """Write the report's files into a folder made by `atomic_folder`, next to other files of the same command."""
+    """Write the report's files into a folder made by `atomic_folder`, next to other files of the
+    same command.
+    """
     for kind in ("plots", "tables"):  # of two of the same name one would overwrite the other
         names = [item.name for chapter in chapters for item in getattr(chapter, kind)]
-        invalid = sorted({name for name in names if names.count(name) > 1 or Path(name).name != name})
+        invalid = sorted(
+            {name for name in names if names.count(name) > 1 or Path(name).name != name}
+        )
         if invalid:
-            raise ValueError(f"{kind}: names must be unique and valid file names; check {', '.join(invalid)}.")
+            raise ValueError(
+                f"{kind}: names must be unique and valid file names; check {', '.join(invalid)}."
+            )
     try:
         for chapter in chapters:
             for plot in chapter.plots:
@@ -60,10 +84,16 @@ def write_into(
         claims = [claim.as_dict() for chapter in chapters for claim in chapter.claims]
         if claims:
             (staging / "claims.json").write_text(as_json(claims), encoding="utf-8")
-        text = render_page(chapters, staging / "figures", title=title, date=date or datetime.date.today())
-        (staging / REPORT_FILE).write_text(text, encoding="utf-8", errors="backslashreplace")  # names of files
+        text = render_page(
+            chapters, staging / "figures", title=title, date=date or datetime.date.today()
+        )
+        (staging / REPORT_FILE).write_text(
+            text, encoding="utf-8", errors="backslashreplace"
+        )  # names of files
     except OSError as error:
-        raise FileError(f"{staging.parent}: the report cannot be written: {error.strerror or error}.") from error
+        raise FileError(
+            f"{staging.parent}: the report cannot be written: {error.strerror or error}."
+        ) from error
 
 
 def rendered_figure(plot: Plot) -> dict[str, bytes]:
@@ -73,13 +103,19 @@ def rendered_figure(plot: Plot) -> dict[str, bytes]:
 
 
 def save_table(table: Table, path: Path) -> None:
-    """Write a table as CSV: headers with units, numbers with all digits, an empty cell for NaN and infinity."""
+    """Write a table as CSV: headers with units, numbers with all digits, an empty cell for NaN and
+    infinity.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(csv_text(table), encoding="utf-8", newline="")
 
 
-def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date: datetime.date) -> str:
-    """Return the HTML of a report; the folder `figures` contains its figures as <name>.svg and <name>.png."""
+def render_page(
+    chapters: Sequence[Chapter], figures: Path, *, title: str, date: datetime.date
+) -> str:
+    """Return the HTML of a report; the folder `figures` contains its figures as <name>.svg and
+    <name>.png.
+    """
     page: str = _template().render(
         title=title,
         date=date.isoformat(),
@@ -114,12 +150,16 @@ def _template() -> Any:
         published=lambda claim: typographic(claiming.format_published(claim)),
         reproduced=lambda statement: typographic(claiming.format_reproduced(statement)),
         unit=format_unit,
-        anchor=lambda text: re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-"),  # identifier of a link target
+        anchor=lambda text: re.sub(r"[^a-z0-9]+", "-", text.lower()).strip(
+            "-"
+        ),  # identifier of a link target
         readings=claiming.count_readings,
         verdicts=claiming.format_verdicts,
         shown=shown_columns,
         rows=lambda shown: list(zip(*(each.cells for each in shown), strict=True)),
-        sentence=lambda text: f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}",
+        sentence=lambda text: (
+            f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}"
+        ),
         results=lambda chapter: value_table(f"{chapter.name}-results", "Results", chapter.values),
         is_short=lambda value: isinstance(value, str) and len(to_plain(value)) <= MAX_LINE,
     )
@@ -128,7 +168,9 @@ def _template() -> Any:
 
 
 def render_cell(value: Any, column: ShownColumn | None = None) -> str:
-    """Return the HTML of a cell; the heading of its column decides on the format of symbols, units and p-values."""
+    """Return the HTML of a cell; the heading of its column decides on the format of symbols, units
+    and p-values.
+    """
     if column is None:
         return to_mathml(format_cell(value))
     if column.heading == SYMBOL and isinstance(value, str):
@@ -141,23 +183,33 @@ def render_header(header: str) -> str:
     unit = _BRACKETS.search(header)
     if unit is None:
         return to_mathml(header)
-    name, shown = header[: unit.start()], format_unit(unit[1])
+    name = header[: unit.start()]
+    shown = format_unit(unit[1])
     return to_mathml(f"{name} [{shown}]" if shown else name)
 
 
 def image_data_uri(stem: Path) -> str:
-    """Return a figure as a data URI: the SVG, or the PNG if the SVG is larger than `MAX_SVG_BYTES`."""
-    kind, content = "svg+xml", stem.with_name(f"{stem.name}.svg").read_bytes()
+    """Return a figure as a data URI: the SVG, or the PNG if the SVG is larger than
+    `MAX_SVG_BYTES`.
+    """
+    kind = "svg+xml"
+    content = stem.with_name(f"{stem.name}.svg").read_bytes()
     if len(content) > MAX_SVG_BYTES:
-        kind, content = "png", stem.with_name(f"{stem.name}.png").read_bytes()
+        kind = "png"
+        content = stem.with_name(f"{stem.name}.png").read_bytes()
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 @functools.cache
 def versions() -> dict[str, str]:
-    """Return the versions of airmuscle, Python and the numerical packages; `not installed` for a missing one."""
+    """Return the versions of airmuscle, Python and the numerical packages; `not installed` for a
+    missing one.
+    """
     found = dict.fromkeys(("airmuscle", "Python", *_PACKAGES), "not installed")
     for package in ("airmuscle", *_PACKAGES):
         with contextlib.suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)
-    return found | {"Python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}
+    return found | {
+        "Python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}",
+    }

@@ -1,8 +1,10 @@
-"""Checks of the recordings of one bench: values that are possible as numbers, but that no muscle explains.
+"""Checks of the recordings of one bench: values that are possible as numbers, but that no muscle
+explains.
 
-The recordings are judged together, because a single run may be slack or at one pressure. Each check is a function of
-the recordings that yields a text with what was found, in which files, how much, and the remedy. Every command that
-reads files issues them as warnings, and every static fit repeats them in its notes.
+The recordings are judged together, because a single run may be slack or at one pressure. Each check
+is a function of the recordings that yields a text with what was found, in which files, how much,
+and the remedy. Every command that reads files issues them as warnings, and every static fit repeats
+them in its notes.
 """
 
 import warnings
@@ -36,7 +38,10 @@ def find_suspicious(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """The findings of all checks on the recordings of one bench, as sentences with their remedy."""
     measured = [recording for recording in recordings if len(recording)]
     values = contractions.without_missing_codes(measured)
-    return (*contractions.check_missing_codes(measured), *(text for check in CHECKS for text in check(values)))
+    return (
+        *contractions.check_missing_codes(measured),
+        *(text for check in CHECKS for text in check(values)),
+    )
 
 
 def warn_of_suspicious_values(recordings: Sequence[Recording]) -> None:

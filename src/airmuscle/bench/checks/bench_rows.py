@@ -1,4 +1,6 @@
-"""Rows of the recordings of a bench for its checks: joined columns, robust limits, lines of force over pressure."""
+"""Rows of the recordings of a bench for its checks: joined columns, robust limits, lines of force
+over pressure.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,23 +17,37 @@ MIN_FORCE = 0.05
 NO_PRESSURE = 0.01
 """Pressure that counts as none, as a fraction of the highest (chosen)."""
 MAX_ELONGATION = 0.005
-"""Elongation and contraction that count as the resting length (chosen); a stretched muscle pulls without pressure."""
+"""Elongation and contraction that count as the resting length (chosen); a stretched muscle pulls
+without pressure.
+"""
 MIN_ROWS = 6
 """Minimum number of rows of a level (chosen)."""
 CONSTANT_PRESSURE = 0.06
 """Range of the pressure of an isobar, as a fraction of its pressure (chosen)."""
-STEP, MIN_STEPS, FLAT = 0.01, 3, 0.1
-"""Steps of the contraction in which the force of an isobar is averaged, the minimum number of successive ones without a
-change of the force, and the change that counts as none, as a fraction of the mean one of a step (chosen)."""
-MIN_LEVELS, MIN_RANGE = 3, 0.05
-"""Minimum number of contractions whose lines of force over pressure show a zero, and their minimum range (chosen)."""
+STEP = 0.01
+MIN_STEPS = 3
+FLAT = 0.1
+"""Steps of the contraction in which the force of an isobar is averaged, the minimum number of
+successive ones without a change of the force, and the change that counts as none, as a fraction of
+the mean one of a step (chosen)."""
+MIN_LEVELS = 3
+MIN_RANGE = 0.05
+"""Minimum number of contractions whose lines of force over pressure show a zero, and their minimum
+range (chosen).
+"""
 LEVELS = 8
-"""Number of intervals of the contraction, with equal numbers of rows, in which force is taken as linear in pressure."""
+"""Number of intervals of the contraction, with equal numbers of rows, in which force is taken as
+linear in pressure.
+"""
 
 
 def recordings_with(recordings: Sequence[Recording], *names: str) -> list[Recording]:
     """The recordings that have all named columns, with a reading in each."""
-    return [run for run in recordings if all(name in run and np.isfinite(run[name]).any() for name in names)]
+    return [
+        run
+        for run in recordings
+        if all(name in run and np.isfinite(run[name]).any() for name in names)
+    ]
 
 
 def limits(values: Array) -> tuple[float, float]:
@@ -48,7 +64,9 @@ def file_list(origins: Sequence[str], most: int = 3) -> str:
 
 
 class BenchRows(NamedTuple):
-    """Pressure [Pa], contraction [1] and force [N] of all complete rows of a bench; shape (N,) each."""
+    """Pressure [Pa], contraction [1] and force [N] of all complete rows of a bench; shape (N,)
+    each.
+    """
 
     pressure: Array
     contraction: Array
@@ -87,30 +105,42 @@ def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
     columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
     complete = np.isfinite(np.sum(columns, axis=0))
     if complete.size:  # at its upper limit, the force sensor states a bound only
-        sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in given])["force"]
+        sensor = estimate_sensors(
+            [Recording({"force": each["force"]}, each.origin) for each in given]
+        )["force"]
         complete &= columns[2] < sensor.upper_limit - 0.25 * sensor.resolution
     return BenchRows(*(column[complete] for column in columns))
 
 
 def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
-    """The rows of isobars at which the muscle is slack: the force does not change with the contraction, up to the
-    shortest length. Drift and friction of a run, which returns, are in the mean of each step of the contraction."""
+    """The rows of isobars at which the muscle is slack: the force does not change with the
+    contraction, up to the shortest length. Drift and friction of a run, which returns, are in the
+    mean of each step of the contraction.
+    """
     found = []
     for recording in recordings_with(recordings, *BenchRows._fields):
         run = bench_rows([recording])
-        if run.force.size < MIN_ROWS or np.ptp(run.pressure) > CONSTANT_PRESSURE * np.max(run.pressure):
+        if run.force.size < MIN_ROWS or np.ptp(run.pressure) > CONSTANT_PRESSURE * np.max(
+            run.pressure
+        ):
             continue
         step = ((np.max(run.contraction) - run.contraction) / STEP).astype(int)
         counts = np.bincount(step)
         means = np.bincount(step, run.force) / np.maximum(counts, 1)
         change = FLAT * np.subtract(*limits(run.force)[::-1]) / max(counts.size - 1, 1)
-        flat = np.count_nonzero(np.logical_and.accumulate((counts > 0) & (np.abs(means - means[0]) < change)))
+        flat = np.count_nonzero(
+            np.logical_and.accumulate((counts > 0) & (np.abs(means - means[0]) < change))
+        )
         found += [run.at(step < flat)] if flat >= MIN_STEPS else []
-    return BenchRows(*(np.concatenate([np.zeros(0), *(getattr(e, n) for e in found)]) for n in BenchRows._fields))
+    return BenchRows(
+        *(np.concatenate([np.zeros(0), *(getattr(e, n) for e in found)]) for n in BenchRows._fields)
+    )
 
 
 class PressureLine(NamedTuple):
-    """The straight line of the force over the pressure at one contraction, of the rows that pull."""
+    """The straight line of the force over the pressure at one contraction, of the rows that
+    pull.
+    """
 
     contraction: float
     intercept: float
@@ -127,16 +157,19 @@ class PressureLine(NamedTuple):
 
 
 def pressure_lines(rows: BenchRows) -> list[PressureLine]:
-    """The lines of force over pressure at levels of the contraction; those with too few rows or pressures are omitted.
+    """The lines of force over pressure at levels of the contraction; those with too few rows or
+    pressures are omitted.
 
-    Empty unless there are `MIN_LEVELS` of them over a range of `MIN_RANGE`. Within a level the force is taken as
-    bilinear in pressure and contraction, at the middle of the level.
+    Empty unless there are `MIN_LEVELS` of them over a range of `MIN_RANGE`. Within a level the
+    force is taken as bilinear in pressure and contraction, at the middle of the level.
     """
     pull = rows.shortened.pulling
     if pull.force.size < MIN_ROWS:
         return []
     edges = np.unique(np.quantile(pull.contraction, np.linspace(0.0, 1.0, LEVELS + 1)))
-    level = np.clip(np.searchsorted(edges, pull.contraction, side="right"), 1, max(edges.size - 1, 1))
+    level = np.clip(
+        np.searchsorted(edges, pull.contraction, side="right"), 1, max(edges.size - 1, 1)
+    )
     lines = []
     for i in range(1, max(edges.size, 2)):
         part = pull.at(level == i)
@@ -154,6 +187,14 @@ def pressure_lines(rows: BenchRows) -> list[PressureLine]:
             continue
         residual = part.force - matrix @ (values / scale)
         variance = float(residual @ residual) / max(offset.size - rank, 1)
-        error = float(np.sqrt(variance * np.linalg.inv((matrix / scale).T @ (matrix / scale))[0, 0])) / float(scale[0])
-        lines.append(PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error))
-    return lines if len(lines) >= MIN_LEVELS and lines[-1].contraction - lines[0].contraction >= MIN_RANGE else []
+        error = float(
+            np.sqrt(variance * np.linalg.inv((matrix / scale).T @ (matrix / scale))[0, 0])
+        ) / float(scale[0])
+        lines.append(
+            PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error)
+        )
+    return (
+        lines
+        if len(lines) >= MIN_LEVELS and lines[-1].contraction - lines[0].contraction >= MIN_RANGE
+        else []
+    )

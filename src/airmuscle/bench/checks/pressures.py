@@ -1,4 +1,6 @@
-"""Checks of pressure and force: absolute pressure in place of gauge, limits, sign and zero of the force."""
+"""Checks of pressure and force: absolute pressure in place of gauge, limits, sign and zero of the
+force.
+"""
 
 import contextlib
 from collections.abc import Iterator, Sequence
@@ -12,7 +14,8 @@ from .bench_rows import BenchRows, bench_rows, file_list, limits, pressure_lines
 
 ATMOSPHERE = (95e3, 106e3)
 """Range of the lowest pressure that may be the atmosphere [Pa] (chosen)."""
-SET_POINT, SET_POINT_TOLERANCE = 1e5, 20.0
+SET_POINT = 1e5
+SET_POINT_TOLERANCE = 20.0
 """A lowest pressure of 1 bar within this tolerance [Pa] is a set point (chosen)."""
 MIN_RISE = 50e3
 """Minimum range of the pressure of a run that begins at ambient pressure [Pa] (chosen)."""
@@ -24,18 +27,26 @@ NEAR_REST = 0.02
 """Contraction near the resting length, at which a muscle under pressure pulls (chosen)."""
 MAX_PRESSURE = 1e6
 """Highest pressure of pneumatic muscles [Pa] (chosen: makers permit 0.6 to 0.8 MPa)."""
-ZERO_FORCE_PRESSURES, SMALL_CONTRACTIONS = (93e3, 130e3), 0.4
-"""Range of the pressures of zero force of isobars that are absolute [Pa], at contractions below this fraction of the
-greatest (chosen): from the atmosphere to what the wall adds. Gauge pressures of zero force begin near 0 and rise."""
-MAX_ZERO, MAX_ZERO_ERROR = 0.012, -30e3
-"""Maximum reading of a slack muscle or without pressure, as a fraction of the maximum force or pressure; gauge pressure
-[Pa] below which a rig draws a vacuum (chosen: the atmosphere at 3000 m)."""
+ZERO_FORCE_PRESSURES = (93e3, 130e3)
+SMALL_CONTRACTIONS = 0.4
+"""Range of the pressures of zero force of isobars that are absolute [Pa], at contractions below
+this fraction of the greatest (chosen): from the atmosphere to what the wall adds. Gauge pressures
+of zero force begin near 0 and rise."""
+MAX_ZERO = 0.012
+MAX_ZERO_ERROR = -30e3
+"""Maximum reading of a slack muscle or without pressure, as a fraction of the maximum force or
+pressure; gauge pressure [Pa] below which a rig draws a vacuum (chosen: the atmosphere at 3000
+m)."""
 _STATE = Hint("To state the unit", "units", {"pressure": ...}, "ColumnMapping")
 
 
 def check_lowest_pressures(recordings: Sequence[Recording]) -> Iterator[HintedText]:
-    """A lowest pressure of all files that is that of the atmosphere, where the muscle does not pull."""
-    unstated = [each for each in recordings_with(recordings, "pressure") if _states_reference(each) is False]
+    """A lowest pressure of all files that is that of the atmosphere, where the muscle does not
+    pull.
+    """
+    unstated = [
+        each for each in recordings_with(recordings, "pressure") if _states_reference(each) is False
+    ]
     if not unstated:
         return
     first = min(unstated, key=lambda each: float(each["pressure"].min()))
@@ -43,33 +54,47 @@ def check_lowest_pressures(recordings: Sequence[Recording]) -> Iterator[HintedTe
     if not _is_atmosphere(lowest) or not _begins_at_ambient(first, _greatest_force(recordings)):
         return
     yield HintedText(
-        f"{first.origin}: the lowest pressure of all files is {lowest / 1e3:.4g} kPa, as that of the atmosphere "
-        f"({AMBIENT_PRESSURE / 1e3:.4g} kPa), and the muscle does not pull there. It is read as gauge pressure, but "
-        f"may be absolute: the unit is then '{first.units['pressure']}(a)'.",
+        f"{first.origin}: the lowest pressure of all files is {lowest / 1e3:.4g} kPa, as that of"
+        f" the atmosphere ({AMBIENT_PRESSURE / 1e3:.4g} kPa), and the muscle does not pull there."
+        " It is read as gauge pressure, but may be absolute: the unit is then"
+        f" '{first.units['pressure']}(a)'.",
         _STATE,
     )
 
 
 def check_mixed_pressures(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """Ramps that begin at the atmosphere beside ramps that begin at zero pressure."""
-    given = [each for each in recordings_with(recordings, "pressure", "force") if not _states_reference(each)]
+    given = [
+        each
+        for each in recordings_with(recordings, "pressure", "force")
+        if not _states_reference(each)
+    ]
     ramps = [each for each in given if np.ptp(each["pressure"]) > MIN_RISE]
     greatest = _greatest_force(recordings)
     lowest = {id(each): float(np.min(each["pressure"])) for each in ramps}
-    absolute = [e for e in ramps if _is_atmosphere(lowest[id(e)]) and _begins_at_ambient(e, greatest)]
+    absolute = [
+        e for e in ramps if _is_atmosphere(lowest[id(e)]) and _begins_at_ambient(e, greatest)
+    ]
     gauge = [each for each in ramps if abs(lowest[id(each)]) <= NO_PRESSURE]
     if absolute and gauge:
         yield HintedText(
-            f"{file_list([each.origin for each in absolute])}: the pressure begins at "
-            f"{lowest[id(absolute[0])] / 1e3:.4g} kPa, that of the atmosphere, and the muscle does not pull there, but "
-            f"in {file_list([each.origin for each in gauge])} it begins at {lowest[id(gauge[0])] / 1e3:.3g} kPa: "
-            "absolute and gauge pressures are mixed. State the unit of the absolute ones in their headings, 'kPa(a)'."
+            f"{file_list([each.origin for each in absolute])}: the pressure begins at"
+            f" {lowest[id(absolute[0])] / 1e3:.4g} kPa, that of the atmosphere, and the muscle does"
+            f" not pull there, but in {file_list([each.origin for each in gauge])} it begins at"
+            f" {lowest[id(gauge[0])] / 1e3:.3g} kPa: absolute and gauge pressures are mixed. State"
+            " the unit of the absolute ones in their headings, 'kPa(a)'."
         )
 
 
 def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedText]:
-    """Forces that extrapolate to zero near the atmosphere at every contraction, without a row near zero pressure."""
-    unstated = [each for each in recordings_with(recordings, *BenchRows._fields) if not _states_reference(each)]
+    """Forces that extrapolate to zero near the atmosphere at every contraction, without a row near
+    zero pressure.
+    """
+    unstated = [
+        each
+        for each in recordings_with(recordings, *BenchRows._fields)
+        if not _states_reference(each)
+    ]
     rows = bench_rows(unstated)
     if not rows.force.size or float(np.min(rows.pressure)) < ATMOSPHERE[0]:
         return
@@ -78,25 +103,32 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
         return
     limit = SMALL_CONTRACTIONS * lines[-1].contraction
     small = [line.zero_force_pressure for line in lines if line.contraction < limit]
-    (low, high), least = ZERO_FORCE_PRESSURES, min(line.zero_force_pressure for line in lines)
+    low, high = ZERO_FORCE_PRESSURES
+    least = min(line.zero_force_pressure for line in lines)
     if len(small) > 1 and low <= least and max(small) <= high:
         yield HintedText(
-            f"{file_list([each.origin for each in unstated])}: the force extrapolates to zero at {least / 1e3:.3g} kPa "
-            f"or more at every contraction, {max(small) / 1e3:.3g} kPa or less at small ones, near the pressure of the "
-            f"atmosphere ({AMBIENT_PRESSURE / 1e3:.4g} kPa). The pressures are probably absolute, but read as gauge.",
+            f"{file_list([each.origin for each in unstated])}: the force extrapolates to zero at"
+            f" {least / 1e3:.3g} kPa or more at every contraction, {max(small) / 1e3:.3g} kPa or"
+            " less at small ones, near the pressure of the atmosphere"
+            f" ({AMBIENT_PRESSURE / 1e3:.4g} kPa). The pressures are probably absolute, but read as"
+            " gauge.",
             _STATE,
         )
 
 
 def check_pressure_zero(recordings: Sequence[Recording]) -> Iterator[HintedText]:
-    """A lowest pressure, but for two glitches, below that of the atmosphere, by less than the vacuum of a rig."""
+    """A lowest pressure, but for two glitches, below that of the atmosphere, by less than the
+    vacuum of a rig.
+    """
     given = [each for each in recordings_with(recordings, "pressure") if len(each) > 2]
-    lowest, origin = min(((float(np.sort(each["pressure"])[2]), each.origin) for each in given), default=(0.0, ""))
+    lowest, origin = min(
+        ((float(np.sort(each["pressure"])[2]), each.origin) for each in given), default=(0.0, "")
+    )
     if MAX_ZERO_ERROR < lowest < -MAX_ZERO * _highest_pressure(given)[0]:
         yield HintedText(
-            f"{origin}: the gauge pressure is down to {lowest / 1e3:.3g} kPa. Unless the rig draws a vacuum, the zero "
-            "of the pressure sensor is wrong, and all pressures by the same amount, or the ambient pressure of "
-            "absolute readings.",
+            f"{origin}: the gauge pressure is down to {lowest / 1e3:.3g} kPa. Unless the rig draws"
+            " a vacuum, the zero of the pressure sensor is wrong, and all pressures by the same"
+            " amount, or the ambient pressure of absolute readings.",
             Hint("To state the ambient pressure", "ambient", ..., "ColumnMapping"),
         )
 
@@ -106,29 +138,38 @@ def check_pressure_limit(recordings: Sequence[Recording]) -> Iterator[str]:
     highest, origin = _highest_pressure(recordings)
     if highest > MAX_PRESSURE:
         yield (
-            f"{origin}: the pressure is up to {highest / 1e3:.4g} kPa, above {MAX_PRESSURE / 1e3:g} kPa, the "
-            "highest of pneumatic muscles. Check its unit, and that the columns of pressure and force are not "
-            "exchanged."
+            f"{origin}: the pressure is up to {highest / 1e3:.4g} kPa, above {MAX_PRESSURE / 1e3:g}"
+            " kPa, the highest of pneumatic muscles. Check its unit, and that the columns of"
+            " pressure and force are not exchanged."
         )
 
 
 def _highest_pressure(recordings: Sequence[Recording]) -> tuple[float, str]:
     """The highest pressure [Pa] of all recordings and its file; 0 without any."""
-    pressures = [(float(np.nanmax(each["pressure"])), each.origin) for each in recordings_with(recordings, "pressure")]
+    pressures = [
+        (float(np.nanmax(each["pressure"])), each.origin)
+        for each in recordings_with(recordings, "pressure")
+    ]
     return max(pressures, default=(0.0, ""))
 
 
 def _greatest_force(recordings: Sequence[Recording]) -> float:
-    return max((limits(each["force"])[1] for each in recordings_with(recordings, "force")), default=0.0)
+    return max(
+        (limits(each["force"])[1] for each in recordings_with(recordings, "force")), default=0.0
+    )
 
 
 def _is_atmosphere(lowest: float) -> bool:
     """Whether a lowest pressure [Pa] may be that of the atmosphere; 1 bar is a set point."""
-    return ATMOSPHERE[0] <= lowest <= ATMOSPHERE[1] and abs(lowest - SET_POINT) > SET_POINT_TOLERANCE
+    return (
+        ATMOSPHERE[0] <= lowest <= ATMOSPHERE[1] and abs(lowest - SET_POINT) > SET_POINT_TOLERANCE
+    )
 
 
 def _begins_at_ambient(recording: Recording, greatest: float) -> bool:
-    """Whether the muscle does not pull at the lowest pressure: at the start of a rise, or near its resting length."""
+    """Whether the muscle does not pull at the lowest pressure: at the start of a rise, or near its
+    resting length.
+    """
     low, high = limits(recording["pressure"])
     rows = recording["pressure"] <= float(np.nanmin(recording["pressure"])) + 3e3
     if "force" not in recording:
@@ -136,12 +177,18 @@ def _begins_at_ambient(recording: Recording, greatest: float) -> bool:
     slack = np.abs(recording["force"]) <= SLACK_FORCE * greatest
     if high - low > MIN_RISE:
         return bool(slack[rows].all())
-    near_rest = rows & (np.abs(recording["contraction"]) < NEAR_REST) if "contraction" in recording else rows & False
+    near_rest = (
+        rows & (np.abs(recording["contraction"]) < NEAR_REST)
+        if "contraction" in recording
+        else rows & False
+    )
     return bool(near_rest.any() and slack[near_rest].all())
 
 
 def _states_reference(recording: Recording) -> bool | None:
-    """Whether the file states an absolute or a gauge pressure, which leaves no doubt; None for arrays."""
+    """Whether the file states an absolute or a gauge pressure, which leaves no doubt; None for
+    arrays.
+    """
     unit = recording.units.get("pressure")
     with contextlib.suppress(UnitError):
         return None if unit is None else not conversion(unit, "Pa").assumed_gauge
@@ -153,9 +200,13 @@ MAX_OFFSET = 0.05
 REVERSED = 3.0
 """Ratio of negative to positive values from which a sign is taken for reversed (chosen)."""
 COMPRESSED = 0.3
-"""Range of the forces at zero pressure, as a fraction of the lowest force, above which they are no offset (chosen)."""
+"""Range of the forces at zero pressure, as a fraction of the lowest force, above which they are no
+offset (chosen).
+"""
 AREAS = (1e-7, 5e-2)
-"""Range of the maximum force divided by the highest pressure [m2] (chosen: 1e-5 to 1e-2 of muscles on sale)."""
+"""Range of the maximum force divided by the highest pressure [m2] (chosen: 1e-5 to 1e-2 of muscles
+on sale).
+"""
 
 
 def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
@@ -166,33 +217,41 @@ def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
     for origin, (low, high) in forces.items():
         if low < -MAX_OFFSET * size and -low > REVERSED * max(high, 0.0):
             yield (
-                f"{origin}: the force is negative, down to {low:.4g} N. The force of a muscle in tension is positive, "
-                "and negative rows count as slack: if the sensor counts tension as negative, multiply the column by -1."
+                f"{origin}: the force is negative, down to {low:.4g} N. The force of a muscle in"
+                " tension is positive, and negative rows count as slack: if the sensor counts"
+                " tension as negative, multiply the column by -1."
             )
             return
     origin, (low, _) = min(forces.items(), key=lambda item: item[1][0], default=("", (0.0, 0.0)))
     slack = bench_rows(recordings).slack.force
-    compressed = slack.size and np.ptp(slack) > COMPRESSED * -low  # the forces vary with the length at zero pressure
+    compressed = (
+        slack.size and np.ptp(slack) > COMPRESSED * -low
+    )  # the forces vary with the length at zero pressure
     if low < -MAX_OFFSET * greatest and not compressed:
         yield (
-            f"{origin}: the force is down to {low:.4g} N, but a muscle cannot push. The sensor has an offset, or "
-            "carries a weight: all forces are then wrong by the same amount. Subtract the reading of the slack muscle."
+            f"{origin}: the force is down to {low:.4g} N, but a muscle cannot push. The sensor has"
+            " an offset, or carries a weight: all forces are then wrong by the same amount."
+            " Subtract the reading of the slack muscle."
         )
 
 
 def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
     """A maximum force that is too great or too small for the highest pressure."""
     given = recordings_with(recordings, "pressure", "force")
-    greatest, (highest, _) = _greatest_force(given), _highest_pressure(recordings)
-    varied = any(np.nanmax(each["pressure"]) - np.nanmin(each["pressure"]) > 0.1 * highest for each in given)
+    greatest = _greatest_force(given)
+    highest, _ = _highest_pressure(recordings)
+    varied = any(
+        np.nanmax(each["pressure"]) - np.nanmin(each["pressure"]) > 0.1 * highest for each in given
+    )
     if greatest <= 0 or highest <= 0 or (highest < 1e3 and not varied):
         return
     area = greatest / highest
     if not AREAS[0] <= area <= AREAS[1]:
         yield (
-            f"the maximum force, {greatest:.4g} N, divided by the highest pressure, {highest / 1e3:.4g} kPa, is "
-            f"{area:.3g} m2; allowed range: {AREAS[0]:g} to {AREAS[1]:g} m2 for pneumatic muscles. The unit of force "
-            "or pressure is probably wrong."
+            f"the maximum force, {greatest:.4g} N, divided by the highest pressure,"
+            f" {highest / 1e3:.4g} kPa, is {area:.3g} m2; allowed range: {AREAS[0]:g} to"
+            f" {AREAS[1]:g} m2 for pneumatic muscles. The unit of force or pressure is probably"
+            " wrong."
         )
 
 
@@ -204,11 +263,13 @@ _REMEDY = "Subtract the reading of the slack muscle from the column, or measure 
 
 
 def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
-    """A sensor that reads a force where a muscle is slack, or the same negative force at several lengths of it: at zero
-    pressure, measured there or extrapolated to it, and where the force of an isobar does not change with the length.
+    """A sensor that reads a force where a muscle is slack, or the same negative force at several
+    lengths of it: at zero pressure, measured there or extrapolated to it, and where the force of an
+    isobar does not change with the length.
 
-    The force at zero gauge pressure is at most 0 at each contraction: the wall resists contraction and does not pull
-    (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall: Tondu and Lopez 2000).
+    The force at zero gauge pressure is at most 0 at each contraction: the wall resists contraction
+    and does not pull (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall:
+    Tondu and Lopez 2000).
     """
     given = recordings_with(recordings, *BenchRows._fields)
     rows = bench_rows(given)
@@ -218,26 +279,38 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     places["over a range of contractions at constant pressure"] = of_bench.slack_plateaus(given)
     for place, slack in places.items():
         reading = float(np.median(slack.force)) if slack.force.size >= MIN_ROWS else 0.0
-        low = -MAX_OFFSET * rows.greatest <= reading < -MAX_ZERO * rows.greatest and _is_constant(slack)
+        low = -MAX_OFFSET * rows.greatest <= reading < -MAX_ZERO * rows.greatest and _is_constant(
+            slack
+        )
         if reading > MAX_ZERO * rows.greatest or low:
             yield (
-                f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N {place}, where a muscle "
-                f"is slack: the zero of the force sensor is wrong, and all forces by the same amount. {_REMEDY}"
+                f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N"
+                f" {place}, where a muscle is slack: the zero of the force sensor is wrong, and all"
+                f" forces by the same amount. {_REMEDY}"
             )
             return
     if rows.slack.force.size >= MIN_ROWS:
         return
-    offset = max((line.intercept for line in pressure_lines(rows) if line.intercept > 3.0 * line.error), default=0.0)
+    offset = max(
+        (line.intercept for line in pressure_lines(rows) if line.intercept > 3.0 * line.error),
+        default=0.0,
+    )
     if offset > MAX_EXTRAPOLATED * rows.greatest:
         yield (
-            f"{file_list([each.origin for each in given])}: the force extrapolates to {offset:.3g} N at zero pressure, "
-            "where a muscle does not pull: the zero of the force sensor, or that of the pressure, is probably wrong. "
-            f"{_REMEDY}"
+            f"{file_list([each.origin for each in given])}: the force extrapolates to {offset:.3g}"
+            " N at zero pressure, where a muscle does not pull: the zero of the force sensor, or"
+            f" that of the pressure, is probably wrong. {_REMEDY}"
         )
 
 
 def _is_constant(slack: BenchRows) -> bool:
-    """Whether a slack muscle reads the same negative force at several lengths, and not the limit of the sensor."""
+    """Whether a slack muscle reads the same negative force at several lengths, and not the limit of
+    the sensor.
+    """
     low, high = limits(slack.force)
     at_limit = float(np.mean(slack.force == np.min(slack.force))) > 0.5
-    return not at_limit and high - low < COMPRESSED * -low and float(np.ptp(slack.contraction)) > of_bench.MIN_RANGE
+    return (
+        not at_limit
+        and high - low < COMPRESSED * -low
+        and float(np.ptp(slack.contraction)) > of_bench.MIN_RANGE
+    )

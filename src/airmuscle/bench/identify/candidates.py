@@ -10,7 +10,12 @@ import numpy.typing as npt
 
 from ...core import Array, HintedText, IdentificationError, ShortRepr, SolveError
 from ...physics.muscle import characteristic
-from ...physics.muscle.characteristic import Characteristic, ContractileSurface, LogarithmicLength, PooledLengthLaw
+from ...physics.muscle.characteristic import (
+    Characteristic,
+    ContractileSurface,
+    LogarithmicLength,
+    PooledLengthLaw,
+)
 from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw
 from ...physics.muscle.characteristic.validity_range import DataScales
 from ...recording import Recording
@@ -19,17 +24,24 @@ FORCE_GRID_POINTS = 801
 """Grid points between zero and the maximum force; the law is interpolated linearly between them."""
 
 COARSE_STEP = 20
-"""Every 20th point is evaluated first; a row whose deficit does not rise along these is evaluated at every point."""
+"""Every 20th point is evaluated first; a row whose deficit does not rise along these is evaluated
+at every point.
+"""
 
 
 def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
-    """Forces [N] at N points, shape (N,), defined at every point so that all laws are compared on the same rows.
-    `max_force` [N] limits the force of laws that give contraction or pressure. Where such a law needs a higher pressure
-    at zero load than is applied, the muscle is slack and the force is 0."""
+    """Forces [N] at N points, shape (N,), defined at every point so that all laws are compared on
+    the same rows. `max_force` [N] limits the force of laws that give contraction or pressure. Where
+    such a law needs a higher pressure at zero load than is applied, the muscle is slack and the
+    force is 0."""
     with np.errstate(all="ignore"):
         if isinstance(law, ForceLaw):
-            force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(pressure.size)
-        else:  # where the deficit first changes its sign: on a coarse grid, then on the fine grid in that interval
+            force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(
+                pressure.size
+            )
+        # where the deficit first changes its sign: on a coarse grid, then on the fine grid in that
+        # interval
+        else:
             forces = np.linspace(0.0, max_force, FORCE_GRID_POINTS)
             coarse = _deficit(law, pressure[:, None], contraction[:, None], forces[::COARSE_STEP])
             rising = np.asarray((np.diff(coarse, axis=1) >= 0).all(axis=1))
@@ -43,9 +55,9 @@ def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: flo
 
 
 def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.bool_]:
-    """Mask (N,) of the points at which a law that is solved for the force is slack: it has no root, even at zero load.
-    Always False for force laws. Raises IdentificationError where the law gives no force at a point without being
-    slack."""
+    """Mask (N,) of the points at which a law that is solved for the force is slack: it has no root,
+    even at zero load. Always False for force laws. Raises IdentificationError where the law gives
+    no force at a point without being slack."""
     if isinstance(law, ForceLaw) or _solve_error(law, pressure, contraction) is None:
         return np.zeros(pressure.size, dtype=bool)
     slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
@@ -66,21 +78,27 @@ def _solve_error(law: Any, pressure: Array, contraction: Array) -> SolveError | 
 
 
 def _deficit(law: Any, pressure: Array, contraction: Array, force: Array) -> Array:
-    """Negative where the muscle pulls more than the force: the contraction or the pressure that it lacks."""
+    """Negative where the muscle pulls more than the force: the contraction or the pressure that it
+    lacks.
+    """
     if isinstance(law, ContractionLaw):
         return np.asarray(contraction - law.contraction(pressure, force))
     return np.asarray(law.pressure(contraction, force) - pressure)
 
 
 def _first_crossing(law: Any, pressure: Array, contraction: Array, forces: Array) -> Array:
-    """The first force of each row of a grid (N, M) at which the deficit is not negative, by linear interpolation; the
-    first force of the row where it is not negative there, the last one where it is negative everywhere."""
+    """The first force of each row of a grid (N, M) at which the deficit is not negative, by linear
+    interpolation; the first force of the row where it is not negative there, the last one where it
+    is negative everywhere.
+    """
     deficit = _deficit(law, pressure[:, None], contraction[:, None], forces)
     crossed = np.asarray(deficit >= 0)
-    crosses, rows = crossed.any(axis=1), np.arange(pressure.size)
+    crosses = crossed.any(axis=1)
+    rows = np.arange(pressure.size)
     first = np.where(crosses, crossed.argmax(axis=1), forces.shape[1] - 1)
     previous = np.maximum(first - 1, 0)
-    high, low = deficit[rows, first], deficit[rows, previous]
+    high = deficit[rows, first]
+    low = deficit[rows, previous]
     with np.errstate(all="ignore"):
         fraction = np.where((first > 0) & crosses, -low / (high - low), 1.0)
     start = forces[rows, previous]
@@ -88,16 +106,22 @@ def _first_crossing(law: Any, pressure: Array, contraction: Array, forces: Array
 
 
 MIN_POOLED = 3
-"""Minimum number of specimens for partial pooling (chosen): the term in ln L0 takes up the difference of two."""
+"""Minimum number of specimens for partial pooling (chosen): the term in ln L0 takes up the
+difference of two.
+"""
 POOLED_DEGREES = ((2, 1), (3, 1), (4, 1), (3, 2), (3, 3))
-"""Degrees of the population law and of its change with the length in laws of partial pooling (chosen)."""
+"""Degrees of the population law and of its change with the length in laws of partial pooling
+(chosen).
+"""
 UNREACHED_FORCE = 1e6
 """Upper clamp [N] of a surface inside another law: above the force of any muscle."""
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Candidate(ShortRepr):
-    """A law to be compared: its structure and initial values, and the names of the parameters that are not fitted."""
+    """A law to be compared: its structure and initial values, and the names of the parameters that
+    are not fitted.
+    """
 
     name: str
     law: Characteristic
@@ -106,8 +130,8 @@ class Candidate(ShortRepr):
 
 @dataclasses.dataclass(frozen=True)
 class ExcludedModel:
-    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
-    reason."""
+    """A candidate whose parameters the data do not determine, or that gives no force at measured
+    points, with the reason."""
 
     name: str
     reason: str
@@ -115,22 +139,28 @@ class ExcludedModel:
     cause: str
     """The cause in one phrase."""
     error: float | None = None
-    """Error in force [N] at which the cross-validation of a law that cannot be recommended was ended."""
+    """Error in force [N] at which the cross-validation of a law that cannot be recommended was
+    ended.
+    """
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cause}."
 
 
 def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...]:
-    """Every law whose initial values follow from the data: those of all classes of `characteristic` that define `guess`
-    or `variants`, and laws of partial pooling for three specimens or more. Raises IdentificationError where the data
-    have no value of pressure, contraction or force."""
+    """Every law whose initial values follow from the data: those of all classes of `characteristic`
+    that define `guess` or `variants`, and laws of partial pooling for three specimens or more.
+    Raises IdentificationError where the data have no value of pressure, contraction or force."""
     return started_candidates(recordings)[0]
 
 
-def started_candidates(recordings: Sequence[Recording]) -> tuple[tuple[Candidate, ...], tuple[ExcludedModel, ...]]:
+def started_candidates(
+    recordings: Sequence[Recording],
+) -> tuple[tuple[Candidate, ...], tuple[ExcludedModel, ...]]:
     """The standard candidates, and those whose initial values do not follow from the data."""
-    scales, candidates, missing = DataScales.of(recordings), list[Candidate](), list[ExcludedModel]()
+    scales = DataScales.of(recordings)
+    candidates = list[Candidate]()
+    missing = list[ExcludedModel]()
     for name in dir(characteristic):
         cls = getattr(characteristic, name)
         if inspect.isclass(cls) and issubclass(cls, Characteristic):
@@ -140,14 +170,20 @@ def started_candidates(recordings: Sequence[Recording]) -> tuple[tuple[Candidate
                 missing.append(ExcludedModel(name, error.message, error.cause))
             else:
                 candidates += [Candidate(each, law, cls.redundant) for each, law in laws.items()]
-    # Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree 2 or 3.
+    # Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree
+    # 2 or 3.
     can_pool = scales.length_count >= 2 and scales.specimen_count >= MIN_POOLED
     for degree, change in POOLED_DEGREES if can_pool else ():
         surfaces = blank_surface(degree), blank_surface(change)
         population = LogarithmicLength(*surfaces, scales.resting_length, scales.resting_length)
         for effects in (2, 3):
-            name = f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree {effects}"
-            candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))
+            name = (
+                f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree"
+                f" {effects}"
+            )
+            candidates.append(
+                Candidate(name, PooledLengthLaw(population, (blank_surface(effects),)))
+            )
     return tuple(candidates), tuple(missing)
 
 

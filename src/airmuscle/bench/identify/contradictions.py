@@ -1,5 +1,6 @@
-"""Contradictions: runs of one specimen whose forces differ at equal pressure, contraction and direction of motion, also
-in two groups as of two muscles in one file; rows in two recordings, as where files overlap, which are one measurement.
+"""Contradictions: runs of one specimen whose forces differ at equal pressure, contraction and
+direction of motion, also in two groups as of two muscles in one file; rows in two recordings, as
+where files overlap, which are one measurement.
 """
 
 import re
@@ -15,8 +16,8 @@ from ..segment.interval import true_intervals
 from .matched_rows import Block, MatchedRuns, Matches
 
 MIN_ROWS = 10
-"""Minimum number of successive equal rows that are one measurement, or all rows of a shorter recording (chosen: the
-rounded readings of two measurements agree in single rows)."""
+"""Minimum number of successive equal rows that are one measurement, or all rows of a shorter
+recording (chosen: the rounded readings of two measurements agree in single rows)."""
 MIN_LEVELS = 3
 """Minimum number of different values of the force in these rows (chosen)."""
 _FACTORS = (1.0, 1.2345678912345e6, 1.3247179572447e3)
@@ -31,20 +32,27 @@ class RepeatedRows(NamedTuple):
     origins: tuple[str, str]
 
     def __str__(self) -> str:
-        count, (here, there) = self.rows.stop - self.rows.start, self.origins
+        count = self.rows.stop - self.rows.start
+        here, there = self.origins
         return f"{count} rows of {here} are also in {there}; they are counted once."
 
 
-def find_repeated_rows(recordings: Sequence[Recording], columns: Sequence[str]) -> tuple[RepeatedRows, ...]:
-    """The stretches of rows whose columns are equal, digit by digit, to those of successive rows of another recording.
-    Those of the later recording are given. Equal rows within one recording are not searched."""
+def find_repeated_rows(
+    recordings: Sequence[Recording], columns: Sequence[str]
+) -> tuple[RepeatedRows, ...]:
+    """The stretches of rows whose columns are equal, digit by digit, to those of successive rows of
+    another recording. Those of the later recording are given. Equal rows within one recording are
+    not searched."""
     if len(recordings) < 2:
         return ()
     found = []
     for here, there, offset in _candidates(recordings, columns):
-        one, other = recordings[here], recordings[there]
-        first, last = max(offset, 0), min(len(one), len(other) + offset)
-        rows, earlier = slice(first, last), slice(first - offset, last - offset)
+        one = recordings[here]
+        other = recordings[there]
+        first = max(offset, 0)
+        last = min(len(one), len(other) + offset)
+        rows = slice(first, last)
+        earlier = slice(first - offset, last - offset)
         same = np.logical_and.reduce([one[name][rows] == other[name][earlier] for name in columns])
         for stretch in true_intervals(same):
             rows = slice(first + stretch.start, first + stretch.stop)
@@ -54,15 +62,23 @@ def find_repeated_rows(recordings: Sequence[Recording], columns: Sequence[str]) 
     return tuple(found)
 
 
-def _candidates(recordings: Sequence[Recording], columns: Sequence[str]) -> Iterator[tuple[int, int, int]]:
-    """Pairs of recordings (later, earlier) and the offset of their rows at which several rows have one weighted sum."""
-    weighted = [[factor * run[n] for factor, n in zip(_FACTORS, columns, strict=True)] for run in recordings]
+def _candidates(
+    recordings: Sequence[Recording], columns: Sequence[str]
+) -> Iterator[tuple[int, int, int]]:
+    """Pairs of recordings (later, earlier) and the offset of their rows at which several rows have
+    one weighted sum.
+    """
+    weighted = [
+        [factor * run[n] for factor, n in zip(_FACTORS, columns, strict=True)] for run in recordings
+    ]
     keys = [np.add.reduce(terms) for terms in weighted]
     row = np.concatenate([np.arange(key.size) for key in keys])
     run = np.repeat(np.arange(len(keys)), [key.size for key in keys])
     joined = np.concatenate(keys)
     order = np.argsort(joined, kind="stable")
-    joined, run, row = joined[order], run[order], row[order]
+    joined = joined[order]
+    run = run[order]
+    row = row[order]
     equal = np.flatnonzero((joined[1:] == joined[:-1]) & (run[1:] > run[:-1]))
     if equal.size < MIN_LEVELS:
         return
@@ -72,22 +88,30 @@ def _candidates(recordings: Sequence[Recording], columns: Sequence[str]) -> Iter
 
 
 MIN_DIFFERENCE = 0.04
-"""Median difference of two runs that contradict each other, as a fraction of the maximum force (chosen)."""
+"""Median difference of two runs that contradict each other, as a fraction of the maximum force
+(chosen).
+"""
 UNORDERED_DIFFERENCE = 0.05
-"""The same where the direction of the motion is not known (chosen); the remark then names hysteresis, too."""
+"""The same where the direction of the motion is not known (chosen); the remark then names
+hysteresis, too.
+"""
 MAX_HYSTERESIS = 0.15
 """The same of two runs of which neither shows a direction, which may be hysteresis (chosen)."""
 MIN_RMS = 0.03
-"""Minimum root mean square of the differences of all matched runs, as a fraction of the maximum force (chosen)."""
+"""Minimum root mean square of the differences of all matched runs, as a fraction of the maximum
+force (chosen).
+"""
 HYSTERESIS = " Without time the direction of the motion is not known: it may be hysteresis."
 SHIFT_TOLERANCE = 0.3
 """Relative tolerance of a shift of the pressure that is that of the atmosphere (chosen)."""
 
 
 def repeatability(matches: Matches) -> float | None:
-    """The standard deviation of the force of a run from that of another at equal pressure, contraction and direction
-    [N]; None where no runs overlap."""
-    squares = [float(np.mean(each.differences**2)) for each in matches.runs if not each.is_unordered]
+    """The standard deviation of the force of a run from that of another at equal pressure,
+    contraction and direction [N]; None where no runs overlap."""
+    squares = [
+        float(np.mean(each.differences**2)) for each in matches.runs if not each.is_unordered
+    ]
     return float(np.sqrt(np.mean(squares) / 2.0)) if squares else None
 
 
@@ -96,7 +120,10 @@ def contradiction_notes(matches: Matches) -> list[str]:
     found = []
     for each in matches.runs:
         share = MIN_DIFFERENCE if each.first.direction else MAX_HYSTERESIS
-        if abs(each.typical) > (UNORDERED_DIFFERENCE if each.is_unordered else share) * matches.greatest:
+        if (
+            abs(each.typical)
+            > (UNORDERED_DIFFERENCE if each.is_unordered else share) * matches.greatest
+        ):
             found.append(each)
     contradicting = [each for each in found if each.are_near] or found
     if not contradicting:
@@ -109,7 +136,11 @@ def contradiction_notes(matches: Matches) -> list[str]:
     unordered = all(each.is_unordered for each in contradicting)
     who = "rows" if unordered else f"{len(contradicting)} of {len(matches.runs)} pairs of runs"
     at_one_place = all(each.are_near for each in contradicting)
-    where = "at equal pressure and contraction" if at_one_place else "apart from a smooth dependence on both quantities"
+    where = (
+        "at equal pressure and contraction"
+        if at_one_place
+        else "apart from a smooth dependence on both quantities"
+    )
     text = (
         f"Rows contradict each other: {where} the forces of {who} differ by {typical:.3g} N "
         f"(median), which no law can follow. {_example(worst)}"
@@ -120,10 +151,16 @@ def contradiction_notes(matches: Matches) -> list[str]:
 def _example(runs: MatchedRuns) -> str:
     """The matched rows whose difference is the median one, as a sentence."""
     i, j = runs.pairs[int(np.argmin(np.abs(np.abs(runs.differences) - abs(runs.typical))))]
-    rows = (runs.first.recording, int(runs.first.rows[i])), (runs.second.recording, int(runs.second.rows[j]))
+    rows = (
+        (runs.first.recording, int(runs.first.rows[i])),
+        (
+            runs.second.recording,
+            int(runs.second.rows[j]),
+        ),
+    )
     texts = [
-        f"{run.origin}, row {row + 1}: {run['force'][row]:.4g} N at {run['pressure'][row] / 1e3:.4g} kPa and "
-        f"{100 * run['contraction'][row]:.3g} %"
+        f"{run.origin}, row {row + 1}: {run['force'][row]:.4g} N at"
+        f" {run['pressure'][row] / 1e3:.4g} kPa and {100 * run['contraction'][row]:.3g} %"
         for run, row in rows
     ]
     return f"For example {'; '.join(texts)}."
@@ -133,39 +170,56 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
     """The cause and the remedy, as far as the contradictions show them."""
     chosen = {id(each) for each in contradicting}
     for column in contradicting[0].first.labels:
-        differs = {id(each) for each in matches.runs if each.first.labels.get(column) != each.second.labels.get(column)}
+        differs = {
+            id(each)
+            for each in matches.runs
+            if each.first.labels.get(column) != each.second.labels.get(column)
+        }
         if not chosen <= differs or len(differs - chosen) > 0.5 * len(differs):
             continue  # its values do not differ in all contradicting pairs, or in many others
         mapped = {re.sub(r"\s*[\[(].*", "", column): "specimen"}
         return [
-            f" Column '{column}' tells the contradicting rows apart: it probably names the specimen.",
+            (
+                f" Column '{column}' tells the contradicting rows apart: it probably names the"
+                " specimen."
+            ),
             Hint("To state it as the specimen", "columns", mapped, "ColumnMapping"),
             " Fit each specimen by itself, or at least three together with --compare.",
         ]
     # The error of the pressure of the first block that would explain the differences.
     slopes = [np.maximum(each.first.slopes[each.pairs[:, 0]], 1e-12) for each in contradicting]
-    shifts = -np.array([np.median(each.differences / s) for each, s in zip(contradicting, slopes, strict=True)])
+    shifts = -np.array(
+        [np.median(each.differences / s) for each, s in zip(contradicting, slopes, strict=True)]
+    )
     if np.mean(np.abs(np.abs(shifts) / AMBIENT_PRESSURE - 1.0) < SHIFT_TOLERANCE) > 0.5:
         pairs = zip(contradicting, shifts, strict=True)
-        names = [(each.first if shift > 0 else each.second).recording.origin for each, shift in pairs]
+        names = [
+            (each.first if shift > 0 else each.second).recording.origin for each, shift in pairs
+        ]
         return [
-            f" A pressure of one atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa, explains the difference: the pressures "
-            f"of {file_list(names)} are probably absolute. State their unit in the heading, 'kPa(a)'."
+            f" A pressure of one atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa, explains the"
+            f" difference: the pressures of {file_list(names)} are probably absolute. State their"
+            " unit in the heading, 'kPa(a)'."
         ]
     return [
-        " Check whether these runs are of one muscle, with the same zeros, units and resting length, and leave out "
-        "what is not."
+        " Check whether these runs are of one muscle, with the same zeros, units and resting"
+        " length, and leave out what is not."
     ]
 
 
-MIN_GROUPED, MIN_GAP = 4, 3.0
-"""Minimum number of runs that are divided; gap of the groups in standard deviations of the runs of a group (chosen)."""
+MIN_GROUPED = 4
+MIN_GAP = 3.0
+"""Minimum number of runs that are divided; gap of the groups in standard deviations of the runs of
+a group (chosen).
+"""
 MAX_PLACES = 80
 """Characters of the recordings of a group that are named (chosen)."""
 
 
 class TwoGroups(NamedTuple):
-    """Blocks of two levels of force, the lower one first, their relative difference, and the scatter within."""
+    """Blocks of two levels of force, the lower one first, their relative difference, and the
+    scatter within.
+    """
 
     sides: tuple[list[Block], list[Block]]
     difference: float
@@ -173,35 +227,41 @@ class TwoGroups(NamedTuple):
 
 
 def two_muscle_notes(matches: Matches) -> list[str]:
-    """The remark that the runs fall into two groups, as those of two muscles do; empty if they do not. A drift has no
-    gap between two levels. Hysteresis, and friction that grows with the speed, raise the force of one direction of the
-    motion and lower that of the other, so that both directions must give the same groups; static points must differ by
-    more than hysteresis."""
+    """The remark that the runs fall into two groups, as those of two muscles do; empty if they do
+    not. A drift has no gap between two levels. Hysteresis, and friction that grows with the speed,
+    raise the force of one direction of the motion and lower that of the other, so that both
+    directions must give the same groups; static points must differ by more than hysteresis."""
     runs = [each for each in matches.runs if not each.is_unordered]
     is_static = all(each.first.direction == 0 for each in runs)
     ways, least = ((0,), MAX_HYSTERESIS) if is_static else ((1, -1), MIN_DIFFERENCE)
-    groups = [_two_groups([each for each in runs if each.first.direction == way], least) for way in ways]
+    groups = [
+        _two_groups([each for each in runs if each.first.direction == way], least) for way in ways
+    ]
     found = [each for each in groups if each is not None]
     if len(found) < len(ways) or not all(_agree(found[0], each) for each in found[1:]):
         return []
     text = (
-        f"The runs fall into two groups: their forces differ by {100 * min(g.difference for g in found):.2g} % at "
-        f"equal pressure and contraction, and agree to {100 * max(g.scatter for g in found):.2g} % within a group "
-        f"({'; '.join(_places([b for g in found for b in g.sides[i]]) for i in (0, 1))}). Are they two muscles, or has "
-        "the muscle or a zero changed between them? "
+        "The runs fall into two groups: their forces differ by"
+        f" {100 * min(g.difference for g in found):.2g} % at equal pressure and contraction, and"
+        f" agree to {100 * max(g.scatter for g in found):.2g} % within a group"
+        f" ({'; '.join(_places([b for g in found for b in g.sides[i]]) for i in (0, 1))}). Are they"
+        " two muscles, or has the muscle or a zero changed between them? "
     )
     purpose = "To fit each muscle by itself, write its name in a column, and"
     return [HintedText(text, Hint(purpose, "columns", {"muscle": "specimen"}, "ColumnMapping"))]
 
 
 def _two_groups(runs: Sequence[MatchedRuns], least: float) -> TwoGroups | None:
-    """The two levels of force of runs; None unless a gap wider than `least` and three times the scatter divides them.
-    The levels, of mean zero where matched rows connect them, solve the relative differences by least squares."""
+    """The two levels of force of runs; None unless a gap wider than `least` and three times the
+    scatter divides them. The levels, of mean zero where matched rows connect them, solve the
+    relative differences by least squares.
+    """
     blocks = list({id(b): b for each in runs for b in (each.first, each.second)}.values())
     if len(blocks) < MIN_GROUPED:
         return None
     number = {id(block): i for i, block in enumerate(blocks)}
-    matrix, ratios = np.zeros((len(runs), len(blocks))), np.zeros(len(runs))
+    matrix = np.zeros((len(runs), len(blocks)))
+    ratios = np.zeros(len(runs))
     for i, each in enumerate(runs):
         ratios[i] = 2.0 * np.median(each.differences / sum(each.forces))
         matrix[i, [number[id(each.first)], number[id(each.second)]]] = 1.0, -1.0
@@ -213,25 +273,37 @@ def _two_groups(runs: Sequence[MatchedRuns], least: float) -> TwoGroups | None:
     scatter = float(np.sqrt(np.mean(np.r_[levels[low] - means[0], levels[high] - means[1]] ** 2)))
     if min(low.size, high.size) < 2 or gaps.max() < max(least, MIN_GAP * scatter):
         return None
-    return TwoGroups(([blocks[i] for i in low], [blocks[i] for i in high]), means[1] - means[0], scatter)
+    return TwoGroups(
+        ([blocks[i] for i in low], [blocks[i] for i in high]), means[1] - means[0], scatter
+    )
 
 
 def _agree(first: TwoGroups, second: TwoGroups) -> bool:
-    """Whether the higher group is the later one, or the only one, of the same recordings in both directions."""
+    """Whether the higher group is the later one, or the only one, of the same recordings in both
+    directions.
+    """
     orders = []
     for groups in (first, second):
         rows: dict[int, tuple[list[float], list[float]]] = {}
         for higher, side in enumerate(groups.sides):
             for block in side:
-                rows.setdefault(id(block.recording), ([-1.0], [-1.0]))[higher].append(float(np.mean(block.rows)))
+                rows.setdefault(id(block.recording), ([-1.0], [-1.0]))[higher].append(
+                    float(np.mean(block.rows))
+                )
         orders.append({key: max(high) > max(low) for key, (low, high) in rows.items()})
     common = orders[0].keys() & orders[1].keys()
-    return bool(common) and sum(orders[0][key] == orders[1][key] for key in common) >= 0.8 * len(common)
+    return bool(common) and sum(orders[0][key] == orders[1][key] for key in common) >= 0.8 * len(
+        common
+    )
 
 
 def _places(blocks: Sequence[Block]) -> str:
     """The recordings of blocks, with the range of their rows."""
     rows: dict[str, list[int]] = {}
     for block in blocks:
-        rows.setdefault(block.recording.origin, []).extend((int(block.rows[0]) + 1, int(block.rows[-1]) + 1))
-    return listed([f"{name} rows {min(ends)} to {max(ends)}" for name, ends in rows.items()], MAX_PLACES)
+        rows.setdefault(block.recording.origin, []).extend(
+            (int(block.rows[0]) + 1, int(block.rows[-1]) + 1)
+        )
+    return listed(
+        [f"{name} rows {min(ends)} to {max(ends)}" for name, ends in rows.items()], MAX_PLACES
+    )

@@ -1,7 +1,8 @@
-"""Cross-validation splits by run, level, specimen or block, and the levels that a test rig keeps constant.
+"""Cross-validation splits by run, level, specimen or block, and the levels that a test rig keeps
+constant.
 
-Rows are left out in groups, never at random: neighbouring rows of one run are correlated, so that a law fitted to some
-of them also fits the others, which says nothing about its error on a new run.
+Rows are left out in groups, never at random: neighbouring rows of one run are correlated, so that a
+law fitted to some of them also fits the others, which says nothing about its error on a new run.
 """
 
 import abc
@@ -12,13 +13,25 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Hint, HintedText, IdentificationError, ParameterError, check_field_types, level_text
+from ...core import (
+    Array,
+    Hint,
+    HintedText,
+    IdentificationError,
+    ParameterError,
+    check_field_types,
+    level_text,
+)
 from ...recording import Recording
 
 LEVEL_TOLERANCE = 0.005
-"""Maximum difference between neighbouring values of a level, as a fraction of the maximum (chosen)."""
+"""Maximum difference between neighbouring values of a level, as a fraction of the maximum
+(chosen).
+"""
 MAX_LEVEL_WIDTH = 3.0
-"""Maximum width of a level, in the difference of neighbours; a wider group of values is a ramp (chosen)."""
+"""Maximum width of a level, in the difference of neighbours; a wider group of values is a ramp
+(chosen).
+"""
 HELD_FRACTION = 0.9
 """Minimum fraction of the rows at levels for a quantity that is held (chosen)."""
 ROUND_DIGITS = 2
@@ -26,19 +39,21 @@ ROUND_DIGITS = 2
 
 
 def held_levels(values: Array) -> tuple[Array, float]:
-    """The levels of a measured quantity in increasing order, and the fraction of the rows at them: medians of groups of
-    values, without groups that a ramp fills."""
+    """The levels of a measured quantity in increasing order, and the fraction of the rows at them:
+    medians of groups of values, without groups that a ramp fills."""
     ordered = np.sort(values)
     tolerance = LEVEL_TOLERANCE * float(np.abs(ordered).max())
     ends = np.flatnonzero(np.diff(ordered) > tolerance) + 1
-    groups = [group for group in np.split(ordered, ends) if np.ptp(group) <= MAX_LEVEL_WIDTH * tolerance]
+    groups = [
+        group for group in np.split(ordered, ends) if np.ptp(group) <= MAX_LEVEL_WIDTH * tolerance
+    ]
     return np.array([np.median(group) for group in groups]), sum(map(len, groups)) / ordered.size
 
 
 def levels_of(values: Array, max_count: int) -> Array:
-    """Return the levels of a measured quantity, at most `max_count` of them, evenly selected, in its unit. A level is
-    the median of values closer together than a test rig controls them. A ramp gives quantiles, rounded to two
-    significant digits."""
+    """Return the levels of a measured quantity, at most `max_count` of them, evenly selected, in
+    its unit. A level is the median of values closer together than a test rig controls them. A ramp
+    gives quantiles, rounded to two significant digits."""
     levels, fraction = held_levels(values)
     if fraction < 0.5:
         quantiles = np.quantile(values, np.linspace(0.1, 0.9, max_count))
@@ -55,13 +70,17 @@ def is_pressure_ramp(pressure: Array, contraction: Array) -> bool:
 
 Labels = npt.NDArray[np.str_]
 MAX_LEVELS = 12
-"""Maximum number of levels; beyond it neighbouring levels are merged (chosen: every level costs a fit of each law)."""
+"""Maximum number of levels; beyond it neighbouring levels are merged (chosen: every level costs a
+fit of each law).
+"""
 ALWAYS_FITTED = ""
 """Label of the rows that are in every training set."""
 
 
 class GroupSplit(abc.ABC):
-    """A division of the rows of recordings into groups; each group is left out in turn (one fold)."""
+    """A division of the rows of recordings into groups; each group is left out in turn (one
+    fold).
+    """
 
     group_name: ClassVar[str]
     """Noun for one group, used in reports."""
@@ -70,7 +89,9 @@ class GroupSplit(abc.ABC):
 
     @abc.abstractmethod
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
-        """The group of each row, one array for each recording; ALWAYS_FITTED for rows that are never left out."""
+        """The group of each row, one array for each recording; ALWAYS_FITTED for rows that are
+        never left out.
+        """
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,13 +103,17 @@ class RunSplit(GroupSplit):
 
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         names = [run.origin for run in recordings]
-        unique = [name if names.count(name) == 1 else f"{name} ({i + 1})" for i, name in enumerate(names)]
+        unique = [
+            name if names.count(name) == 1 else f"{name} ({i + 1})" for i, name in enumerate(names)
+        ]
         return [np.full(len(run), name) for run, name in zip(recordings, unique, strict=True)]
 
 
 @dataclasses.dataclass(frozen=True)
 class SpecimenSplit(GroupSplit):
-    """Each muscle is a group, identified by the constant `specimen`, or else by its resting length."""
+    """Each muscle is a group, identified by the constant `specimen`, or else by its resting
+    length.
+    """
 
     group_name: ClassVar[str] = "specimen"
     purpose: ClassVar[str] = "other muscles of the same type"
@@ -107,7 +132,9 @@ def specimen_name(run: Recording) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class LevelSplit(GroupSplit):
-    """Each level of a quantity is a group; values closer than `min_gap` times their range belong to one level."""
+    """Each level of a quantity is a group; values closer than `min_gap` times their range belong to
+    one level.
+    """
 
     quantity: str
     min_gap: float = 0.02
@@ -128,18 +155,21 @@ class LevelSplit(GroupSplit):
             nearest = int(np.argmin(np.diff(centres)))
             centres = np.delete(centres, nearest)
         edges = (centres[1:] + centres[:-1]) / 2
-        names = np.array([f"{self.quantity} {level_text(self.quantity, float(each), span)}" for each in centres])
+        names = np.array(
+            [f"{self.quantity} {level_text(self.quantity, float(each), span)}" for each in centres]
+        )
         return [names[np.searchsorted(edges, run[self.quantity])] for run in recordings]
 
 
 @dataclasses.dataclass(frozen=True)
 class BlockSplit(GroupSplit):
-    """Blocks of a quantity within every run, so that every run and every muscle is part of each training set.
+    """Blocks of a quantity within every run, so that every run and every muscle is part of each
+    training set.
 
-    The range of a run is divided into `2 folds` intervals. Every `folds`-th interval belongs to one group, shifted by
-    one interval from run to run. The first and the last interval are in every training set, so that a law is evaluated
-    by interpolation only. The rows of an interval are correlated and are therefore left out together (Roberts et al.,
-    Ecography 40:913 (2017)).
+    The range of a run is divided into `2 folds` intervals. Every `folds`-th interval belongs to one
+    group, shifted by one interval from run to run. The first and the last interval are in every
+    training set, so that a law is evaluated by interpolation only. The rows of an interval are
+    correlated and are therefore left out together (Roberts et al., Ecography 40:913 (2017)).
     """
 
     quantity: str = "pressure"
@@ -166,31 +196,44 @@ class BlockSplit(GroupSplit):
         return labels
 
 
-def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple[list[Labels], list[str]]:
-    """The label of each row, and the names of the folds in order. Raises IdentificationError where there are fewer than
-    two groups."""
+def label_folds(
+    recordings: Sequence[Recording], leave_out: GroupSplit
+) -> tuple[list[Labels], list[str]]:
+    """The label of each row, and the names of the folds in order. Raises IdentificationError where
+    there are fewer than two groups."""
     labels = leave_out.labels(recordings)
-    names = list(dict.fromkeys(str(name) for array in labels for name in dict.fromkeys(array.tolist())))
+    names = list(
+        dict.fromkeys(str(name) for array in labels for name in dict.fromkeys(array.tolist()))
+    )
     names = [name for name in names if name != ALWAYS_FITTED]
     if len(names) < 2:
         raise IdentificationError(
             HintedText(
-                f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, "
-                f"but all rows belong to one {leave_out.group_name}. Give more runs.",
-                *(Hint(f"To leave out levels of {n}", "leave_out", LevelSplit(n)) for n in ("contraction", "pressure")),
+                f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs"
+                f" two groups or more, but all rows belong to one {leave_out.group_name}. Give more"
+                " runs.",
+                *(
+                    Hint(f"To leave out levels of {n}", "leave_out", LevelSplit(n))
+                    for n in ("contraction", "pressure")
+                ),
             )
         )
     return labels, names
 
 
 def default_split(recordings: Sequence[Recording], least: int = 3) -> GroupSplit:
-    """The first split with `least` groups or more: specimens, runs, levels of contraction, levels of pressure. Raises
-    IdentificationError where there is none."""
-    splits: tuple[GroupSplit, ...] = (SpecimenSplit(), RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"))
+    """The first split with `least` groups or more: specimens, runs, levels of contraction, levels
+    of pressure. Raises IdentificationError where there is none."""
+    splits: tuple[GroupSplit, ...] = (
+        SpecimenSplit(),
+        RunSplit(),
+        LevelSplit("contraction"),
+        LevelSplit("pressure"),
+    )
     for split in splits:
         if len({name for array in split.labels(recordings) for name in array.tolist()}) >= least:
             return split
     raise IdentificationError(
-        f"{least} groups or more are needed, but there are fewer than {least} specimens, runs, levels of contraction "
-        "and levels of pressure. Measure at more levels."
+        f"{least} groups or more are needed, but there are fewer than {least} specimens, runs,"
+        " levels of contraction and levels of pressure. Measure at more levels."
     )

@@ -1,4 +1,5 @@
-"""Checks of the data of a static fit: contradictions, outliers, sensor delays and scatter, as notes with their cause.
+"""Checks of the data of a static fit: contradictions, outliers, sensor delays and scatter, as notes
+with their cause.
 
 They need no law. `check_data` joins them with the checks of `bench.checks`, for every static fit.
 """
@@ -22,14 +23,19 @@ from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .matched_rows import match_rows
 from .weighting import Huber
 
-MAX_MISFIT, MIN_MISFIT = 3.0, 0.02
-"""Residual above which the law does not follow the data: ratio to their scatter and to the maximum force (chosen)."""
+MAX_MISFIT = 3.0
+MIN_MISFIT = 0.02
+"""Residual above which the law does not follow the data: ratio to their scatter and to the maximum
+force (chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scatter:
-    """Standard deviations of the force: of noise, and of runs at equal pressure, contraction and direction [N]; None
-    where the data do not show them. `branches` is the distance of the branches that the residuals follow [N]."""
+    """Standard deviations of the force: of noise, and of runs at equal pressure, contraction and
+    direction [N]; None where the data do not show them. `branches` is the distance of the branches
+    that the residuals follow [N].
+    """
 
     noise: float | None
     repeatability: float | None
@@ -40,22 +46,27 @@ class Scatter:
         if self.noise is not None:
             yield NamedValue("noise of the data", self.noise, "N", digits=3)
         if self.repeatability is not None:
-            yield NamedValue("difference of repeated runs", float(np.sqrt(2.0)) * self.repeatability, "N", digits=3)
+            yield NamedValue(
+                "difference of repeated runs",
+                float(np.sqrt(2.0)) * self.repeatability,
+                "N",
+                digits=3,
+            )
         if self.branches:
             yield NamedValue("distance of the branches", self.branches, "N", digits=3)
 
     def misfit_notes(self, rmse: float, greatest: float, lengths: int = 1) -> list[str]:
-        """The remark that a residual [N] is greater than the scatter explains. A static law follows the middle of two
-        branches. `greatest` is the maximum force of the data [N], `lengths` the number of resting lengths that a law
-        without an effect of the length is fitted to."""
+        """The remark that a residual [N] is greater than the scatter explains. A static law follows
+        the middle of two branches. `greatest` is the maximum force of the data [N], `lengths` the
+        number of resting lengths that a law without an effect of the length is fitted to."""
         known = [each for each in (self.noise, self.repeatability) if each is not None]
         expected = max([*known, 0.5 * self.branches], default=0.0)
         if not known or rmse <= MAX_MISFIT * expected or rmse <= MIN_MISFIT * greatest:
             return []
         parts = ", ".join(f"{each.name} {each.value:.3g} N" for each in self.values())
         return [
-            f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data ({parts}): the "
-            "law does not follow them. "
+            f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data"
+            f" ({parts}): the law does not follow them. "
             + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
             + "Compare other laws, and check the remarks on contradicting or suspicious data."
         ]
@@ -73,10 +84,13 @@ class Remarks:
 
 
 MIN_DISTANCE = 0.02
-"""Minimum distance of an outlier of the force from its neighbours, as a fraction of the maximum force (chosen)."""
-MIN_SHARE, MIN_RMS = 0.002, 0.005
-"""Minimum share of rows with such outliers that a fit reports, or of their part of the rms error, as a fraction of the
-maximum force (chosen)."""
+"""Minimum distance of an outlier of the force from its neighbours, as a fraction of the maximum
+force (chosen).
+"""
+MIN_SHARE = 0.002
+MIN_RMS = 0.005
+"""Minimum share of rows with such outliers that a fit reports, or of their part of the rms error,
+as a fraction of the maximum force (chosen)."""
 HELD = 0.005
 """Range of the contraction at a held length (chosen)."""
 HUBER = 3.0
@@ -84,7 +98,9 @@ HUBER = 3.0
 
 
 def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
-    """The remark on outliers of the force; empty where there are few, or where the rows are in no order of time."""
+    """The remark on outliers of the force; empty where there are few, or where the rows are in no
+    order of time.
+    """
     timed = [run for run in recordings if "time" in run and "force" in run and len(run)]
     if not timed:
         return []
@@ -100,35 +116,57 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
     rms = math.sqrt(sum((outlier.value - outlier.expected) ** 2 for _, outlier in found) / rows)
     if not found or (len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest):
         return []
-    files, spoilt = {run.origin for run in timed}, {run.origin for run, _ in found}
+    files = {run.origin for run in timed}
+    spoilt = {run.origin for run, _ in found}
     examples = "; ".join(
         f"{run.origin}, row {each.row + 1} ({each.value:.4g} N, neighbours {each.expected:.4g} N)"
         for run, each in found[:3]
     )
     return [
         HintedText(
-            f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in {len(spoilt)} of "
-            f"{len(files)} files, which alone give an rms error of {rms:.2g} N ({examples}).",
+            f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in"
+            f" {len(spoilt)} of {len(files)} files, which alone give an rms error of {rms:.2g} N"
+            f" ({examples}).",
             Hint("To leave them out", "drop_outliers", True, "ColumnMapping"),
-            Hint("To reduce their weight", "loss", Huber(float(f"{HUBER * sensors['force'].std:.2g}"))),
+            Hint(
+                "To reduce their weight",
+                "loss",
+                Huber(float(f"{HUBER * sensors['force'].std:.2g}")),
+            ),
         )
     ]
 
 
 def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
-    """The remark on a pressure sensor at its upper limit, while the force at constant length still changes."""
-    runs = [run for run in recordings if all(name in run for name in ("time", "pressure", "contraction", "force"))]
+    """The remark on a pressure sensor at its upper limit, while the force at constant length still
+    changes.
+    """
+    runs = [
+        run
+        for run in recordings
+        if all(name in run for name in ("time", "pressure", "contraction", "force"))
+    ]
     if not runs:
         return []
-    limit = estimate_sensors([Recording({"pressure": run["pressure"]}, run.origin) for run in runs])["pressure"]
+    limit = estimate_sensors(
+        [Recording({"pressure": run["pressure"]}, run.origin) for run in runs]
+    )["pressure"]
     least = MIN_DISTANCE * _greatest_force(runs)
-    at_limit = {run.origin: run.rows(run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution) for run in runs}
-    held = {name: run for name, run in at_limit.items() if len(run) and np.ptp(run["contraction"]) < HELD}
+    at_limit = {
+        run.origin: run.rows(run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution)
+        for run in runs
+    }
+    held = {
+        name: run
+        for name, run in at_limit.items()
+        if len(run) and np.ptp(run["contraction"]) < HELD
+    }
     found = {name: len(run) for name, run in held.items() if np.ptp(run["force"]) > least}
     text = (
-        f"The pressure sensor saturates at {limit.upper_limit / 1e3:.4g} kPa, in {sum(found.values())} rows of "
-        f"{file_list([*found])}, where the force still changes: the pressure is greater there, and the law takes the "
-        "limit for it. Leave these rows out, or use a sensor of a greater range."
+        f"The pressure sensor saturates at {limit.upper_limit / 1e3:.4g} kPa, in"
+        f" {sum(found.values())} rows of {file_list([*found])}, where the force still changes: the"
+        " pressure is greater there, and the law takes the limit for it. Leave these rows out, or"
+        " use a sensor of a greater range."
     )
     return [text] if found else []
 
@@ -141,14 +179,24 @@ def _greatest_force(recordings: Sequence[Recording]) -> float:
 def check_data(recordings: Sequence[Recording]) -> Remarks:
     """The checks of recordings, without the rows in which a code stands for a missing value."""
     measured = without_missing_codes([recording for recording in recordings if len(recording)])
-    matches, delay = match_rows(measured), find_delay(measured)
+    matches = match_rows(measured)
+    delay = find_delay(measured)
     contradictions = contradiction_notes(matches)
     if not any(" tells the contradicting rows apart" in note for note in contradictions):
         contradictions += two_muscle_notes(match_rows(measured, by_branch=True))
-    found = (*contradictions, *outlier_notes(measured), *saturation_notes(measured), *delay_notes(delay))
+    found = (
+        *contradictions,
+        *outlier_notes(measured),
+        *saturation_notes(measured),
+        *delay_notes(delay),
+    )
     # The noise only where the rows are in order of time.
     timed = [run["force"] for run in measured if "time" in run and "force" in run]
-    noise = float(np.median([estimate_noise(force[np.isfinite(force)]) for force in timed])) if timed else 0.0
+    noise = (
+        float(np.median([estimate_noise(force[np.isfinite(force)]) for force in timed]))
+        if timed
+        else 0.0
+    )
     scatter = Scatter(noise if noise > 0 else None, repeatability(matches))
     return Remarks((*find_suspicious(recordings), *found), scatter, delay)
 

@@ -17,11 +17,20 @@ from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
 from .data_checks import Remarks, check_data
 from .parameter_covariance import Runs
-from .problem import POINT_COLUMNS, RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem, with_length
+from .problem import (
+    POINT_COLUMNS,
+    RESTING_LENGTH,
+    FitProblem,
+    fitted_quantity_of,
+    make_problem,
+    with_length,
+)
 from .weighting import Censoring, default_censoring, force_limits, sensor_deviations
 
 LEVEL_BAND = 0.1
-"""Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum (chosen)."""
+"""Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum
+(chosen).
+"""
 MIN_ROWS_OF_RUN = 12
 """Minimum number of rows of a run whose constant quantity is replaced by its level (chosen)."""
 _MAX_ROWS_OF_POINTS = 2000
@@ -30,9 +39,9 @@ _MAX_ROWS_OF_POINTS = 2000
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FitPoints:
-    """The points of one or several recordings, for fits of any law; the sensors are estimated once. `joined` has all
-    rows of the recordings in order. `missing` is the mask of the rows that are not used, because they lack a value or
-    are `repeated` from another recording."""
+    """The points of one or several recordings, for fits of any law; the sensors are estimated once.
+    `joined` has all rows of the recordings in order. `missing` is the mask of the rows that are not
+    used, because they lack a value or are `repeated` from another recording."""
 
     recordings: tuple[Recording, ...]
     joined: Recording
@@ -41,13 +50,21 @@ class FitPoints:
     """Number of rows with a missing value."""
     repeated: tuple[RepeatedRows, ...] = ()
     kept: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
-    """What was computed last for one law and all points, which laws with the same population share."""
+    """What was computed last for one law and all points, which laws with the same population
+    share.
+    """
 
     @classmethod
     def from_recordings(cls, recording: Recording | Sequence[Recording]) -> "FitPoints":
-        """The points of one or several recordings. Raises IdentificationError for an infinite value."""
+        """The points of one or several recordings. Raises IdentificationError for an infinite
+        value.
+        """
         runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
-        columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
+        columns = (
+            {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS}
+            if runs
+            else {}
+        )
         origins = list(dict.fromkeys(run.origin for run in runs))
         few = origins if len(origins) <= 3 else [*origins[:2], f"{len(origins) - 2} more"]
         origin = " + ".join(few) or "no recording"
@@ -55,20 +72,27 @@ class FitPoints:
             if np.isinf(values).any():
                 row = int(np.argmax(np.isinf(values)))
                 raise IdentificationError(
-                    f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
-                    f"recording.rows(np.isfinite(recording['{name}']))."
+                    f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for"
+                    f" example with recording.rows(np.isfinite(recording['{name}']))."
                 )
-        missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
+        missing = (
+            np.isnan(np.stack(list(columns.values()))).any(axis=0)
+            if columns
+            else np.zeros(0, dtype=bool)
+        )
         lengths = {run.constants[RESTING_LENGTH] for run in runs if RESTING_LENGTH in run.constants}
         if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
             by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
             columns[RESTING_LENGTH] = np.concatenate(by_row)
         constants = {RESTING_LENGTH: lengths.pop()} if len(lengths) == 1 else {}
         joined = Recording(columns, origin, constants, references=tuple(cite(runs)))
-        dropped, repeated = int(np.count_nonzero(missing)), find_repeated_rows(runs, POINT_COLUMNS)
+        dropped = int(np.count_nonzero(missing))
+        repeated = find_repeated_rows(runs, POINT_COLUMNS)
         starts = np.cumsum([0, *(len(run) for run in runs)])
         for each in repeated:
-            missing[starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop] = True
+            missing[
+                starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop
+            ] = True
         return cls(runs, joined, missing, dropped, repeated)
 
     @functools.cached_property
@@ -79,7 +103,8 @@ class FitPoints:
     @functools.cached_property
     def runs(self) -> Runs:
         """The run and the specimen of each complete row."""
-        lengths, names = [len(run) for run in self.recordings], [specimen_name(run) for run in self.recordings]
+        lengths = [len(run) for run in self.recordings]
+        names = [specimen_name(run) for run in self.recordings]
         numbers = np.arange(len(lengths)), np.unique(names, return_inverse=True)[1]
         index, specimen = (np.repeat(each, lengths)[~self.missing] for each in numbers)
         return Runs(index, specimen, all("time" in run for run in self.recordings))
@@ -95,75 +120,111 @@ class FitPoints:
 
     @functools.cached_property
     def at_levels(self) -> Recording:
-        """The complete rows of `data`, with every quantity that is constant in a run replaced by its level. Its noise
-        and its ripple vary in these rows, and its level in repeated runs, but do not show how the muscle depends on
-        it."""
+        """The complete rows of `data`, with every quantity that is constant in a run replaced by
+        its level. Its noise and its ripple vary in these rows, and its level in repeated runs, but
+        do not show how the muscle depends on it."""
         columns = [_columns_at_levels(run) for run in self.recordings]
         if not any(held.any() for _, each in columns for held in each.values()):
             return self.data
         levels: dict[str, Array] = {}
         for name in ("pressure", "contraction"):
-            values, held = (np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True))
+            values, held = (
+                np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True)
+            )
             distinct, member = np.unique(values[held], return_inverse=True)
-            merged, band = distinct.copy(), RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0))
-            for interval in level_intervals(distinct, band):  # those within the band count as the lowest of them
+            merged = distinct.copy()
+            band = RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0))
+            for interval in level_intervals(
+                distinct, band
+            ):  # those within the band count as the lowest of them
                 merged[interval.rows] = distinct[interval.start]
             values[held] = merged[member]
             levels[name] = values[~self.missing]
         return self.data.with_columns(**levels)
 
     def _range_of(self, name: str) -> tuple[float, float]:
-        values, unit = self.data[name], " Pa" if name == "pressure" else ""
+        values = self.data[name]
+        unit = " Pa" if name == "pressure" else ""
         if np.ptp(values) == 0:
             raise IdentificationError(
-                f"{self.data.origin}: {name} is {values[0]:g}{unit} in every row, so a surface cannot be fitted. "
-                f"Measure at several levels of {name}.",
+                f"{self.data.origin}: {name} is {values[0]:g}{unit} in every row, so a surface"
+                f" cannot be fitted. Measure at several levels of {name}.",
                 cause=f"{name} does not vary",
             )
         return float(values.min()), float(values.max())
 
     def problem(
-        self, characteristic: Characteristic, *, censoring: Censoring | None = None, sigma: npt.ArrayLike | None = None,
+        self,
+        characteristic: Characteristic,
+        *,
+        censoring: Censoring | None = None,
+        sigma: npt.ArrayLike | None = None,
         fixed: Collection[str] = (),
-    ) -> FitProblem:  # fmt: skip
-        """The problem of fitting a law to these points; arguments as for `fit`. Raises IdentificationError."""
+    ) -> FitProblem:
+        """The problem of fitting a law to these points; arguments as for `fit`. Raises
+        IdentificationError.
+        """
         law: Any = with_length(characteristic, self.data.constants.get(RESTING_LENGTH))
-        if hasattr(law, "with_validity_range") and len(self.data):  # a surface is scaled to the range of the data
+        if hasattr(law, "with_validity_range") and len(
+            self.data
+        ):  # a surface is scaled to the range of the data
             law = law.with_validity_range(*map(self._range_of, ("pressure", "contraction")))
         if sigma is None:
             by_recording = self.deviations(fitted_quantity_of(characteristic).name)
             if by_recording is not None:
                 sigma = np.repeat(by_recording, [len(run) for run in self.recordings])
-        weights = np.ones(len(self.data)) if sigma is None else _row_weights(self.joined, self.missing, sigma)
+        weights = (
+            np.ones(len(self.data))
+            if sigma is None
+            else _row_weights(self.joined, self.missing, sigma)
+        )
         if censoring is None:
             censoring = default_censoring(law)
             if isinstance(law, ForceLaw):  # the range that the law and the sensor have in common
-                own, sensor = censoring, force_limits(self.recordings)
-                censoring = Censoring(max(own.min_force, sensor.min_force), min(own.max_force, sensor.max_force))
+                own = censoring
+                sensor = force_limits(self.recordings)
+                censoring = Censoring(
+                    max(own.min_force, sensor.min_force), min(own.max_force, sensor.max_force)
+                )
         return make_problem(law, self.data, censoring, weights, fixed)
 
 
-def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str, npt.NDArray[np.bool_]]]:
-    """Pressure and contraction of the rows; that which is constant in a run is replaced by its level, in these rows."""
+def _columns_at_levels(
+    recording: Recording,
+) -> tuple[dict[str, Array], dict[str, npt.NDArray[np.bool_]]]:
+    """Pressure and contraction of the rows; that which is constant in a run is replaced by its
+    level, in these rows.
+    """
     columns = {name: np.array(recording[name], dtype=float) for name in ("pressure", "contraction")}
     held = {name: np.zeros(len(recording), dtype=bool) for name in columns}
     if not np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all():
         return columns, held
-    bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
+    bands = {
+        "pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)),
+        "contraction": 0.01,
+    }
     if not any(_may_be_constant(columns[name], band) for name, band in bands.items()):
         return columns, held
     names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
     for run in find_runs(recording):
-        name, rows = names.get(run.kind), run.interval.rows
-        if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and spread(columns[name][rows]) <= bands[name]:
-            columns[name][rows], held[name][rows] = np.median(columns[name][rows]), True
+        name = names.get(run.kind)
+        rows = run.interval.rows
+        if (
+            name is not None
+            and len(run.interval) >= MIN_ROWS_OF_RUN
+            and spread(columns[name][rows]) <= bands[name]
+        ):
+            columns[name][rows] = np.median(columns[name][rows])
+            held[name][rows] = True
     return columns, held
 
 
 def _may_be_constant(values: Array, band: float) -> bool:
-    """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit into a band. It is
-    necessary for a run at a level, and quickly answered for single points: up to 101 rows have at most one value at
-    each end outside the band of 98 %, and longer runs have as many rows in succession without any."""
+    """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit
+    into a band. It is necessary for a run at a level, and quickly answered for single points: up to
+    101 rows have at most one value at each end outside the band of 98 %, and longer runs have as
+    many rows in succession without any.
+    """
     if not MIN_ROWS_OF_RUN <= len(values) <= _MAX_ROWS_OF_POINTS:
         return len(values) > _MAX_ROWS_OF_POINTS
     # Ten rows of twelve are in the band, and so at least four in succession.
@@ -180,8 +241,8 @@ def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.Arr
     deviations = np.asarray(sigma, dtype=float)
     if deviations.shape not in ((), (1,), (len(data),)):
         raise IdentificationError(
-            f"{data.origin}: sigma has the shape {deviations.shape}; give one number, or one for each "
-            f"of the {len(data)} rows."
+            f"{data.origin}: sigma has the shape {deviations.shape}; give one number, or one for"
+            f" each of the {len(data)} rows."
         )
     deviations = np.broadcast_to(deviations, (len(data),))[~dropped]
     if not (np.isfinite(deviations) & (deviations > 0)).all():

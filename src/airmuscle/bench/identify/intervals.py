@@ -1,4 +1,6 @@
-"""Intervals of a static fit: confidence and prediction bands of the law, profile likelihood of a parameter."""
+"""Intervals of a static fit: confidence and prediction bands of the law, profile likelihood of a
+parameter.
+"""
 
 import dataclasses
 from typing import NamedTuple
@@ -16,35 +18,44 @@ from .weighting import LeastSquares
 
 
 class Band(NamedTuple):
-    """The fitted quantity at the points, not clamped, with the lower and upper limit of its band; shape (N,) each."""
+    """The fitted quantity at the points, not clamped, with the lower and upper limit of its band;
+    shape (N,) each.
+    """
 
     value: Array
     low: Array
     high: Array
 
 
-def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, prediction: bool = False) -> Band:
-    """The confidence band of a fit at points: value -+ t sqrt(g^T C g), in the fitted quantity [SI].
+def confidence_band(
+    fit: Fit, points: Recording, *, level: float = 0.95, prediction: bool = False
+) -> Band:
+    """The confidence band of a fit at points: value -+ t sqrt(g^T C g), in the fitted quantity
+    [SI].
 
-    g is the gradient of the law with respect to its parameters, C their covariance, t the quantile of Student's
-    distribution. Covariance and degrees of freedom follow from the scatter of the runs, or of parts of them, where rows
-    are correlated (`fit.error_basis` states which); for independent rows the latter are N - P. `prediction` gives the
-    prediction band of one further observation of the measured runs: the residual variance is added.
-    `points` has the columns that the law takes as arguments, and the constant `resting_length` if the law was fitted to
-    several lengths.
+    g is the gradient of the law with respect to its parameters, C their covariance, t the quantile
+    of Student's distribution. Covariance and degrees of freedom follow from the scatter of the
+    runs, or of parts of them, where rows are correlated (`fit.error_basis` states which); for
+    independent rows the latter are N - P. `prediction` gives the prediction band of one further
+    observation of the measured runs: the residual variance is added. `points` has the columns that
+    the law takes as arguments, and the constant `resting_length` if the law was fitted to several
+    lengths.
 
-    The band of a PooledLengthLaw is that of the specimen that `points` state (the constant `specimen`, or else the
-    resting length), or of a new muscle, with the scatter of the specimens and that of the runs.
-    Raises IdentificationError without degrees of freedom, or for a level outside 0 to 1.
+    The band of a PooledLengthLaw is that of the specimen that `points` state (the constant
+    `specimen`, or else the resting length), or of a new muscle, with the scatter of the specimens
+    and that of the runs. Raises IdentificationError without degrees of freedom, or for a level
+    outside 0 to 1.
     """
     degrees_of_freedom = fit.degrees_of_freedom
     if degrees_of_freedom <= 0 or not np.isfinite(fit.sigma):
         raise IdentificationError(
-            f"{fit.recording.origin}: the band cannot be computed, because there are no more uncensored rows than "
-            "parameters. Measure more points."
+            f"{fit.recording.origin}: the band cannot be computed, because there are no more"
+            " uncensored rows than parameters. Measure more points."
         )
     if not 0 < level < 1:
-        raise IdentificationError(f"the confidence level is {level:g}; it must lie between 0 and 1, e.g. 0.95.")
+        raise IdentificationError(
+            f"the confidence level is {level:g}; it must lie between 0 and 1, e.g. 0.95."
+        )
     columns = {name: points[name] for name in fit.fitted_quantity.arguments}
     length = points.constants.get(RESTING_LENGTH)
     if length is not None:
@@ -61,8 +72,11 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     return Band(value, value - half, value + half)
 
 
-_HIGH_CORRELATION, _HIGH_RELATIVE_ERROR = 0.99, 0.5
-"""Absolute correlation, or relative standard error, above which a standard error is not trusted (chosen)."""
+_HIGH_CORRELATION = 0.99
+_HIGH_RELATIVE_ERROR = 0.5
+"""Absolute correlation, or relative standard error, above which a standard error is not trusted
+(chosen).
+"""
 _MAX_DOUBLINGS = 12
 """Maximum number of outward steps, each twice the previous one: up to 4096 standard errors."""
 _BISECTIONS = 18
@@ -87,37 +101,44 @@ class ProfileLikelihood:
 
 
 def weakly_determined(fit: Fit) -> tuple[str, ...]:
-    """Names of the parameters whose standard error is not reliable. These are highly correlated with another parameter
-    or, in a nonlinear fit, have a large relative standard error."""
+    """Names of the parameters whose standard error is not reliable. These are highly correlated
+    with another parameter or, in a nonlinear fit, have a large relative standard error."""
     correlation = fit.parameter_covariance.greatest_correlations()
-    nonlinear = not is_linear(fit.problem)  # in a linear fit a standard error is exact, however large
+    nonlinear = not is_linear(
+        fit.problem
+    )  # in a linear fit a standard error is exact, however large
     return tuple(
         e.name
         for e, r in zip(fit.estimates, correlation, strict=True)
-        if not e.on_bound and (r > _HIGH_CORRELATION or (nonlinear and e.stderr > _HIGH_RELATIVE_ERROR * abs(e.value)))
+        if not e.on_bound
+        and (
+            r > _HIGH_CORRELATION or (nonlinear and e.stderr > _HIGH_RELATIVE_ERROR * abs(e.value))
+        )
     )
 
 
 def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
-    """The profile-likelihood interval of one parameter (Bates and Watts (1988), Nonlinear Regression, 6.1).
+    """The profile-likelihood interval of one parameter (Bates and Watts (1988), Nonlinear
+    Regression, 6.1).
 
-    It holds all values for which the sum of squares, minimised over the other parameters, stays below
-    S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P degrees of freedom; P counts
-    the parameters that are not on a bound. Where rows are correlated, F is multiplied by the squared ratio of the half
-    width of the interval by standard errors (`fit.error_basis`) to that for independent rows. Raises
-    IdentificationError for a robust fit, a parameter on its bound, or without degrees of freedom.
+    It holds all values for which the sum of squares, minimised over the other parameters, stays
+    below S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P
+    degrees of freedom; P counts the parameters that are not on a bound. Where rows are correlated,
+    F is multiplied by the squared ratio of the half width of the interval by standard errors
+    (`fit.error_basis`) to that for independent rows. Raises IdentificationError for a robust fit, a
+    parameter on its bound, or without degrees of freedom.
     """
     if not isinstance(fit.loss, LeastSquares):
         raise IdentificationError(
-            "a likelihood profile needs a fit by least squares, because a robust loss is no likelihood of the noise. "
-            "Fit with LeastSquares()."
+            "a likelihood profile needs a fit by least squares, because a robust loss is no"
+            " likelihood of the noise. Fit with LeastSquares()."
         )
     estimate = fit[name]
     degrees_of_freedom = fit.degrees_of_freedom
     if degrees_of_freedom <= 0 or not np.isfinite(estimate.stderr):
         raise IdentificationError(
-            f"{name} has no likelihood profile, because it is on its bound or there are no more uncensored rows than "
-            "parameters."
+            f"{name} has no likelihood profile, because it is on its bound or there are no more"
+            " uncensored rows than parameters."
         )
     index = fit.names.index(name)
     minimum = _sum_of_squares(fit.problem, fit.values)
@@ -132,10 +153,12 @@ def _sum_of_squares(problem: FitProblem, values: np.ndarray) -> float:
 
 
 def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
-    """The value at which the profile exceeds the threshold on one side; infinite where it never does, or where a bound
-    is reached first."""
-    problem, estimate = fit.problem, fit.estimates[index]
-    leaf, bounds = problem.free[index], problem.free_leaves[index].declared.bounds
+    """The value at which the profile exceeds the threshold on one side; infinite where it never
+    does, or where a bound is reached first."""
+    problem = fit.problem
+    estimate = fit.estimates[index]
+    leaf = problem.free[index]
+    bounds = problem.free_leaves[index].declared.bounds
     others = tuple(i for i in problem.free if i != leaf)
 
     def is_beyond(value: float) -> bool:
@@ -145,9 +168,12 @@ def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
         values = solve_least_squares(constrained, LeastSquares()).values if others else np.zeros(0)
         return _sum_of_squares(constrained, values) > threshold
 
-    inside, outside, unbounded = estimate.value, estimate.value, float(np.copysign(np.inf, step))
+    inside = estimate.value
+    outside = estimate.value
+    unbounded = float(np.copysign(np.inf, step))
     for doubling in range(_MAX_DOUBLINGS):
-        inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, *bounds))
+        inside = outside
+        outside = float(np.clip(estimate.value + step * 2.0**doubling, *bounds))
         if inside == outside:  # the bound is reached below the threshold
             return unbounded
         if is_beyond(outside):

@@ -1,14 +1,15 @@
 """Covariance of the estimates of a static fit, with the correlation of the errors within runs.
 
-With independent errors the covariance is sigma^2 (J^T J)^-1. Errors that a whole run shares, such as the zero or the
-gain of a sensor, and those of a slow ramp are correlated. The covariance is then computed from groups of rows, between
-which errors are independent: C = A (Sum_g s_g s_g^T) A, where A = (J^T J)^-1 and s_g = J_g^T (I - H_g)^-1/2 e_g is the
-gradient of group g, H_g = J_g A J_g^T its leverage (CR2). It has no bias where the errors of all rows are independent.
-The quantile of Student's distribution of an interval has the degrees of freedom of the variance of this combination of
-parameters under independent errors.
-References: Bell and McCaffrey (2002), "Bias reduction in standard errors for linear regression with multi-stage
-samples", Survey Methodology 28(2), 169-181; Cameron and Miller (2015), "A practitioner's guide to cluster-robust
-inference", Journal of Human Resources 50(2), 317-372.
+With independent errors the covariance is sigma^2 (J^T J)^-1. Errors that a whole run shares, such
+as the zero or the gain of a sensor, and those of a slow ramp are correlated. The covariance is then
+computed from groups of rows, between which errors are independent: C = A (Sum_g s_g s_g^T) A, where
+A = (J^T J)^-1 and s_g = J_g^T (I - H_g)^-1/2 e_g is the gradient of group g, H_g = J_g A J_g^T its
+leverage (CR2). It has no bias where the errors of all rows are independent. The quantile of
+Student's distribution of an interval has the degrees of freedom of the variance of this combination
+of parameters under independent errors. References: Bell and McCaffrey (2002), "Bias reduction in
+standard errors for linear regression with multi-stage samples", Survey Methodology 28(2), 169-181;
+Cameron and Miller (2015), "A practitioner's guide to cluster-robust inference", Journal of Human
+Resources 50(2), 317-372.
 """
 
 import dataclasses
@@ -22,22 +23,28 @@ import numpy.typing as npt
 from ...core import Array
 from .model_evidence import lag_one_autocorrelation, student_quantile
 
-ROWS, PARTS, RUNS, SPECIMENS = "rows", "parts", "runs", "specimens"
+ROWS = "rows"
+PARTS = "parts"
+RUNS = "runs"
+SPECIMENS = "specimens"
 """What the errors are independent between."""
 MIN_GROUPS = 3
 """Minimum number of runs or specimens from which their scatter is estimated (chosen)."""
 MIN_DEGREES_OF_FREEDOM = 2.4
 """Minimum of the median of the parameters' degrees of freedom for groups of rows (chosen)."""
 LEAST_DEGREES_OF_FREEDOM = 2.0
-"""Least degrees of freedom of an interval by groups of rows (chosen: Student's distribution has no variance below; 91
-to 99 % of 95 % intervals of seven laboratories held, each of 400 experiments)."""
+"""Least degrees of freedom of an interval by groups of rows (chosen: Student's distribution has no
+variance below; 91 to 99 % of 95 % intervals of seven laboratories held, each of 400
+experiments)."""
 SPARE_GROUPS = 2
-"""Number of parts of runs beyond that of the parameters (chosen: 92 to 95 % of 95 % intervals of first-order processes
-held, with an autocorrelation of 0.97 and 1000 rows)."""
+"""Number of parts of runs beyond that of the parameters (chosen: 92 to 95 % of 95 % intervals of
+first-order processes held, with an autocorrelation of 0.97 and 1000 rows)."""
 MIN_GROUP_ROWS = 3
 """Minimum number of rows of a part of a run (chosen)."""
 SIGNIFICANCE = 3.0
-"""Lag-1 autocorrelation, in its standard deviations 1/sqrt(N) for independent rows, that counts as such (chosen)."""
+"""Lag-1 autocorrelation, in its standard deviations 1/sqrt(N) for independent rows, that counts as
+such (chosen).
+"""
 NORMAL_QUANTILE = 1.959963984540054
 """Half width of a 95 % interval of the normal distribution in standard deviations."""
 _MAX_LEVERAGE = 1.0 - 1e-9
@@ -62,8 +69,8 @@ class Runs:
 
 
 class Groups(NamedTuple):
-    """Adjusted gradients (G, P), leverages H and H (I - H)^-1/2 (G, P, P) of the groups, in the orthonormal basis of
-    the Jacobian."""
+    """Adjusted gradients (G, P), leverages H and H (I - H)^-1/2 (G, P, P) of the groups, in the
+    orthonormal basis of the Jacobian."""
 
     gradients: Array
     leverages: Array
@@ -72,8 +79,8 @@ class Groups(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ParameterCovariance:
-    """Covariance of P parameters, and of any combination of them. These are all fitted parameters, or those that are
-    not on a bound where the rows do not determine all."""
+    """Covariance of P parameters, and of any combination of them. These are all fitted parameters,
+    or those that are not on a bound where the rows do not determine all."""
 
     parameters: Mask
     """Mask of the P parameters among all fitted ones, whose number is Q."""
@@ -104,32 +111,48 @@ class ParameterCovariance:
         return np.asarray(gradients.T @ gradients)
 
     def of_parameters(self) -> tuple[Array, Array]:
-        """Standard errors (Q,) and correlations (Q, Q) of all fitted parameters; NaN for those that are not contained.
-        With groups of rows the standard errors contain Student's quantile over that of the normal distribution, so that
-        1.96 of them are the half width of a 95 % interval (effective degrees of freedom, JCGM 100:2008, G.4)."""
-        count, square = self.parameters.size, np.ix_(self.parameters, self.parameters)
-        errors, correlations = np.full(count, np.nan), np.full((count, count), np.nan)
-        factor = 1.0 if self.groups is None else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE
+        """Standard errors (Q,) and correlations (Q, Q) of all fitted parameters; NaN for those that
+        are not contained. With groups of rows the standard errors contain Student's quantile over
+        that of the normal distribution, so that 1.96 of them are the half width of a 95 % interval
+        (effective degrees of freedom, JCGM 100:2008, G.4).
+        """
+        count = self.parameters.size
+        square = np.ix_(self.parameters, self.parameters)
+        errors = np.full(count, np.nan)
+        correlations = np.full((count, count), np.nan)
+        factor = (
+            1.0
+            if self.groups is None
+            else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE
+        )
         errors[self.parameters] = factor * np.sqrt(np.diag(self._scatter))
-        correlations[square] = normalised(self.basis @ self.basis.T if self.groups is None else self._scatter)
+        correlations[square] = normalised(
+            self.basis @ self.basis.T if self.groups is None else self._scatter
+        )
         return errors, correlations
 
     def greatest_correlations(self) -> Array:
-        """The greatest magnitude of the correlations of each fitted parameter (Q,) with another for independent rows,
-        which depends only on the points; 0 for those that are not contained."""
+        """The greatest magnitude of the correlations of each fitted parameter (Q,) with another for
+        independent rows, which depends only on the points; 0 for those that are not contained."""
         greatest = np.zeros(self.parameters.size)
         between = np.abs(normalised(self.basis @ self.basis.T) - np.eye(len(self.basis)))
         greatest[self.parameters] = between.max(axis=1, initial=0.0)
         return greatest
 
     def error_ratio(self, index: int, level: float) -> float:
-        """Half width of the interval of a fitted parameter over its standard error for independent rows."""
+        """Half width of the interval of a fitted parameter over its standard error for independent
+        rows.
+        """
         position = int(np.count_nonzero(self.parameters[:index]))
-        half = float(self._quantile(self.degrees_of_freedom, level)) * np.sqrt(self._scatter[position, position])
+        half = float(self._quantile(self.degrees_of_freedom, level)) * np.sqrt(
+            self._scatter[position, position]
+        )
         return float(half / (self.sigma * np.linalg.norm(self.basis[position])))
 
     def half_widths(self, combinations: Array, level: float) -> Array:
-        """Half widths (K,) of the intervals of combinations of the fitted parameters (K, Q) at a confidence level."""
+        """Half widths (K,) of the intervals of combinations of the fitted parameters (K, Q) at a
+        confidence level.
+        """
         variances, freedoms = self.variances(combinations[:, self.parameters])
         return np.asarray(self._quantile(freedoms, level) * np.sqrt(variances))
 
@@ -138,43 +161,63 @@ class ParameterCovariance:
         return student_quantile(np.maximum(freedoms, least), level)
 
     def within_bounds(self, low: Mask, high: Mask, descent: Array) -> "ParameterCovariance":
-        """The covariance where some of the parameters, masks (P,), are on their lower and upper bounds.
+        """The covariance where some of the parameters, masks (P,), are on their lower and upper
+        bounds.
 
         descent  -J^T e (P,) of the weighted residuals e, which points outwards at a bound
 
-        With normal errors the unconstrained estimate of such a parameter is d standard errors beyond its bound. Its
-        true value lies inside: the error counts with the second moment about the bound of the normal distribution
-        truncated there, 1 + d^2 - d phi(d)/Phi(-d) of its variance: the whole of it at d = 0, 2/d^2 far beyond. The
-        errors of the others follow along their regression on it.
+        With normal errors the unconstrained estimate of such a parameter is d standard errors
+        beyond its bound. Its true value lies inside: the error counts with the second moment about
+        the bound of the normal distribution truncated there, 1 + d^2 - d phi(d)/Phi(-d) of its
+        variance: the whole of it at d = 0, 2/d^2 far beyond. The errors of the others follow along
+        their regression on it.
         """
         held = low | high
         beyond = (self.basis @ (self.basis.T @ descent))[held] * np.where(high, 1.0, -1.0)[held]
         distance = np.maximum(beyond, 0.0) / np.sqrt(np.diag(self._scatter)[held])
         covariance = self.basis @ self.basis.T
         slopes = np.linalg.solve(covariance[np.ix_(held, held)], covariance[np.ix_(held, ~held)]).T
-        basis, own = self.basis.copy(), np.sqrt(_truncated_square(distance))[:, None] * self.basis[held]
+        basis = self.basis.copy()
+        own = np.sqrt(_truncated_square(distance))[:, None] * self.basis[held]
         basis[~held] -= slopes @ (self.basis[held] - own)
         basis[held] = own
-        return dataclasses.replace(self, basis=basis, spare_rows=self.spare_rows + int(np.count_nonzero(held)))
+        return dataclasses.replace(
+            self, basis=basis, spare_rows=self.spare_rows + int(np.count_nonzero(held))
+        )
 
     def variances(self, combinations: Array) -> tuple[Array, Array]:
-        """Variance and degrees of freedom, shape (K,) each, of combinations of the parameters, shape (K, P)."""
+        """Variance and degrees of freedom, shape (K,) each, of combinations of the parameters,
+        shape (K, P).
+        """
         rows = combinations @ self.basis
         if self.groups is None:
-            return self.sigma**2 * np.sum(rows**2, axis=1), np.full(len(rows), float(self.spare_rows))
+            return self.sigma**2 * np.sum(rows**2, axis=1), np.full(
+                len(rows), float(self.spare_rows)
+            )
         variances = np.sum((rows @ self.groups.gradients.T) ** 2, axis=1)
         chunks = (rows[start : start + _CHUNK] for start in range(0, max(len(rows), 1), _CHUNK))
-        return variances, np.concatenate([_degrees_of_freedom(self.groups, chunk) for chunk in chunks])
+        return variances, np.concatenate(
+            [_degrees_of_freedom(self.groups, chunk) for chunk in chunks]
+        )
 
     def describe(self) -> str:
-        """What the standard errors are estimated from, and what they do not contain, as a phrase."""
+        """What the standard errors are estimated from, and what they do not contain, as a
+        phrase.
+        """
         if not np.isfinite(self.sigma):
             return "unknown, because there are no more rows than parameters"
         text = "for independent rows"
         if self.groups is not None:
-            count, runs = len(self.groups.gradients), "one run" if self.run_count == 1 else f"{self.run_count} runs"
-            scatter = f"{count} successive parts of {runs}" if self.unit == PARTS else f"{count} {self.unit}"
-            text = f"from the scatter of {scatter}, {self.degrees_of_freedom:.2g} degrees of freedom"
+            count = len(self.groups.gradients)
+            runs = "one run" if self.run_count == 1 else f"{self.run_count} runs"
+            scatter = (
+                f"{count} successive parts of {runs}"
+                if self.unit == PARTS
+                else f"{count} {self.unit}"
+            )
+            text = (
+                f"from the scatter of {scatter}, {self.degrees_of_freedom:.2g} degrees of freedom"
+            )
         if self.unit in (ROWS, PARTS) and (self.groups is not None or self.run_count > 1):
             return f"{text}; the scatter between runs (zero and gain of the sensors) is not known"
         if self.unit == RUNS and self.specimen_count > 1:
@@ -185,15 +228,18 @@ class ParameterCovariance:
 def estimate_covariance(
     basis: Array, weighted: Array, residuals: Array, sigma: float, runs: Runs, which: Mask
 ) -> ParameterCovariance:
-    """The covariance from the weighted Jacobian (N, P) and the residuals (N,) of the rows that determine the fit, for
-    the parameters of the mask `which` (Q,).
+    """The covariance from the weighted Jacobian (N, P) and the residuals (N,) of the rows that
+    determine the fit, for the parameters of the mask `which` (Q,).
 
-    The groups are the specimens or else the runs, where these determine the standard errors. Otherwise they are
-    successive parts of the runs, as few as do so, if the rows follow in time or are correlated in their order; if not,
-    the rows are independent.
+    The groups are the specimens or else the runs, where these determine the standard errors.
+    Otherwise they are successive parts of the runs, as few as do so, if the rows follow in time or
+    are correlated in their order; if not, the rows are independent.
     """
-    spare, parameters = len(residuals) - len(basis), len(basis)
-    specimens, count = (int(np.count_nonzero(np.bincount(each))) for each in (runs.specimen, runs.run))
+    spare = len(residuals) - len(basis)
+    parameters = len(basis)
+    specimens, count = (
+        int(np.count_nonzero(np.bincount(each))) for each in (runs.specimen, runs.run)
+    )
     independent = ParameterCovariance(which, basis, sigma, spare, count, specimens)
     if spare <= 0 or not parameters or not sigma > 0:
         return independent
@@ -201,17 +247,26 @@ def estimate_covariance(
     if not in_parts and count < MIN_GROUPS:
         return independent
     rows = weighted @ basis  # the Jacobian in its orthonormal basis
-    units = ((SPECIMENS, runs.specimen, specimens if specimens < count else 0), (RUNS, runs.run, count))
+    units = (
+        (SPECIMENS, runs.specimen, specimens if specimens < count else 0),
+        (RUNS, runs.run, count),
+    )
     whole = ((unit, group) for unit, group, number in units if number >= MIN_GROUPS)
-    fewest, most = max(-(-(parameters + SPARE_GROUPS) // count), 2), len(residuals) // (count * MIN_GROUP_ROWS)
-    divided = ((PARTS, successive_parts(runs.run, parts)) for parts in range(fewest, most + 1) if in_parts)
+    fewest = max(-(-(parameters + SPARE_GROUPS) // count), 2)
+    most = len(residuals) // (count * MIN_GROUP_ROWS)
+    divided = (
+        (PARTS, successive_parts(runs.run, parts)) for parts in range(fewest, most + 1) if in_parts
+    )
     for unit, group in itertools.chain(whole, divided):
         parts = _split(rows, group)
         leverages = np.array([part.T @ part for part in parts])
-        raw = np.array([part.T @ errors for part, errors in zip(parts, _split(residuals, group), strict=True)])
+        raw = np.array(
+            [part.T @ errors for part, errors in zip(parts, _split(residuals, group), strict=True)]
+        )
         values, vectors = np.linalg.eigh(leverages)
         values = np.clip(values, 0.0, _MAX_LEVERAGE)
-        scaled, transposed = vectors / np.sqrt(1.0 - values)[:, None, :], np.swapaxes(vectors, 1, 2)
+        scaled = vectors / np.sqrt(1.0 - values)[:, None, :]
+        transposed = np.swapaxes(vectors, 1, 2)
         gradients = (scaled @ transposed @ raw[:, :, None])[:, :, 0]
         groups = Groups(gradients, leverages, (scaled * values[:, None, :]) @ transposed)
         found = dataclasses.replace(independent, unit=unit, groups=groups)
@@ -236,7 +291,9 @@ def _truncated_square(distance: Array) -> Array:
 
 
 def successive_parts(run: Indices, parts: int) -> Indices:
-    """The group of each row, where each run is divided into this number of successive parts of equal size; (N,)."""
+    """The group of each row, where each run is divided into this number of successive parts of
+    equal size; (N,).
+    """
     groups = np.empty(len(run), dtype=np.intp)
     for i in np.unique(run):
         rows = np.flatnonzero(run == i)
@@ -249,19 +306,22 @@ def _split(rows: Array, group: Indices) -> list[Array]:
     steps = np.diff(group)
     if (steps < 0).any():
         order = np.argsort(group, kind="stable")
-        rows, steps = rows[order], np.diff(group[order])
+        rows = rows[order]
+        steps = np.diff(group[order])
     return np.split(rows, np.flatnonzero(steps) + 1)
 
 
 def _degrees_of_freedom(groups: Groups, rows: Array) -> Array:
-    """tr(M)^2/tr(M^2) of the quadratic forms M (G, G) in independent errors, for combinations (K, P): 1 to G. The upper
-    bound is that of the rank of M, which rounding in tr(M^2) would exceed. With u_g = H_g (I - H_g)^-1/2 a and m_g =
-    a^T H_g a it is M = diag(m_g + |u_g|^2) - U U^T."""
+    """tr(M)^2/tr(M^2) of the quadratic forms M (G, G) in independent errors, for combinations (K,
+    P): 1 to G. The upper bound is that of the rank of M, which rounding in tr(M^2) would exceed.
+    With u_g = H_g (I - H_g)^-1/2 a and m_g = a^T H_g a it is M = diag(m_g + |u_g|^2) - U U^T."""
     projected = np.einsum("gij,kj->kgi", groups.adjusted, rows, optimize=True)
     shares = np.einsum("ki,gij,kj->kg", rows, groups.leverages, rows, optimize=True)
     products = np.swapaxes(projected, 1, 2) @ projected
     trace = np.sum(shares, axis=1)
-    squares = np.sum(shares**2 - np.sum(projected**2, axis=2) ** 2, axis=1) + np.sum(products**2, axis=(1, 2))
+    squares = np.sum(shares**2 - np.sum(projected**2, axis=2) ** 2, axis=1) + np.sum(
+        products**2, axis=(1, 2)
+    )
     at_rank = trace**2 / len(groups.leverages)
     known = np.maximum(squares, at_rank)
     return np.where(known > 0.0, np.maximum(trace**2 / np.where(known > 0.0, known, 1.0), 1.0), 1.0)
@@ -269,4 +329,6 @@ def _degrees_of_freedom(groups: Groups, rows: Array) -> Array:
 
 def is_correlated(residuals: Array, run: Indices) -> bool:
     """Whether successive residuals of the runs are more alike than those of independent rows."""
-    return bool(lag_one_autocorrelation(_split(residuals, run)) > SIGNIFICANCE / np.sqrt(residuals.size))
+    return bool(
+        lag_one_autocorrelation(_split(residuals, run)) > SIGNIFICANCE / np.sqrt(residuals.size)
+    )

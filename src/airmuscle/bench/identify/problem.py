@@ -8,8 +8,24 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Hint, IdentificationError, ParameterError, alternatives, as_slice, autodiff, parts_of, tree
-from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PooledLengthLaw, PressureLaw
+from ...core import (
+    Array,
+    Hint,
+    IdentificationError,
+    ParameterError,
+    alternatives,
+    as_slice,
+    autodiff,
+    parts_of,
+    tree,
+)
+from ...physics.muscle.characteristic import (
+    Characteristic,
+    ContractionLaw,
+    ForceLaw,
+    PooledLengthLaw,
+    PressureLaw,
+)
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from .weighting import UNCENSORED, Censoring
@@ -25,7 +41,9 @@ SPECIMEN = "specimen"
 
 @dataclasses.dataclass(frozen=True)
 class FittedQuantity:
-    """The quantity that a law gives as a function of the other two: the method that computes it and its arguments."""
+    """The quantity that a law gives as a function of the other two: the method that computes it and
+    its arguments.
+    """
 
     method: str
     arguments: tuple[str, str]
@@ -43,33 +61,56 @@ PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
 
 
 def rows_by_length(law: Any, data: Recording) -> list[tuple[float | None, npt.NDArray[np.intp]]]:
-    """Each resting length in the data with the indices of its rows; once None, without rows or an effect of length."""
-    if RESTING_LENGTH not in data.columns or not hasattr(law, "with_resting_length") or not len(data):
+    """Each resting length in the data with the indices of its rows; once None, without rows or an
+    effect of length.
+    """
+    if (
+        RESTING_LENGTH not in data.columns
+        or not hasattr(law, "with_resting_length")
+        or not len(data)
+    ):
         return [(None, np.arange(len(data)))]
     lengths = data[RESTING_LENGTH]
     return [(float(length), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
 
 
 def with_length(law: Any, length: Any) -> Any:
-    """The law of a muscle with this resting length [m], if it is known and the law depends on it."""
-    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
+    """The law of a muscle with this resting length [m], if it is known and the law depends on
+    it.
+    """
+    return (
+        law.with_resting_length(float(length))
+        if length is not None and hasattr(law, "with_resting_length")
+        else law
+    )
 
 
 def of_length(law: Any, length: float | None) -> Any:
-    """As `law.with_resting_length`, but without validation, because a search may pass through invalid parameters."""
+    """As `law.with_resting_length`, but without validation, because a search may pass through
+    invalid parameters.
+    """
     if length is None:
         return law
-    return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in tree.leaves(law)])
+    return tree.unflatten(
+        law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in tree.leaves(law)]
+    )
 
 
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
-    """The values of `law.method(*arguments)` at every row, with the law of its specimen or resting length; (N,)."""
+    """The values of `law.method(*arguments)` at every row, with the law of its specimen or resting
+    length; (N,).
+    """
     laws: list[tuple[Any, slice | npt.NDArray[np.intp]]]
     if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
         member = data[SPECIMEN].astype(int)
-        laws = [(law.for_specimen(law.specimens[i]), np.flatnonzero(member == i)) for i in np.unique(member).tolist()]
+        laws = [
+            (law.for_specimen(law.specimens[i]), np.flatnonzero(member == i))
+            for i in np.unique(member).tolist()
+        ]
     else:
-        laws = [(of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)]
+        laws = [
+            (of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)
+        ]
     values = np.zeros(len(data))
     for single, rows in laws:
         values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
@@ -78,16 +119,23 @@ def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording)
 
 def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
     """The quantity that a law gives, in which residuals are taken. Raises IdentificationError."""
-    for kind, quantity in ((ForceLaw, FORCE), (ContractionLaw, CONTRACTION), (PressureLaw, PRESSURE)):
+    for kind, quantity in (
+        (ForceLaw, FORCE),
+        (ContractionLaw, CONTRACTION),
+        (PressureLaw, PRESSURE),
+    ):
         if isinstance(law, kind):
             return quantity
     raise IdentificationError(
-        f"{type(law).__name__} cannot be fitted, because it gives neither force nor contraction nor pressure."
+        f"{type(law).__name__} cannot be fitted, because it gives neither force nor contraction nor"
+        " pressure."
     )
 
 
 class LeastSquaresSolution(NamedTuple):
-    """The optimal free parameters (P,), with the fitted quantity (N,) and its Jacobian (N, P) there."""
+    """The optimal free parameters (P,), with the fitted quantity (N,) and its Jacobian (N, P)
+    there.
+    """
 
     values: Array
     modelled: Array
@@ -134,21 +182,25 @@ class FitProblem:
         return pairs[:, 0], pairs[:, 1]
 
     def bounds_reached(self, values: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-        """Masks (P,) of the parameters on their lower and on their upper bound, within a margin, because a search may
-        stop strictly inside."""
+        """Masks (P,) of the parameters on their lower and on their upper bound, within a margin,
+        because a search may stop strictly inside."""
         low, high = self.bounds
         margin = BOUND_MARGIN * np.maximum(np.abs(values), np.abs(self.initial_values))
         return values - low <= margin, high - values <= margin
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """A short label for each free parameter: its term in a polynomial, else its symbol, else its path."""
+        """A short label for each free parameter: its term in a polynomial, else its symbol, else
+        its path.
+        """
         terms = getattr(self.law, "term_labels", ())
         fields = getattr(self.law, "linear_in", ())
         texts = {f"{field}[{i}]": f"a({term})" for field in fields for i, term in enumerate(terms)}
         symbols = [leaf.declared.symbol for leaf in self.free_leaves]
         paths = [leaf.path for leaf in self.free_leaves]
-        names = (s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True))
+        names = (
+            s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True)
+        )
         return tuple(texts.get(path, name) for path, name in zip(paths, names, strict=True))
 
     def leaf_values(self, values: Sequence[float] | Array) -> list[float]:
@@ -160,7 +212,9 @@ class FitProblem:
 
     def rows(self, selection: npt.NDArray[Any]) -> "FitProblem":
         """The problem of these rows, a mask or indices."""
-        chosen: dict[str, Any] = {name: getattr(self, name)[selection] for name in ("target", "censoring", "weights")}
+        chosen: dict[str, Any] = {
+            name: getattr(self, name)[selection] for name in ("target", "censoring", "weights")
+        }
         return dataclasses.replace(self, data=self.data.rows(selection), **chosen)
 
     def repeated(self, counts: Array) -> "FitProblem":
@@ -172,11 +226,15 @@ class FitProblem:
     def predict(self, values: Array) -> Array:
         """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
         method = self.fitted_quantity.method
-        with np.errstate(all="ignore"):  # non-finite values raise an error at the start; later the search backtracks
+        with np.errstate(
+            all="ignore"
+        ):  # non-finite values raise an error at the start; later the search backtracks
             return self._join([getattr(law, method)(*x) for law, x in self._laws(values)])
 
     def _laws(self, values: Array) -> Iterator[tuple[Any, tuple[Array, ...]]]:
-        """The law of each resting length with these parameters, not validated, and the arguments of its rows."""
+        """The law of each resting length with these parameters, not validated, and the arguments of
+        its rows.
+        """
         leaf_values = self.leaf_values(values)
         which = [i for i, leaf in enumerate(self.leaves) if leaf.path == RESTING_LENGTH]
         for length, _, arguments in self._points:
@@ -200,12 +258,16 @@ class FitProblem:
         return values
 
     def residuals(self, modelled: Array) -> Array:
-        """Weighted residuals; that of a censored row is 0 unless the law violates its bound; shape (N,)."""
+        """Weighted residuals; that of a censored row is 0 unless the law violates its bound; shape
+        (N,).
+        """
         difference = modelled - self.target
         return self.weights * np.where(self.censoring * difference < 0, 0.0, difference)
 
     def active_rows(self, modelled: Array) -> npt.NDArray[np.bool_]:
-        """Mask of the uncensored rows and of the censored rows whose bound the law violates; shape (N,)."""
+        """Mask of the uncensored rows and of the censored rows whose bound the law violates; shape
+        (N,).
+        """
         return np.asarray((self.censoring == 0) | (self.censoring * (modelled - self.target) > 0))
 
     def solution(self, values: Array) -> LeastSquaresSolution:
@@ -213,34 +275,49 @@ class FitProblem:
         return LeastSquaresSolution(values, self.predict(values), self.jacobian(values))
 
     def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
-        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N, P). Exact if the
-        law is traceable, otherwise by central differences."""
+        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N,
+        P). Exact if the law is traceable, otherwise by central differences."""
         which = range(len(self.free)) if which is None else which
         if all(autodiff.is_traceable(type(part)) for _, part in parts_of(self.law)):
-            leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
-            return self._join([autodiff.parameter_derivatives(law, method, x, leaves) for law, x in self._laws(values)])
-        (low, high), columns = self.bounds, []
+            leaves = [self.free[i] for i in which]
+            method = self.fitted_quantity.method
+            return self._join(
+                [
+                    autodiff.parameter_derivatives(law, method, x, leaves)
+                    for law, x in self._laws(values)
+                ]
+            )
+        low, high = self.bounds
+        columns = []
         for i in which:
             value = values[i]
             step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
-            up, down = values.copy(), values.copy()
+            up = values.copy()
+            down = values.copy()
             up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
             columns.append((self.predict(up) - self.predict(down)) / (up[i] - down[i]))
         return np.column_stack(columns)
 
 
 def make_problem(
-    law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]
+    law: Characteristic,
+    data: Recording,
+    censoring: Censoring,
+    weights: Array,
+    fixed: Collection[str],
 ) -> FitProblem:
-    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted. Raises
-    IdentificationError where there are too few rows, ParameterError for an unknown name."""
+    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted.
+    Raises IdentificationError where there are too few rows, ParameterError for an unknown name."""
     quantity = fitted_quantity_of(law)
     signs = censoring.signs(data["force"])
     target = data[quantity.name]
     if quantity == FORCE:
-        target = np.where(signs > 0, censoring.min_force, np.where(signs < 0, censoring.max_force, target))
+        target = np.where(
+            signs > 0, censoring.min_force, np.where(signs < 0, censoring.max_force, target)
+        )
     elif quantity == PRESSURE:
-        signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
+        # a smaller force at the same pressure means that the stated force needs a higher pressure
+        signs = -signs
     leaves = tuple(tree.leaves(law))
     fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
     for name in fixed:
@@ -249,8 +326,14 @@ def make_problem(
                 f"{type(law).__name__} has no parameter '{name}' to be fixed"
                 f"{alternatives(name, fields, 'its parameters are')}"
             )
-    kept = {leaf.path for leaf in leaves if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)}
-    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept)
+    kept = {
+        leaf.path
+        for leaf in leaves
+        if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)
+    }
+    free = tuple(
+        i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept
+    )
     _check_row_count(law, data, len(free), int(np.count_nonzero(signs == 0)))
     return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
 
@@ -262,15 +345,18 @@ def _check_row_count(law: Characteristic, data: Recording, free: int, measured: 
     censored = len(data) - measured
     if len(data) and not measured:
         raise IdentificationError(
-            f"{name}: all {censored} rows are censored (at zero force, or at the limit of the force range), so there "
-            "is no measured value. Give rows with a positive force.",
-            hint=Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
+            f"{name}: all {censored} rows are censored (at zero force, or at the limit of the force"
+            " range), so there is no measured value. Give rows with a positive force.",
+            hint=Hint(
+                "To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"
+            ),
         )
     if measured < free:
         also = f" ({censored} further rows are censored and give bounds only)" if censored else ""
         raise IdentificationError(
-            f"{name} has {free} free parameters, but only {measured} rows are measured values{also}. Measure more "
-            "points, or choose a law with fewer parameters or a lower degree.",
+            f"{name} has {free} free parameters, but only {measured} rows are measured"
+            f" values{also}. Measure more points, or choose a law with fewer parameters or a lower"
+            " degree.",
             hint=Hint("To fix parameters", "fixed"),
             cause=f"{free} parameters, but {measured} measured values",
         )

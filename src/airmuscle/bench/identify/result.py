@@ -33,9 +33,10 @@ MANY_POINTS = 1000
 class Fit(Reported):
     """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
 
-    Residuals are in the fitted quantity. `rmse` and `correlation_index` are over the uncensored rows, `max_error` over
-    all rows; a censored row has a residual only where the law violates its bound. `sigma` is over the rows that
-    determine the parameters: uncensored rows where the law is not slack, and violated bounds.
+    Residuals are in the fitted quantity. `rmse` and `correlation_index` are over the uncensored
+    rows, `max_error` over all rows; a censored row has a residual only where the law violates its
+    bound. `sigma` is over the rows that determine the parameters: uncensored rows where the law is
+    not slack, and violated bounds.
     """
 
     model: Characteristic
@@ -43,14 +44,18 @@ class Fit(Reported):
     correlations: Array
     """Correlation matrix of the estimates, in their order, shape (P, P)."""
     parameter_covariance: ParameterCovariance
-    """How the covariance of the estimates was computed; for a PooledLengthLaw that of its population law alone."""
+    """How the covariance of the estimates was computed; for a PooledLengthLaw that of its
+    population law alone.
+    """
     rank: int
     condition: float
     """Condition number of the design matrix at the solution, with columns of unit norm."""
     sigma: float
     """Standard deviation of the residuals with N - P degrees of freedom [SI]."""
     rmse: float
-    """Root mean square error of the measured rows [SI]; violations of the bounds of censored rows are added."""
+    """Root mean square error of the measured rows [SI]; violations of the bounds of censored rows
+    are added.
+    """
     max_error: WorstPoint
     """The greatest error of all rows; that of a censored row is the violation of its bound."""
     correlation_index: CorrelationIndex | None
@@ -66,9 +71,13 @@ class Fit(Reported):
     """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
     remarks: "Remarks | Callable[[Fit], Remarks]"
-    """The remarks, or the examination of the data that gives them, which is made when they are first read."""
+    """The remarks, or the examination of the data that gives them, which is made when they are
+    first read.
+    """
     effects: SpecimenEffects | None = None
-    """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""
+    """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its
+    population law.
+    """
 
     @functools.cached_property
     def _remarks(self) -> Remarks:
@@ -79,21 +88,31 @@ class Fit(Reported):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks on the fit and its data, as sentences; the data are examined when they are first read."""
+        """Remarks on the fit and its data, as sentences; the data are examined when they are first
+        read.
+        """
         return self._remarks.notes
 
     @property
     def scatter(self) -> Scatter | None:
-        """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
+        """Noise and repeatability of the measured force; None for laws that give contraction or
+        pressure.
+        """
         return self._remarks.scatter if self.fitted_quantity == FORCE else None
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Number of the uncensored rows minus that of the parameters that are not on a bound; negative where fewer."""
-        return int(np.count_nonzero(self.censoring == 0)) - sum(not estimate.on_bound for estimate in self.estimates)
+        """Number of the uncensored rows minus that of the parameters that are not on a bound;
+        negative where fewer.
+        """
+        return int(np.count_nonzero(self.censoring == 0)) - sum(
+            not estimate.on_bound for estimate in self.estimates
+        )
 
     def __getitem__(self, name: str) -> Estimate:
-        """An estimate by the path of its parameter, for example `geometry.radius`. Raises ParameterError."""
+        """An estimate by the path of its parameter, for example `geometry.radius`. Raises
+        ParameterError.
+        """
         check_known("the fit has no parameter", name, self.names, "it has")
         return self.estimates[self.names.index(name)]
 
@@ -111,23 +130,31 @@ class Fit(Reported):
     def standard_errors(self) -> Array:
         """Standard errors of the estimates [SI], shape (P,); NaN for a parameter on a bound.
 
-        With correlated errors they contain Student's factor, so that 1.96 of them are the half width of a 95 % interval
-        (see `ParameterCovariance`).
+        With correlated errors they contain Student's factor, so that 1.96 of them are the half
+        width of a 95 % interval (see `ParameterCovariance`).
         """
         return np.array([estimate.stderr for estimate in self.estimates])
 
     @property
     def covariance(self) -> Array:
-        """Covariance matrix of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
+        """Covariance matrix of the estimates, in their order, shape (P, P); NaN for a parameter on
+        a bound.
+        """
         return np.asarray(self.correlations * np.outer(self.standard_errors, self.standard_errors))
 
     @property
     def error_basis(self) -> str:
-        """What the standard errors and bands were estimated from, and what they do not contain, as a phrase."""
+        """What the standard errors and bands were estimated from, and what they do not contain, as
+        a phrase.
+        """
         if self.effects is not None and self.effects.covariance is not None:
             return self.effects.covariance.describe()
         contained = self.parameter_covariance.parameters
-        known = [name for name, is_contained in zip(self.names, contained, strict=True) if not is_contained]
+        known = [
+            name
+            for name, is_contained in zip(self.names, contained, strict=True)
+            if not is_contained
+        ]
         remark = f"; {', '.join(known)} on the bound counts as known" if known else ""
         return self.parameter_covariance.describe() + remark
 
@@ -148,7 +175,9 @@ class Fit(Reported):
 
     @property
     def modelled(self) -> Array:
-        """The fitted quantity of the model at the rows of the fit, clamped as the model is [SI]; shape (N,)."""
+        """The fitted quantity of the model at the rows of the fit, clamped as the model is [SI];
+        shape (N,).
+        """
         quantity = self.fitted_quantity
         return evaluate(self.model, quantity.name, quantity.arguments, self.recording)
 
@@ -159,39 +188,65 @@ class Fit(Reported):
 
     @property
     def data_ranges(self) -> dict[str, tuple[float, float]]:
-        """Minimum and maximum of pressure, contraction and force in the data; outside them the fit is extrapolated."""
+        """Minimum and maximum of pressure, contraction and force in the data; outside them the fit
+        is extrapolated.
+        """
         columns = ((name, self.recording[name]) for name in ("pressure", "contraction", "force"))
         return {name: (float(values.min()), float(values.max())) for name, values in columns}
 
     @property
     def validity_range(self) -> ValidityRange:
-        """The range of the data in pressure and contraction. Raises ParameterError where one of them did not vary."""
+        """The range of the data in pressure and contraction. Raises ParameterError where one of
+        them did not vary.
+        """
         ranges = self.data_ranges
         return ValidityRange(*ranges["pressure"], *ranges["contraction"])
 
     def plot(self, *, ax: Any = None) -> Any:
-        """Plot the modelled against the measured values, and the residuals; censored rows are marked.
+        """Plot the modelled against the measured values, and the residuals; censored rows are
+        marked.
 
-        `ax` is an Axes for the values, or a sequence of two, also for the residuals, and is returned; without it a new
-        figure is returned. Raises ParameterError for another `ax`.
+        `ax` is an Axes for the values, or a sequence of two, also for the residuals, and is
+        returned; without it a new figure is returned. Raises ParameterError for another `ax`.
         """
         quantity = self.fitted_quantity.name
         factor, unit = display_scale(quantity)
-        x, y = self.recording[quantity] * factor, self.modelled * factor
+        x = self.recording[quantity] * factor
+        y = self.modelled * factor
         given = None if ax is None else (None, given_axes(ax, 1, "plot of a fit"))
         figure, axes = given or plotting.new_figure(1, 2, width=7.0, height=3.4)
-        ends, size = [min(x.min(), y.min()), max(x.max(), y.max())], 3.5 if x.size < MANY_POINTS else 1.8
-        axes[0].plot(ends, ends, color=plotting.BLACK, linewidth=0.8, label="model = measured", zorder=3)
+        ends = [min(x.min(), y.min()), max(x.max(), y.max())]
+        size = 3.5 if x.size < MANY_POINTS else 1.8
+        axes[0].plot(
+            ends, ends, color=plotting.BLACK, linewidth=0.8, label="model = measured", zorder=3
+        )
         bound = self.censoring != 0
-        kinds = (~bound, plotting.BLUE, "o", "measured"), (bound, plotting.RED, "x", "censored (bound)")
+        kinds = (
+            (~bound, plotting.BLUE, "o", "measured"),
+            (
+                bound,
+                plotting.RED,
+                "x",
+                "censored (bound)",
+            ),
+        )
         for rows, colour, marker, label in kinds:
-            style = {"color": colour, "marker": marker, "linestyle": "none", "markersize": size, "label": label}
+            style = {
+                "color": colour,
+                "marker": marker,
+                "linestyle": "none",
+                "markersize": size,
+                "label": label,
+            }
             for axis, drawn in zip(axes[:2], (y, y - x), strict=False) if rows.any() else ():
                 axis.plot(x[rows], drawn[rows], **style)
         axes[0].set(xlabel=f"measured {quantity} [{unit}]", ylabel=f"modelled {quantity} [{unit}]")
         for axis in axes[1:2]:
             axis.axhline(0.0, color=plotting.BLACK, linewidth=0.8)
-            axis.set(xlabel=f"measured {quantity} [{unit}]", ylabel=f"residual (model - measured) [{unit}]")
+            axis.set(
+                xlabel=f"measured {quantity} [{unit}]",
+                ylabel=f"residual (model - measured) [{unit}]",
+            )
         if figure is None:
             axes[0].legend(loc="upper left", frameon=False, fontsize=8)
             return ax
@@ -204,31 +259,51 @@ class Fit(Reported):
         return f"{type(self.model).__name__} fitted to {self.recording.origin}"
 
     def chapter(self) -> Chapter:
-        """The description of the fit: goodness of fit, estimates, residuals, remarks on the data."""
-        correlations = {"parameter": list(self.names), **dict(zip(self.names, self.correlations.T, strict=True))}
+        """The description of the fit: goodness of fit, estimates, residuals, remarks on the
+        data.
+        """
+        correlations = {
+            "parameter": list(self.names),
+            **dict(zip(self.names, self.correlations.T, strict=True)),
+        }
         estimates = estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS)
         tables = (estimates, Table("correlations", "Correlations", correlations, shown=False))
         plots = (Plot("errors", "Modelled against measured values, and residuals.", self.plot),)
-        return Chapter("fit", self._title, f"Standard errors {self.error_basis}.", values=self.goodness(),
-                       tables=tables, plots=plots, notes=self.notes)  # fmt: skip
+        return Chapter(
+            "fit",
+            self._title,
+            f"Standard errors {self.error_basis}.",
+            values=self.goodness(),
+            tables=tables,
+            plots=plots,
+            notes=self.notes,
+        )
 
     def goodness(self) -> tuple[NamedValue, ...]:
         """The goodness of fit."""
-        worst, index = self.max_error, self.correlation_index
+        worst = self.max_error
+        index = self.correlation_index
         texts = quantity_text(worst.pressure, "Pa", "kPa"), contraction_text(worst.contraction)
         point = f"at {', '.join(texts)}, {quantity_text(worst.force, 'N', 'N')}"
         undefined = "undefined, because the measured values do not vary"
         # The rms error of a robust fit with its residuals limited, as in a comparison.
-        residuals, limited = self.residuals[self.censoring == 0], ""
+        residuals = self.residuals[self.censoring == 0]
+        limited = ""
         limit = self.loss.limit(residuals)
         if count := int(np.count_nonzero(np.abs(residuals) > limit)):
             rmse = float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2)))
             rows = "1 row" if count == 1 else f"{count} rows"
-            limited = f"({self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)})"
+            limited = (
+                f"({self.format_residual(rmse)} with {rows} limited to"
+                f" {self.format_residual(limit)})"
+            )
         ranges = self.data_ranges
         return (
-            NamedValue("rows used", self.rows_used,
-                     remark=f"{self.rows_censored} of them censored; {self.rows_dropped} dropped"),
+            NamedValue(
+                "rows used",
+                self.rows_used,
+                remark=f"{self.rows_censored} of them censored; {self.rows_dropped} dropped",
+            ),
             NamedValue("rows censored", self.rows_censored, brief=False),
             NamedValue("rows dropped", self.rows_dropped, brief=False),
             self._residual("rms error", self.rmse, limited),
@@ -236,15 +311,28 @@ class Fit(Reported):
             self._residual("maximum error", worst.error, point),
             self._residual("residual standard deviation", self.sigma, brief=False),
             NamedValue("R2", self.r2, "1", digits=6, remark=undefined if self.r2 is None else ""),
-            NamedValue("correlation index IK", self.ik, "1", digits=6,
-                     remark="" if self.ik is not None else undefined if index is None else str(index)),
+            NamedValue(
+                "correlation index IK",
+                self.ik,
+                "1",
+                digits=6,
+                remark="" if self.ik is not None else undefined if index is None else str(index),
+            ),
             NamedValue("rank", self.rank, remark=f"of {len(self.estimates)}"),
             NamedValue("condition", self.condition, "1", digits=3, brief=False),
-            *(NamedValue(f"{name} of the data", ranges[name], unit, shown, brief=False)
-              for name, unit, shown in (("pressure", "Pa", "kPa"), ("contraction", "1", "%"), ("force", "N", "N"))),
-        )  # fmt: skip
+            *(
+                NamedValue(f"{name} of the data", ranges[name], unit, shown, brief=False)
+                for name, unit, shown in (
+                    ("pressure", "Pa", "kPa"),
+                    ("contraction", "1", "%"),
+                    ("force", "N", "N"),
+                )
+            ),
+        )
 
-    def _residual(self, name: str, value: float, remark: str = "", brief: bool = True) -> NamedValue:
+    def _residual(
+        self, name: str, value: float, remark: str = "", brief: bool = True
+    ) -> NamedValue:
         """A residual in the fitted quantity."""
         quantity = self.fitted_quantity
         shown = {"Pa": "kPa", "1": "%"}.get(quantity.unit, "")
@@ -254,4 +342,6 @@ class Fit(Reported):
         """A residual [SI] as text in the usual unit of the fitted quantity."""
         unit = self.fitted_quantity.unit
         shown = {"Pa": "kPa"}.get(unit, unit)
-        return contraction_text(residual, 4) if unit == "1" else quantity_text(residual, unit, shown)
+        return (
+            contraction_text(residual, 4) if unit == "1" else quantity_text(residual, unit, shown)
+        )

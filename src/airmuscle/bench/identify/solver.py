@@ -8,13 +8,20 @@ import numpy as np
 from ...core import Array, Hint, IdentificationError
 from .gauss_newton import gauss_newton
 from .problem import FitProblem, LeastSquaresSolution
-from .variable_projection import find_initial_values, is_linear_parameter, solve_censored_least_squares, uncensored_rank
+from .variable_projection import (
+    find_initial_values,
+    is_linear_parameter,
+    solve_censored_least_squares,
+    uncensored_rank,
+)
 from .weighting import LeastSquares, Loss
 
 SEARCH_STAGES = (("trf", 100), ("dogbox", 500), ("trf", 500))
-"""Methods and maximum evaluations; each starts where the previous one stopped without convergence (chosen).
+"""Methods and maximum evaluations; each starts where the previous one stopped without convergence
+(chosen).
 
-`trf` converges slowly along an active bound, which `dogbox` steps onto; in all other tests it needed fewer than 100."""
+`trf` converges slowly along an active bound, which `dogbox` steps onto; in all other tests it
+needed fewer than 100."""
 _TOLERANCE = 1e-14
 _RELATIVE_OFFSET = 1e-3
 """Relative offset of Bates and Watts at which the search counts as converged."""
@@ -22,25 +29,38 @@ _SINGULAR_TOLERANCE = 1e-8
 """Relative singular value below which parameters count as redundant (chosen)."""
 
 
-def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
-    """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge. The
-    search starts at `start`, if possible by Gauss-Newton steps; by default at the initial values found by variable
-    projection."""
+def solve_least_squares(
+    problem: FitProblem, loss: Loss, start: Array | None = None
+) -> LeastSquaresSolution:
+    """The free parameters that minimise the loss. Raises IdentificationError where the search does
+    not converge. The search starts at `start`, if possible by Gauss-Newton steps; by default at the
+    initial values found by variable projection."""
     if not is_linear(problem):
-        near = gauss_newton(problem, start) if start is not None and isinstance(loss, LeastSquares) else None
+        near = (
+            gauss_newton(problem, start)
+            if start is not None and isinstance(loss, LeastSquares)
+            else None
+        )
         if near is not None:
             return near
-        return solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
+        return solve_iteratively(
+            problem, loss, find_initial_values(problem) if start is None else start
+        )
     linear = _solve_linear(problem)
     if isinstance(loss, LeastSquares):
         return linear
     robust = solve_iteratively(problem, loss, linear.values)
-    if not problem.censoring.any() or uncensored_rank(problem, robust.jacobian) == robust.values.size:
+    if (
+        not problem.censoring.any()
+        or uncensored_rank(problem, robust.jacobian) == robust.values.size
+    ):
         return robust
-    # The search stops as soon as no bound is violated; parameters that only bounds determine are then arbitrary.
-    # Least squares with every square weighted by rho' have the same solution.
+    # The search stops as soon as no bound is violated; parameters that only bounds determine are
+    # then arbitrary. Least squares with every square weighted by rho' have the same solution.
     derivative = loss.rho((problem.residuals(robust.modelled) / loss.scale) ** 2)[1]
-    return _solve_linear(dataclasses.replace(problem, weights=problem.weights * np.sqrt(derivative)))
+    return _solve_linear(
+        dataclasses.replace(problem, weights=problem.weights * np.sqrt(derivative))
+    )
 
 
 def is_linear(problem: FitProblem) -> bool:
@@ -50,7 +70,9 @@ def is_linear(problem: FitProblem) -> bool:
 
 
 def design_matrix(problem: FitProblem) -> tuple[Array, Array]:
-    """Design matrix (N, P) and constant part (N,) of a law that is linear in its free parameters."""
+    """Design matrix (N, P) and constant part (N,) of a law that is linear in its free
+    parameters.
+    """
     basis = getattr(problem.law, "basis", None)
     if basis is not None and len(problem.free) == len(problem.law.term_labels):
         return np.array(basis(*problem.arguments)).T, np.zeros(len(problem.data))
@@ -65,7 +87,9 @@ def _solve_linear(problem: FitProblem) -> LeastSquaresSolution:
 
 
 def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
-    """Trust-region least squares within bounds, with parameters and residuals scaled to the order of one."""
+    """Trust-region least squares within bounds, with parameters and residuals scaled to the order
+    of one.
+    """
     from scipy.optimize import least_squares
 
     low, high = problem.bounds
@@ -80,24 +104,35 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
     def jacobian(scaled: Array) -> Array:
         values = scaled * scale
         active = problem.active_rows(problem.predict(values))
-        return np.asarray(problem.jacobian(values) * (active * problem.weights / spread)[:, None] * scale)
+        return np.asarray(
+            problem.jacobian(values) * (active * problem.weights / spread)[:, None] * scale
+        )
 
     if np.abs(residuals(start / scale)).max() < 1e-14:  # an exact fit: the gradient vanishes
         return problem.solution(start)
     rho = "linear" if isinstance(loss, LeastSquares) else loss.rho
     tolerances = {"ftol": _TOLERANCE, "xtol": _TOLERANCE, "gtol": None}
-    options: dict[str, Any] = {"x_scale": "jac", "loss": rho, "f_scale": loss.scale / spread, **tolerances}
-    scaled, bounds = start / scale, (low / scale, high / scale)
+    options: dict[str, Any] = {
+        "x_scale": "jac",
+        "loss": rho,
+        "f_scale": loss.scale / spread,
+        **tolerances,
+    }
+    scaled = start / scale
+    bounds = (low / scale, high / scale)
     for method, max_evaluations in SEARCH_STAGES:
-        result = least_squares(residuals, scaled, jacobian, bounds, method, max_nfev=max_evaluations, **options)
+        result = least_squares(
+            residuals, scaled, jacobian, bounds, method, max_nfev=max_evaluations, **options
+        )
         scaled = result.x
         if result.status > 0 or _is_converged(result):
             break
     else:
         evaluations = sum(count for _, count in SEARCH_STAGES)
         raise IdentificationError(
-            f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in {evaluations} "
-            "evaluations. Give initial values closer to those of the muscle, or choose a law with fewer parameters.",
+            f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in"
+            f" {evaluations} evaluations. Give initial values closer to those of the muscle, or"
+            " choose a law with fewer parameters.",
             hint=Hint("To fix parameters", "fixed"),
             cause="the fit does not converge",
         )
@@ -105,15 +140,20 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
 
 
 def _is_converged(result: Any) -> bool:
-    """Whether the residuals are nearly orthogonal to the tangent space, though the search has not stopped. With
-    redundant parameters it moves on without converging. The criterion is the relative offset of Bates and Watts,
-    Technometrics 23:179 (1981)."""
+    """Whether the residuals are nearly orthogonal to the tangent space, though the search has not
+    stopped. With redundant parameters it moves on without converging. The criterion is the relative
+    offset of Bates and Watts, Technometrics 23:179 (1981)."""
     norms = np.linalg.norm(result.jac, axis=0)
     norms[norms == 0] = 1.0
-    projection = np.linalg.lstsq((result.jac / norms).T, result.grad / norms, rcond=_SINGULAR_TOLERANCE)[0]
-    squares, size = float(projection @ projection), norms.size
+    projection = np.linalg.lstsq(
+        (result.jac / norms).T, result.grad / norms, rcond=_SINGULAR_TOLERANCE
+    )[0]
+    squares = float(projection @ projection)
+    size = norms.size
     degrees_of_freedom = max(result.fun.size - size, 1)
-    return bool(squares / size <= _RELATIVE_OFFSET**2 * (2 * result.cost - squares) / degrees_of_freedom)
+    return bool(
+        squares / size <= _RELATIVE_OFFSET**2 * (2 * result.cost - squares) / degrees_of_freedom
+    )
 
 
 def _check_finite(problem: FitProblem, start: Array) -> None:
@@ -121,11 +161,12 @@ def _check_finite(problem: FitProblem, start: Array) -> None:
     bad = ~np.isfinite(values)
     if bad.any():
         row = int(np.argmax(bad))
-        (first, second), (a, b) = problem.fitted_quantity.arguments, (x[row] for x in problem.arguments)
+        first, second = problem.fitted_quantity.arguments
+        a, b = (x[row] for x in problem.arguments)
         raise IdentificationError(
-            f"{problem.data.origin}: with its initial values {type(problem.law).__name__} gives no finite "
-            f"{problem.fitted_quantity.name} at {np.count_nonzero(bad)} of {len(values)} points, the first at {first} "
-            f"{a:.4g} and {second} {b:.4g} (SI). Give other initial values, or remove points outside the range of the "
-            "law.",
+            f"{problem.data.origin}: with its initial values {type(problem.law).__name__} gives no"
+            f" finite {problem.fitted_quantity.name} at {np.count_nonzero(bad)} of {len(values)}"
+            f" points, the first at {first} {a:.4g} and {second} {b:.4g} (SI). Give other initial"
+            " values, or remove points outside the range of the law.",
             cause=f"it gives no finite {problem.fitted_quantity.name} with its initial values",
         )

@@ -1,4 +1,6 @@
-"""Statistics of a static fit: errors of rows, correlation index, rank, condition number and standard errors."""
+"""Statistics of a static fit: errors of rows, correlation index, rank, condition number and
+standard errors.
+"""
 
 import dataclasses
 import itertools
@@ -21,14 +23,17 @@ from .weighting import LeastSquares, Loss
 
 @dataclasses.dataclass(frozen=True)
 class CorrelationIndex:
-    """IK = sqrt(1 - SSE/SST), SSE = Sum (k_i - y_i)^2, SST = Sum (mean(y) - y_i)^2; k_i modelled, y_i measured.
+    """IK = sqrt(1 - SSE/SST), SSE = Sum (k_i - y_i)^2, SST = Sum (mean(y) - y_i)^2; k_i modelled,
+    y_i measured.
 
     Where SSE > SST the model is worse than the mean of the measurements and IK is undefined.
     Reference: Borzíková et al., the index given next to their plane curves.
     """
 
     r_squared: float
-    """Coefficient of determination R^2 = 1 - SSE/SST [1], at most 1; negative where IK is undefined."""
+    """Coefficient of determination R^2 = 1 - SSE/SST [1], at most 1; negative where IK is
+    undefined.
+    """
 
     @property
     def value(self) -> float | None:
@@ -42,26 +47,33 @@ class CorrelationIndex:
 
 
 def correlation_index(measured: npt.ArrayLike, modelled: npt.ArrayLike) -> CorrelationIndex:
-    """The correlation index of modelled and measured values, shape (N,) each, in the same unit. Raises
-    IdentificationError where a value is not finite, the shapes differ, there are fewer than two values, or the measured
-    values do not vary."""
-    y, k = np.asarray(measured, dtype=float), np.asarray(modelled, dtype=float)
+    """The correlation index of modelled and measured values, shape (N,) each, in the same unit.
+    Raises IdentificationError where a value is not finite, the shapes differ, there are fewer than
+    two values, or the measured values do not vary."""
+    y = np.asarray(measured, dtype=float)
+    k = np.asarray(modelled, dtype=float)
     if y.shape != k.shape or y.size < 2:
         raise IdentificationError(
-            f"correlation index: there are {y.size} measured and {k.size} modelled values; give the same number of "
-            "each, at least two."
+            f"correlation index: there are {y.size} measured and {k.size} modelled values; give the"
+            " same number of each, at least two."
         )
     if not (np.isfinite(y).all() and np.isfinite(k).all()):
-        raise IdentificationError("correlation index: a value is not finite. Remove such rows first.")
+        raise IdentificationError(
+            "correlation index: a value is not finite. Remove such rows first."
+        )
     total = float(np.sum((y.mean() - y) ** 2))
     if total == 0.0:
-        raise IdentificationError("correlation index: undefined, because all measured values are equal.")
+        raise IdentificationError(
+            "correlation index: undefined, because all measured values are equal."
+        )
     return CorrelationIndex(1.0 - float(np.sum((k - y) ** 2)) / total)
 
 
 @dataclasses.dataclass(frozen=True)
 class WorstPoint:
-    """The residual (model - measured) of maximum magnitude and the point where it occurs, all SI."""
+    """The residual (model - measured) of maximum magnitude and the point where it occurs, all
+    SI.
+    """
 
     error: float
     pressure: float
@@ -70,17 +82,23 @@ class WorstPoint:
 
 
 def goodness_of_fit(problem: FitProblem, modelled: Array, data: Recording) -> dict[str, Any]:
-    """The rms error, maximum error and correlation index of a law, as fields of a `Fit`. The error at a row is model -
-    measured, with the model (N,) clamped; at a censored row it is the violation of its bound, because its reading is
-    not a measured value. The squares of violations are added to those of measured rows."""
-    measured, target = problem.censoring == 0, data[problem.fitted_quantity.name]
+    """The rms error, maximum error and correlation index of a law, as fields of a `Fit`. The error
+    at a row is model - measured, with the model (N,) clamped; at a censored row it is the violation
+    of its bound, because its reading is not a measured value. The squares of violations are added
+    to those of measured rows."""
+    measured = problem.censoring == 0
+    target = data[problem.fitted_quantity.name]
     errors = problem.residuals(modelled) / problem.weights
     worst = int(np.argmax(np.abs(errors)))
     varies = np.ptp(target[measured]) > 0
     return {
         "rmse": float(np.sqrt(errors @ errors / max(int(np.count_nonzero(measured)), 1))),
-        "max_error": WorstPoint(float(errors[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)),
-        "correlation_index": correlation_index(target[measured], modelled[measured]) if varies else None,
+        "max_error": WorstPoint(
+            float(errors[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)
+        ),
+        "correlation_index": (
+            correlation_index(target[measured], modelled[measured]) if varies else None
+        ),
     }
 
 
@@ -92,7 +110,9 @@ DEGREE_REMEDY = "For the greatest degree that the levels determine"
 
 @dataclasses.dataclass(frozen=True)
 class Estimate:
-    """A fitted parameter with its standard error, NaN on a bound or without degrees of freedom; SI."""
+    """A fitted parameter with its standard error, NaN on a bound or without degrees of freedom;
+    SI.
+    """
 
     name: str
     label: str
@@ -114,11 +134,15 @@ class Estimate:
         return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
 
 
-def fit_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> dict[str, Any]:
-    """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`. Raises
-    IdentificationError where the design matrix is rank-deficient."""
-    design, active = check_determined(problem, solution), problem.active_rows(solution.modelled)
-    on_bound, counted = ~design.columns, design
+def fit_statistics(
+    problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs
+) -> dict[str, Any]:
+    """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`.
+    Raises IdentificationError where the design matrix is rank-deficient."""
+    design = check_determined(problem, solution)
+    active = problem.active_rows(solution.modelled)
+    on_bound = ~design.columns
+    counted = design
     residuals = problem.residuals(solution.modelled)[active]
     sigma, influences = _residual_std(residuals, design.norms.size, loss)
     if on_bound.any():
@@ -131,22 +155,34 @@ def fit_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Lo
         low, high = problem.bounds_reached(solution.values)
         covariance = covariance.within_bounds(low, high, -counted.matrix.T @ influences)
     standard_errors, correlations = covariance.of_parameters()
-    standard_errors[on_bound], correlations[on_bound], correlations[:, on_bound] = np.nan, np.nan, np.nan
+    standard_errors[on_bound] = np.nan
+    correlations[on_bound] = np.nan
+    correlations[:, on_bound] = np.nan
     singular = design.singular_values
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
     columns = (each.tolist() for each in (solution.values, standard_errors, on_bound))
     estimates = tuple(
-        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, is_on_bound)
-        for leaf, label, value, stderr, is_on_bound in zip(problem.free_leaves, problem.labels, *columns, strict=True)
+        Estimate(
+            leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, is_on_bound
+        )
+        for leaf, label, value, stderr, is_on_bound in zip(
+            problem.free_leaves, problem.labels, *columns, strict=True
+        )
     )
     return {
-        "estimates": estimates, "correlations": correlations, "parameter_covariance": covariance,
-        "rank": singular.size, "condition": condition, "sigma": sigma,
-    }  # fmt: skip
+        "estimates": estimates,
+        "correlations": correlations,
+        "parameter_covariance": covariance,
+        "rank": singular.size,
+        "condition": condition,
+        "sigma": sigma,
+    }
 
 
 def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_Design":
-    """The design of the parameters that are not on a bound. Raises IdentificationError where it is rank-deficient."""
+    """The design of the parameters that are not on a bound. Raises IdentificationError where it is
+    rank-deficient.
+    """
     low, high = problem.bounds_reached(solution.values)
     design = _Design.of(problem, solution, ~(low | high))
     if design.null.any():
@@ -155,10 +191,14 @@ def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_D
     return design
 
 
-def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording) -> None:
-    """Raise IdentificationError where only the noise or ripple of a constant quantity determines the parameters.
-    `at_levels` are the data of the problem with the constant quantity of each run at its level."""
-    data, arguments = problem.data, problem.fitted_quantity.arguments
+def check_determined_by_levels(
+    problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording
+) -> None:
+    """Raise IdentificationError where only the noise or ripple of a constant quantity determines
+    the parameters. `at_levels` are the data of the problem with the constant quantity of each run
+    at its level."""
+    data = problem.data
+    arguments = problem.fitted_quantity.arguments
     if at_levels is data or all(np.array_equal(at_levels[name], data[name]) for name in arguments):
         return
     levelled = dataclasses.replace(problem, data=at_levels)
@@ -166,8 +206,8 @@ def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSoluti
 
 
 class _Design(NamedTuple):
-    """Columns of the weighted design matrix of the active rows, a mask (P,): their norms, and the singular values and
-    right singular vectors of the columns scaled to unit norm."""
+    """Columns of the weighted design matrix of the active rows, a mask (P,): their norms, and the
+    singular values and right singular vectors of the columns scaled to unit norm."""
 
     columns: Mask
     matrix: Array
@@ -183,7 +223,9 @@ class _Design(NamedTuple):
         selected = solution.jacobian if whole else solution.jacobian[np.ix_(active, columns)]
         matrix = np.multiply(problem.weights[active, None], selected, order="C")
         norms = np.linalg.norm(matrix, axis=0)
-        return cls(columns, matrix, norms, *singular_vectors(matrix / np.where(norms > 0, norms, 1.0)))
+        return cls(
+            columns, matrix, norms, *singular_vectors(matrix / np.where(norms > 0, norms, 1.0))
+        )
 
     @property
     def null(self) -> Mask:
@@ -193,14 +235,18 @@ class _Design(NamedTuple):
     @property
     def basis(self) -> Array:
         """T with T T^T = (J^T J)^-1 of the columns."""
-        return np.asarray(self.right_singular_vectors.T / self.singular_values / self.norms[:, None])
+        return np.asarray(
+            self.right_singular_vectors.T / self.singular_values / self.norms[:, None]
+        )
 
 
 def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float, Array]:
-    """The sigma for which sigma^2 (J^T J)^-1 is the covariance of the estimates, and psi/mean(psi') of every residual.
+    """The sigma for which sigma^2 (J^T J)^-1 is the covariance of the estimates, and psi/mean(psi')
+    of every residual.
 
-    For least squares these are sqrt(SSE/(N - P)) and the residuals; for a loss with influence function psi(e) = e rho'
-    sigma is sqrt(Sum psi^2/(N - P))/mean(psi'). Reference: Huber, Robust Statistics (1981), section 7.6.
+    For least squares these are sqrt(SSE/(N - P)) and the residuals; for a loss with influence
+    function psi(e) = e rho' sigma is sqrt(Sum psi^2/(N - P))/mean(psi'). Reference: Huber, Robust
+    Statistics (1981), section 7.6.
     """
     influences = residuals
     if residuals.size and not isinstance(loss, LeastSquares):
@@ -213,10 +259,16 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float,
     return float(np.sqrt(np.sum(influences**2) / degrees_of_freedom)), influences
 
 
-def _rank_deficiency(problem: FitProblem, free: Mask, shares: Array, rank: int) -> IdentificationError:
-    """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms in it."""
+def _rank_deficiency(
+    problem: FitProblem, free: Mask, shares: Array, rank: int
+) -> IdentificationError:
+    """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms
+    in it.
+    """
     labels = list(itertools.compress(problem.labels, free))
-    names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
+    names = [
+        label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()
+    ]
     quantities = problem.fitted_quantity.arguments
     levels = [count_levels(values) for values in problem.arguments]
     counts = [f"{count} of {name}" for count, name in zip(levels, quantities, strict=True)]
@@ -226,27 +278,32 @@ def _rank_deficiency(problem: FitProblem, free: Mask, shares: Array, rank: int) 
     listed = ", ".join(names[:_MAX_NAMES])
     more = f" and {len(names) - _MAX_NAMES} other parameters" if len(names) > _MAX_NAMES else ""
     few = [names[0], f"{len(names) - 1} other parameters"] if more else names
-    what, cause = f"cannot separate {listed}{more}", f"cannot separate {' and '.join(few)}"
+    what = f"cannot separate {listed}{more}"
+    cause = f"cannot separate {' and '.join(few)}"
     if len(names) == 1:
         what = cause = f"do not depend on {names[0]}"
-    text, hint = "", Hint("To fix one parameter", "fixed", (path,))
+    text = ""
+    hint = Hint("To fix one parameter", "fixed", (path,))
     if isinstance(problem.law, ContractileSurface):
         text = (
-            "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the pressure, each scaled to "
-            "-1..1; powers up to n need n + 1 levels. "
+            "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the"
+            " pressure, each scaled to -1..1; powers up to n need n + 1 levels. "
         )
         degree = min(levels) - 1  # the greatest for the pure powers of each quantity
         if 0 < degree < problem.law.degree:
             hint = Hint(DEGREE_REMEDY, "degree", degree, "characteristic.ContractileSurface.blank")
     return IdentificationError(
-        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. {text}"
-        "Measure at more levels, or choose a lower degree or a law with fewer parameters.",
+        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels:"
+        f" {', '.join(counts)}. {text}Measure at more levels, or choose a lower degree or a law"
+        " with fewer parameters.",
         hint=hint,
         cause=f"the data {cause} (rank {rank} of {len(labels)})",
     )
 
 
 def count_levels(values: Array) -> int:
-    """The number of levels: of groups of values that differ by at most the band of a constant quantity."""
+    """The number of levels: of groups of values that differ by at most the band of a constant
+    quantity.
+    """
     band = RELATIVE_BAND * float(np.max(np.abs(values), initial=0.0))
     return sum(1 for _ in level_intervals(np.sort(values), band))

@@ -1,4 +1,6 @@
-"""Uncertainty of the parameters of a fit: by bootstrap, profile likelihood and standard errors, with its chapter."""
+"""Uncertainty of the parameters of a fit: by bootstrap, profile likelihood and standard errors,
+with its chapter.
+"""
 
 import dataclasses
 from functools import partial
@@ -14,12 +16,15 @@ from ..reported import Reported
 from . import Fit, ProfileLikelihood
 
 MIN_GROUPS = 5
-"""Minimum number of groups. G groups give (2G - 1)!/(G! (G - 1)!) different samples, 35 with G = 4; an end of a 95 %
-interval needs 40. Reference: Hall (1992), The Bootstrap and Edgeworth Expansion, Springer, appendix I."""
+"""Minimum number of groups. G groups give (2G - 1)!/(G! (G - 1)!) different samples, 35 with G = 4;
+an end of a 95 % interval needs 40. Reference: Hall (1992), The Bootstrap and Edgeworth Expansion,
+Springer, appendix I."""
 RELIABLE_GROUPS = 12
-"""Number of groups from which the intervals need no caution (chosen: in a study of errors that a run shares, 95 %
-intervals of a plane held 59 % with 3 runs, 84 % with 5, 89 % with 8, 91 % with 12 and 92 % with 24)."""
-MAX_ROWS, MAX_BRIEF = 40, 8
+"""Number of groups from which the intervals need no caution (chosen: in a study of errors that a
+run shares, 95 % intervals of a plane held 59 % with 3 runs, 84 % with 5, 89 % with 8, 91 % with 12
+and 92 % with 24)."""
+MAX_ROWS = 40
+MAX_BRIEF = 8
 """Maximum numbers of parameters in the figure and in the brief view (chosen)."""
 NORMAL_QUANTILE = 1.96
 """Half width of a 95 % interval in standard deviations."""
@@ -31,7 +36,9 @@ AXIS_LIMIT = 12.0
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Bootstrap(Reported):
-    """Parameters of every refit, shape (refits, P); a row of NaN where the drawn groups do not determine them."""
+    """Parameters of every refit, shape (refits, P); a row of NaN where the drawn groups do not
+    determine them.
+    """
 
     fit: Fit
     values: Array
@@ -49,8 +56,9 @@ class Bootstrap(Reported):
         if self.group_count >= RELIABLE_GROUPS:
             return ""
         return (
-            f"with fewer than {RELIABLE_GROUPS} groups the intervals hold less often than stated (84 % instead of 95 % "
-            f"with {MIN_GROUPS} in a study); the standard errors of the fit contain the small number"
+            f"with fewer than {RELIABLE_GROUPS} groups the intervals hold less often than stated"
+            f" (84 % instead of 95 % with {MIN_GROUPS} in a study); the standard errors of the fit"
+            " contain the small number"
         )
 
     @property
@@ -64,11 +72,15 @@ class Bootstrap(Reported):
 
     def model(self, refit: int) -> Characteristic:
         """The law with the parameters of one refit."""
-        law: Characteristic = tree.unflatten(self.fit.problem.law, self.fit.problem.leaf_values(self.values[refit]))
+        law: Characteristic = tree.unflatten(
+            self.fit.problem.law, self.fit.problem.leaf_values(self.values[refit])
+        )
         return law
 
     def chapter(self) -> Chapter:
-        """The description of the bootstrap: the intervals of every parameter beside those by standard error."""
+        """The description of the bootstrap: the intervals of every parameter beside those by
+        standard error.
+        """
         return Uncertainty(self.fit, self).chapter()
 
 
@@ -85,34 +97,55 @@ class Uncertainty(Reported):
     def chapter(self) -> Chapter:
         """The description: 95 % intervals of every parameter by each requested method."""
         sentences = [
-            f"95 % intervals. Standard errors are estimated {self.fit.error_basis}. They hold for a law that is "
-            "nearly linear in its parameters."
+            f"95 % intervals. Standard errors are estimated {self.fit.error_basis}. They hold for a"
+            " law that is nearly linear in its parameters."
         ]
         counts = dict[str, int]()
         if (bootstrap := self.bootstrap) is not None:
-            refits, groups, failed = len(bootstrap.values), bootstrap.group_count, bootstrap.failed_refits
+            refits = len(bootstrap.values)
+            groups = bootstrap.group_count
+            failed = bootstrap.failed_refits
             text = f"Bootstrap: {refits} refits, {groups} blocks resampled, seed {bootstrap.seed}"
             text += f"; {failed} of them did not determine the parameters" if failed else ""
             if failed > MAX_FAILED_SHARE * refits:
-                text += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
+                text += (
+                    ", so the intervals are not reliable: add runs, or use a law with fewer"
+                    " parameters"
+                )
             sentences.insert(0, "; ".join(filter(None, (text, bootstrap.caution))) + ".")
-            counts = {"refits": refits, "resampled groups": groups, "failed refits": failed, "seed": bootstrap.seed}
+            counts = {
+                "refits": refits,
+                "resampled groups": groups,
+                "failed refits": failed,
+                "seed": bootstrap.seed,
+            }
         if self.profiles:
             sentences.append(
-                "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data "
-                "do not limit the parameter."
+                "A profile fixes one parameter and estimates all others again; an interval is"
+                " unbounded where the data do not limit the parameter."
             )
-        caption = "95 % intervals in units of the standard error; an arrow marks an interval beyond the axis."
+        caption = (
+            "95 % intervals in units of the standard error; an arrow marks an interval beyond the"
+            " axis."
+        )
         return Chapter(
-            "uncertainty", "Uncertainty of the parameters", tuple(sentences),
+            "uncertainty",
+            "Uncertainty of the parameters",
+            tuple(sentences),
             values=tuple(NamedValue(name, count, brief=False) for name, count in counts.items()),
-            tables=(_table(self),), plots=(Plot("intervals", caption, partial(_figure, self)),),
-            notes=("no parameter is weakly determined; the standard errors are valid",) if self.none_weak else (),
-        )  # fmt: skip
+            tables=(_table(self),),
+            plots=(Plot("intervals", caption, partial(_figure, self)),),
+            notes=(
+                ("no parameter is weakly determined; the standard errors are valid",)
+                if self.none_weak
+                else ()
+            ),
+        )
 
 
 def _table(uncertainty: Uncertainty) -> Table:
-    fit, estimates = uncertainty.fit, uncertainty.fit.estimates
+    fit = uncertainty.fit
+    estimates = uncertainty.fit.estimates
     half = NORMAL_QUANTILE * fit.standard_errors
     ends = list(zip((fit.values - half).tolist(), (fit.values + half).tolist(), strict=True))
     columns: dict[str, Any] = {
@@ -121,11 +154,18 @@ def _table(uncertainty: Uncertainty) -> Table:
         "by standard error": TableColumn(ends, BY_ROW, brief=False),
     }
     if uncertainty.bootstrap is not None:
-        columns["by bootstrap"] = TableColumn(list(map(tuple, uncertainty.bootstrap.intervals().tolist())), BY_ROW)
+        columns["by bootstrap"] = TableColumn(
+            list(map(tuple, uncertainty.bootstrap.intervals().tolist())), BY_ROW
+        )
         deviations = uncertainty.bootstrap.standard_errors
-        columns["standard error of bootstrap"] = TableColumn(deviations, BY_ROW, digits=3, brief=False)
+        columns["standard error of bootstrap"] = TableColumn(
+            deviations, BY_ROW, digits=3, brief=False
+        )
     if uncertainty.profiles:
-        profiled = {profile.name: (float(profile.low), float(profile.high)) for profile in uncertainty.profiles}
+        profiled = {
+            profile.name: (float(profile.low), float(profile.high))
+            for profile in uncertainty.profiles
+        }
         columns["by profile"] = TableColumn([profiled.get(e.name) for e in estimates], BY_ROW)
     columns["unit"] = [e.unit for e in estimates]
     return Table("intervals", "95 % intervals", columns, brief=MAX_BRIEF)
@@ -133,7 +173,9 @@ def _table(uncertainty: Uncertainty) -> Table:
 
 def _figure(uncertainty: Uncertainty) -> Any:
     estimates = uncertainty.fit.estimates
-    plotted = [i for i, e in enumerate(estimates) if np.isfinite(e.stderr) and e.stderr > 0][:MAX_ROWS]
+    plotted = [i for i, e in enumerate(estimates) if np.isfinite(e.stderr) and e.stderr > 0][
+        :MAX_ROWS
+    ]
     figure, axes = new_figure(width=6.4, height=1.6 + 0.24 * max(len(plotted), 3))
     by_name = {profile.name: (profile.low, profile.high) for profile in uncertainty.profiles}
     ends = None if uncertainty.bootstrap is None else uncertainty.bootstrap.intervals()
@@ -141,12 +183,16 @@ def _figure(uncertainty: Uncertainty) -> Any:
         estimate = estimates[i]
         intervals = [((-NORMAL_QUANTILE, NORMAL_QUANTILE), BLACK, "standard error", 0.0)]
         if ends is not None:
-            intervals.append((tuple((ends[i] - estimate.value) / estimate.stderr), BLUE, "bootstrap", 0.25))
+            intervals.append(
+                (tuple((ends[i] - estimate.value) / estimate.stderr), BLUE, "bootstrap", 0.25)
+            )
         if estimate.name in by_name:
             pair = (np.array(by_name[estimate.name]) - estimate.value) / estimate.stderr
             intervals.append((tuple(pair), RED, "profile", -0.25))
         for interval, colour, label, shift in intervals:
-            finite = np.nan_to_num(np.array(interval, dtype=float), posinf=AXIS_LIMIT, neginf=-AXIS_LIMIT)
+            finite = np.nan_to_num(
+                np.array(interval, dtype=float), posinf=AXIS_LIMIT, neginf=-AXIS_LIMIT
+            )
             low, high = np.clip(finite, -AXIS_LIMIT, AXIS_LIMIT)
             once = None if label in axes.get_legend_handles_labels()[1] else label
             style = {"color": colour, "linewidth": 2.2, "solid_capstyle": "butt", "label": once}
@@ -155,10 +201,14 @@ def _figure(uncertainty: Uncertainty) -> Any:
                 if abs(end) >= AXIS_LIMIT:
                     axes.plot([end], [row + shift], marker=marker, color=colour, markersize=5)
     axes.axvline(0.0, color=BLACK, linewidth=0.6)
-    axes.set_yticks(range(len(plotted)), [to_mathtext(symbol_formula(estimates[i].label)) for i in plotted])
+    axes.set_yticks(
+        range(len(plotted)), [to_mathtext(symbol_formula(estimates[i].label)) for i in plotted]
+    )
     axes.invert_yaxis()
     axes.set(xlabel="deviation from the estimate [standard errors]")
-    widest = max((abs(v) for line in axes.lines for v in np.atleast_1d(line.get_xdata())), default=1.0)
+    widest = max(
+        (abs(v) for line in axes.lines for v in np.atleast_1d(line.get_xdata())), default=1.0
+    )
     axes.set_xlim(-1.1 * max(widest, 2.5), 1.1 * max(widest, 2.5))
     legend_below(figure, axes, 3)
     return figure

@@ -1,11 +1,11 @@
-"""Censored least squares of a law linear in its parameters, and initial values by variable projection.
+"""Censored least squares of a law linear in its parameters, and initial values by variable
+projection.
 
-For given values of the nonlinear parameters the linear ones follow by linear least squares. The search therefore runs
-over the nonlinear parameters alone, from several initial guesses (multi-start).
-The Jacobian of the projected residuals is that of the law in the nonlinear parameters, projected onto the complement of
-the linear columns.
-References: Golub and Pereyra, SIAM Journal on Numerical Analysis 10:413 (1973); Kaufman, BIT Numerical Mathematics
-15:49 (1975).
+For given values of the nonlinear parameters the linear ones follow by linear least squares. The
+search therefore runs over the nonlinear parameters alone, from several initial guesses
+(multi-start). The Jacobian of the projected residuals is that of the law in the nonlinear
+parameters, projected onto the complement of the linear columns. References: Golub and Pereyra, SIAM
+Journal on Numerical Analysis 10:413 (1973); Kaufman, BIT Numerical Mathematics 15:49 (1975).
 """
 
 from collections.abc import Callable
@@ -18,24 +18,33 @@ from ...core import Array
 from .problem import FitProblem
 
 RANK_TOLERANCE = 1e-10
-"""Relative tolerance below which a singular value of the scaled design matrix counts as zero (chosen): a parameter
-that is not determined within ten digits of the data is not determined."""
+"""Relative tolerance below which a singular value of the scaled design matrix counts as zero
+(chosen): a parameter that is not determined within ten digits of the data is not determined."""
 _INACTIVE_WEIGHT = 1e-4
-"""Weight of an inactive censored row, where the uncensored rows alone do not determine all parameters (chosen)."""
+"""Weight of an inactive censored row, where the uncensored rows alone do not determine all
+parameters (chosen).
+"""
 _MAX_ITERATIONS = 200
-"""Maximum number of Newton steps with censored rows; the iteration is finite and took fewer than 30 in all tests."""
+"""Maximum number of Newton steps with censored rows; the iteration is finite and took fewer than 30
+in all tests.
+"""
 _RCOND = 1e-13
 
 
 def solve_censored_least_squares(
-    problem: FitProblem, jacobian: Array, constant: Array, active: npt.NDArray[np.bool_] | None = None
+    problem: FitProblem,
+    jacobian: Array,
+    constant: Array,
+    active: npt.NDArray[np.bool_] | None = None,
 ) -> Array:
-    """The parameters x that minimise the weighted residuals of `jacobian` (N, P) @ x + `constant` (N,).
+    """The parameters x that minimise the weighted residuals of `jacobian` (N, P) @ x + `constant`
+    (N,).
 
-    A censored row contributes only where the law violates its bound. The one-sided squares form a convex sum; each
-    iteration is a Newton step, halved until the sum does not increase. Where the uncensored rows alone do not determine
-    all parameters, the minimum is not unique: of all equally good solutions the one closest to the bounds is returned.
-    `active` (N,) is the mask of the rows that count in the first step, by default all.
+    A censored row contributes only where the law violates its bound. The one-sided squares form a
+    convex sum; each iteration is a Newton step, halved until the sum does not increase. Where the
+    uncensored rows alone do not determine all parameters, the minimum is not unique: of all equally
+    good solutions the one closest to the bounds is returned. `active` (N,) is the mask of the rows
+    that count in the first step, by default all.
     """
     norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0] = 1.0
@@ -51,14 +60,17 @@ def solve_censored_least_squares(
     def sum_of_squares(scaled: Array) -> float:
         return float(np.sum((row_weights(scaled) * (matrix @ scaled - target)) ** 2))
 
-    weights, x = np.ones(len(target)) if active is None else np.where(active, 1.0, inactive), np.zeros(len(norms))
+    weights = np.ones(len(target)) if active is None else np.where(active, 1.0, inactive)
+    x = np.zeros(len(norms))
     for iteration in range(_MAX_ITERATIONS):
         counted = slice(None) if weights.all() else weights > 0
-        rows, right = weights[counted, None] * matrix[counted], weights[counted] * target[counted]
+        rows = weights[counted, None] * matrix[counted]
+        right = weights[counted] * target[counted]
         step = np.linalg.lstsq(rows, right, rcond=_RCOND)[0] - x
         if iteration:
             step = shortened_step(sum_of_squares, x, step, sum_of_squares(x))
-        x, previous = x + step, weights
+        x = x + step
+        previous = weights
         weights = row_weights(x)
         if np.array_equal(weights, previous):
             break
@@ -66,9 +78,15 @@ def solve_censored_least_squares(
 
 
 def shortened_step(
-    sum_of_squares: Callable[[Array], float], x: Array, step: Array, limit: float, halvings: int = 30
+    sum_of_squares: Callable[[Array], float],
+    x: Array,
+    step: Array,
+    limit: float,
+    halvings: int = 30,
 ) -> Array:
-    """The step from x, halved until the sum of squares is at most `limit`; zero where no part of it is short enough."""
+    """The step from x, halved until the sum of squares is at most `limit`; zero where no part of it
+    is short enough.
+    """
     parts = (factor * step for factor in 0.5 ** np.arange(halvings))
     return next((part for part in parts if sum_of_squares(x + part) <= limit), 0.0 * step)
 
@@ -77,18 +95,27 @@ def uncensored_rank(problem: FitProblem, jacobian: Array) -> int:
     """Rank of the weighted design matrix of the uncensored rows."""
     matrix = (problem.weights[:, None] * jacobian)[problem.censoring == 0]
     norms = np.linalg.norm(matrix, axis=0)
-    triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")  # with the same singular values
+    triangle = np.linalg.qr(
+        matrix / np.where(norms > 0, norms, 1.0), mode="r"
+    )  # with the same singular values
     return int(np.linalg.matrix_rank(triangle, rtol=RANK_TOLERANCE))
 
 
-_GUESS_COUNT, _SEARCH_COUNT = 16, 2
-"""Initial guesses, with the given one, at which projected residuals are evaluated; searches from the best (chosen)."""
+_GUESS_COUNT = 16
+_SEARCH_COUNT = 2
+"""Initial guesses, with the given one, at which projected residuals are evaluated; searches from
+the best (chosen).
+"""
 _SPREAD_FACTOR = 4.0
 """Maximum factor between an initial guess and the given value (chosen)."""
 _RANGE_FRACTION = 0.01
-"""Additional shift as a fraction of the range between the bounds, so that a value of zero is varied too (chosen)."""
+"""Additional shift as a fraction of the range between the bounds, so that a value of zero is varied
+too (chosen).
+"""
 _MAX_ROWS = 2000
-"""Rows of the multi-start search, drawn at random of more (chosen): one search over all rows follows."""
+"""Rows of the multi-start search, drawn at random of more (chosen): one search over all rows
+follows.
+"""
 
 
 def linear_fields(law: Any) -> tuple[str, ...]:
@@ -100,33 +127,45 @@ def linear_fields(law: Any) -> tuple[str, ...]:
 def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
     """Mask of the free parameters in which the law is linear, shape (P,)."""
     fields = linear_fields(problem.law)
-    return np.array([leaf.path.partition("[")[0] in fields for leaf in problem.free_leaves], dtype=bool)
+    return np.array(
+        [leaf.path.partition("[")[0] in fields for leaf in problem.free_leaves], dtype=bool
+    )
 
 
 def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
-    """The best free parameters by variable projection, shape (P,); the given ones where none are better. Without
-    `multi_start` there is one search, from the given parameters."""
+    """The best free parameters by variable projection, shape (P,); the given ones where none are
+    better. Without `multi_start` there is one search, from the given parameters."""
     linear = is_linear_parameter(problem)
     if linear.all() or not linear.any():
         return problem.initial_values
-    projection, thinned, count = _Projection(problem, linear), problem, len(problem.data)
+    projection = _Projection(problem, linear)
+    thinned = problem
+    count = len(problem.data)
     if count > _MAX_ROWS:  # drawn, as a regular choice could miss levels
         thinned = problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
-    best, (low, high) = problem.initial_values[~linear], problem.bounds
+    best = problem.initial_values[~linear]
+    low, high = problem.bounds
     if multi_start:
         preview = projection if thinned is problem else _Projection(thinned, linear)
-        # The given nonlinear parameters, and random guesses around them within the bounds, with a constant seed.
-        random, guesses, (bottom, top) = np.random.default_rng(1), [best], (bound[~linear] for bound in (low, high))
+        # The given nonlinear parameters, and random guesses around them within the bounds, with a
+        # constant seed.
+        random = np.random.default_rng(1)
+        guesses = [best]
+        bottom, top = (bound[~linear] for bound in (low, high))
         width = np.where(np.isfinite(top - bottom), top - bottom, 0.0)
         for _ in range(_GUESS_COUNT - 1):
-            factor, shift = _SPREAD_FACTOR ** random.uniform(-1, 1, best.size), random.uniform(-1, 1, best.size)
+            factor = _SPREAD_FACTOR ** random.uniform(-1, 1, best.size)
+            shift = random.uniform(-1, 1, best.size)
             guesses.append(np.clip(best * factor + _RANGE_FRACTION * width * shift, bottom, top))
         guesses = sorted(guesses, key=preview.sum_of_squares)[:_SEARCH_COUNT]
         best = min((preview.search(guess) for guess in guesses), key=preview.sum_of_squares)
     if not multi_start or thinned is not problem:
         best = projection.search(best)
     values = np.clip(projection.solve(best)[0], low, high)
-    after, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
+    after, before = (
+        _sum_of_squares(problem.residuals(problem.predict(v)))
+        for v in (values, problem.initial_values)
+    )
     return values if after < before else problem.initial_values
 
 
@@ -134,7 +173,8 @@ class _Projection:
     """The residuals of a problem as a function of its nonlinear parameters alone."""
 
     def __init__(self, problem: FitProblem, linear: npt.NDArray[np.bool_]) -> None:
-        self._problem, self._linear = problem, linear
+        self._problem = problem
+        self._linear = linear
         self._linear_indices = np.flatnonzero(linear).tolist()
         self._bounds = tuple(bound[~linear] for bound in problem.bounds)
         initial = problem.initial_values[~linear]
@@ -143,8 +183,9 @@ class _Projection:
         self._active: npt.NDArray[np.bool_] | None = None
 
     def solve(self, nonlinear: Array) -> tuple[Array, Array, Array]:
-        """All free parameters (P,), the fitted quantity (N,) and the columns of the linear parameters, which are NaN
-        where the law is not finite; kept for the Jacobian at the same point."""
+        """All free parameters (P,), the fitted quantity (N,) and the columns of the linear
+        parameters, which are NaN where the law is not finite; kept for the Jacobian at the same
+        point."""
         key = nonlinear.tobytes()
         if self._last is None or self._last[0] != key:
             values = np.zeros(self._linear.size)
@@ -153,7 +194,9 @@ class _Projection:
             columns = self._problem.jacobian(values, self._linear_indices)
             finite = np.isfinite(columns).all() and np.isfinite(constant).all()
             values[self._linear] = (
-                solve_censored_least_squares(self._problem, columns, constant, self._active) if finite else np.nan
+                solve_censored_least_squares(self._problem, columns, constant, self._active)
+                if finite
+                else np.nan
             )
             modelled = columns @ values[self._linear] + constant
             self._active = self._problem.active_rows(modelled) if finite else None
@@ -165,10 +208,14 @@ class _Projection:
         return self._problem.residuals(self.solve(nonlinear)[1])
 
     def jacobian(self, nonlinear: Array) -> Array:
-        """Derivatives of the residuals with respect to the nonlinear parameters, after Kaufman; shape (N, K)."""
+        """Derivatives of the residuals with respect to the nonlinear parameters, after Kaufman;
+        shape (N, K).
+        """
         values, modelled, columns = self.solve(nonlinear)
         row_weights = (self._problem.weights * self._problem.active_rows(modelled))[:, None]
-        slopes = row_weights * self._problem.jacobian(values, np.flatnonzero(~self._linear).tolist())
+        slopes = row_weights * self._problem.jacobian(
+            values, np.flatnonzero(~self._linear).tolist()
+        )
         norms = np.linalg.norm(columns, axis=0)
         linear = row_weights * (columns / np.where(norms > 0, norms, 1.0))
         return np.asarray(slopes - linear @ np.linalg.lstsq(linear, slopes, rcond=None)[0])
@@ -187,9 +234,13 @@ class _Projection:
         inside = np.clip(start / self._scale, low + 1e-9, high - 1e-9)
         try:
             result = least_squares(
-                lambda x: self.residuals(x * self._scale), inside, bounds=(low, high), x_scale="jac", max_nfev=60,
+                lambda x: self.residuals(x * self._scale),
+                inside,
+                bounds=(low, high),
+                x_scale="jac",
+                max_nfev=60,
                 jac=lambda x: self.jacobian(x * self._scale) * self._scale,
-            )  # fmt: skip
+            )
         except (ValueError, np.linalg.LinAlgError):  # the law is not finite at a trial point
             return start
         return np.asarray(result.x * self._scale)

@@ -1,8 +1,10 @@
-"""Volume identification: one volume law of a muscle from a water column, or from fills at held lengths.
+"""Volume identification: one volume law of a muscle from a water column, or from fills at held
+lengths.
 
-A water column gives the volume at every contraction. A fill at a held contraction gives one volume from the mass of air
-that enters between two settled pressures, V = Delta m R T/Delta p. A fill without the mass of air determines only the
-ratio of volume and valve conductance: see `bench.identify.dynamic`.
+A water column gives the volume at every contraction. A fill at a held contraction gives one volume
+from the mass of air that enters between two settled pressures, V = Delta m R T/Delta p. A fill
+without the mass of air determines only the ratio of volume and valve conductance: see
+`bench.identify.dynamic`.
 """
 
 import dataclasses
@@ -28,17 +30,24 @@ HELD = 0.005
 MIN_RISE = 2e4
 """Minimum pressure rise of a fill [Pa] (chosen)."""
 SETTLED = 0.05
-"""Fraction of the rows at either end of a fill over which mass and pressure are averaged (chosen)."""
+"""Fraction of the rows at either end of a fill over which mass and pressure are averaged
+(chosen).
+"""
 MAX_DEGREE = 4
 """Maximum degree of a polynomial (chosen)."""
 RESOLUTION = 1e-6
 """Residual relative to the volume below which laws are not distinguished (chosen)."""
-LEVELS, VOLUMES = 3, 11
-"""Pressures at which the reciprocity is drawn, and contractions of the table of volumes (chosen)."""
+LEVELS = 3
+VOLUMES = 11
+"""Pressures at which the reciprocity is drawn, and contractions of the table of volumes
+(chosen).
+"""
 
 
 class VolumePoints(NamedTuple):
-    """Measured volumes [m3] at contractions [1], shape (N,) each, and the number of fills among them."""
+    """Measured volumes [m3] at contractions [1], shape (N,) each, and the number of fills among
+    them.
+    """
 
     contraction: Array
     volume: Array
@@ -71,82 +80,111 @@ class VolumeFit(Reported):
     def summary(self) -> str:
         """The law with its residual and its standard deviation."""
         return (
-            f"{type(self.geometry).__name__}, rms residual {1e6 * self.rmse:.4g} cm3, standard deviation of the volume "
-            f"at most {1e6 * self.largest_deviation:.4g} cm3"
+            f"{type(self.geometry).__name__}, rms residual {1e6 * self.rmse:.4g} cm3, standard"
+            f" deviation of the volume at most {1e6 * self.largest_deviation:.4g} cm3"
         )
 
     def chapter(
-        self, title: str = "Volume of the muscle", law: Characteristic | None = None,
-        validity_range: ValidityRange | None = None, defect: EnergyDefect | None = None,
-    ) -> Chapter:  # fmt: skip
-        """The description of the fit; with a force law also dF/dp against -dV/dL and the Maxwell defect."""
+        self,
+        title: str = "Volume of the muscle",
+        law: Characteristic | None = None,
+        validity_range: ValidityRange | None = None,
+        defect: EnergyDefect | None = None,
+    ) -> Chapter:
+        """The description of the fit; with a force law also dF/dp against -dV/dL and the Maxwell
+        defect.
+        """
         caption = "Measured volumes, and the law with two standard deviations."
         plots = [Plot("volume", caption, partial(_volume_figure, self))]
         if law is not None and validity_range is not None:
             caption = (
-                "Reciprocity: dF/dp of the force law (lines, at several pressures) and -dV/dL of the volume law "
-                "(thick). They are equal if force and volume derive from one potential."
+                "Reciprocity: dF/dp of the force law (lines, at several pressures) and -dV/dL of"
+                " the volume law (thick). They are equal if force and volume derive from one"
+                " potential."
             )
-            plots.append(Plot("reciprocity", caption, partial(_reciprocity_figure, self, law, validity_range)))
+            plots.append(
+                Plot(
+                    "reciprocity", caption, partial(_reciprocity_figure, self, law, validity_range)
+                )
+            )
         model = type(self.geometry).__name__
         values = (
             NamedValue("law", model, brief=False),
             NamedValue("points", len(self.points.contraction), brief=False),
             NamedValue("fills", self.points.fills, brief=False),
             NamedValue("rms residual", self.rmse, "m3", "cm3", brief=False),
-            NamedValue("maximum standard deviation", self.largest_deviation, "m3", "cm3", brief=False),
+            NamedValue(
+                "maximum standard deviation", self.largest_deviation, "m3", "cm3", brief=False
+            ),
             *([] if defect is None else defect_values(defect)),
         )
-        tables = (*_tables(self), parameter_table(self.geometry, "volume-parameters", f"Parameters of {model}"))
-        return Chapter("volume", title, f"{self.summary}.", values=values, tables=tables, plots=tuple(plots),
-                       references=tuple(cite(self.geometry)))  # fmt: skip
+        tables = (
+            *_tables(self),
+            parameter_table(self.geometry, "volume-parameters", f"Parameters of {model}"),
+        )
+        return Chapter(
+            "volume",
+            title,
+            f"{self.summary}.",
+            values=values,
+            tables=tables,
+            plots=tuple(plots),
+            references=tuple(cite(self.geometry)),
+        )
 
 
 def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) -> VolumePoints:
-    """The volumes of recordings with a column `volume`, or with `pressure` and `air_mass` or `mass_flow` of a fill.
+    """The volumes of recordings with a column `volume`, or with `pressure` and `air_mass` or
+    `mass_flow` of a fill.
 
-    `temperature` [K] is that of the air before and after a fill, for which the muscle must come to rest. Raises
-    ColumnError for a recording with neither, a contraction that was not held, or a fill without a rise of pressure.
+    `temperature` [K] is that of the air before and after a fill, for which the muscle must come to
+    rest. Raises ColumnError for a recording with neither, a contraction that was not held, or a
+    fill without a rise of pressure.
     """
     if not recordings:
         raise IdentificationError("a volume fit needs at least one recording.")
-    contractions, volumes = zip(*(_measured(recording, temperature) for recording in recordings), strict=True)
+    contractions, volumes = zip(
+        *(_measured(recording, temperature) for recording in recordings), strict=True
+    )
     fills = sum("volume" not in recording.columns for recording in recordings)
     return VolumePoints(np.concatenate(contractions), np.concatenate(volumes), fills)
 
 
 def _measured(recording: Recording, temperature: float) -> tuple[Array, Array]:
-    """Contractions and volumes [m3] of a water column, or the one contraction and volume of a fill, from the mass of
-    air and the pressures at both ends."""
+    """Contractions and volumes [m3] of a water column, or the one contraction and volume of a fill,
+    from the mass of air and the pressures at both ends."""
     if not len(recording):
-        raise ColumnError(f"{recording.origin}: the recording has no rows. Give one with measured values.")
+        raise ColumnError(
+            f"{recording.origin}: the recording has no rows. Give one with measured values."
+        )
     contraction = recording["contraction"]
     if "volume" in recording.columns:
         return contraction, recording["volume"]
     if np.ptp(contraction) > HELD:
         raise ColumnError(
-            f"{recording.origin}: the contraction varies by {100 * np.ptp(contraction):.2f} % during the fill; it "
-            f"must be held within {100 * HELD:.1f} %. Hold the muscle, or measure the volume in a water column "
-            "(a column 'volume')."
+            f"{recording.origin}: the contraction varies by {100 * np.ptp(contraction):.2f} %"
+            f" during the fill; it must be held within {100 * HELD:.1f} %. Hold the muscle, or"
+            " measure the volume in a water column (a column 'volume')."
         )
     if "air_mass" in recording.columns:
         mass = recording["air_mass"]
     elif "mass_flow" in recording.columns:
-        flow, time = recording["mass_flow"], recording["time"]
+        flow = recording["mass_flow"]
+        time = recording["time"]
         mass = np.concatenate([[0.0], np.cumsum((flow[1:] + flow[:-1]) / 2 * np.diff(time))])
     else:
         raise ColumnError(
-            f"{recording.origin}: neither a column 'volume' (water column) nor the mass of air of a fill ('air_mass' "
-            "or 'mass_flow'). A fill without it determines only the ratio of volume and conductance: use "
-            "airmuscle fit-dynamic."
+            f"{recording.origin}: neither a column 'volume' (water column) nor the mass of air of a"
+            " fill ('air_mass' or 'mass_flow'). A fill without it determines only the ratio of"
+            " volume and conductance: use airmuscle fit-dynamic."
         )
     pressure = recording["pressure"]
     count = max(1, round(SETTLED * len(recording)))
     rise = float(np.mean(pressure[-count:]) - np.mean(pressure[:count]))
     if rise < MIN_RISE:
         raise ColumnError(
-            f"{recording.origin}: the pressure rises by {rise / 1e3:.4g} kPa; a volume needs a rise of at least "
-            f"{MIN_RISE / 1e3:g} kPa between settled ends."
+            f"{recording.origin}: the pressure rises by {rise / 1e3:.4g} kPa; a volume needs a rise"
+            f" of at least {MIN_RISE / 1e3:g} kPa between settled ends."
         )
     entered = float(np.mean(mass[-count:]) - np.mean(mass[:count]))
     volume = entered * GAS_CONSTANT * temperature / rise
@@ -154,38 +192,55 @@ def _measured(recording: Recording, temperature: float) -> tuple[Array, Array]:
 
 
 def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
-    """The volume law by AICc: a Braid, or a polynomial of degree 1 to 4 in the contraction; the simplest of equivalent
-    ones.
+    """The volume law by AICc: a Braid, or a polynomial of degree 1 to 4 in the contraction; the
+    simplest of equivalent ones.
 
-    `resting_length` [m]. The standard deviation follows from the residuals; that of the muscle's own reproducibility is
-    contained if the points are of several runs. Raises ParameterError for a length that is not positive, and
-    IdentificationError for a value that is not finite, fewer than four points, or fewer than three contractions.
+    `resting_length` [m]. The standard deviation follows from the residuals; that of the muscle's
+    own reproducibility is contained if the points are of several runs. Raises ParameterError for a
+    length that is not positive, and IdentificationError for a value that is not finite, fewer than
+    four points, or fewer than three contractions.
     """
     if not resting_length > 0.0:
-        raise ParameterError(f"fit_volume: the resting length is {resting_length:g} m; it must be greater than zero.")
+        raise ParameterError(
+            f"fit_volume: the resting length is {resting_length:g} m; it must be greater than zero."
+        )
     if missing := int(np.count_nonzero(~np.isfinite(points.contraction + points.volume))):
         raise IdentificationError(
-            f"fit_volume: {missing} of {points.volume.size} points have no finite contraction and volume. Remove them."
+            f"fit_volume: {missing} of {points.volume.size} points have no finite contraction and"
+            " volume. Remove them."
         )
     levels = np.unique(np.round(points.contraction, 4)).size
     if points.volume.size < 4 or levels < 3:
         raise IdentificationError(
-            f"a volume law needs four points at three contractions or more; there are {points.volume.size} at "
-            f"{levels}. Fill the muscle at further lengths."
+            "a volume law needs four points at three contractions or more; there are"
+            f" {points.volume.size} at {levels}. Fill the muscle at further lengths."
         )
     degrees = range(1, min(MAX_DEGREE, levels - 2, points.volume.size - 3) + 1)
-    braid, ends = _braid(points, resting_length), (float(points.contraction.min()), float(points.contraction.max()))
+    braid = _braid(points, resting_length)
+    ends = (float(points.contraction.min()), float(points.contraction.max()))
     laws: dict[str, Geometry] = {} if braid is None else {"Braid": braid}
     for n in degrees:
-        terms = np.linalg.lstsq(_chebyshev_terms(points.contraction, *ends, n), points.volume, rcond=None)[0]
-        laws[f"polynomial of degree {n}"] = ChebyshevGeometry(tuple(terms.tolist()), *ends, resting_length)
+        terms = np.linalg.lstsq(
+            _chebyshev_terms(points.contraction, *ends, n), points.volume, rcond=None
+        )[0]
+        laws[f"polynomial of degree {n}"] = ChebyshevGeometry(
+            tuple(terms.tolist()), *ends, resting_length
+        )
     criteria = dict[str, float]()
-    size, resolution = points.volume.size, RESOLUTION * float(np.abs(points.volume).max())
-    for name, law in laws.items():  # residuals below the resolution of the volumes do not distinguish laws
+    size = points.volume.size
+    resolution = RESOLUTION * float(np.abs(points.volume).max())
+    for (
+        name,
+        law,
+    ) in laws.items():  # residuals below the resolution of the volumes do not distinguish laws
         squares = float(np.sum((np.asarray(law.volume(points.contraction)) - points.volume) ** 2))
         parameters = _design(law, points.contraction).shape[1]
         criteria[name] = aicc(max(squares, size * resolution**2) / size, size, parameters)
-    equivalent = [laws[name] for name, value in criteria.items() if value <= min(criteria.values()) + EQUIVALENT]
+    equivalent = [
+        laws[name]
+        for name, value in criteria.items()
+        if value <= min(criteria.values()) + EQUIVALENT
+    ]
     best = min(equivalent, key=lambda law: _design(law, points.contraction).shape[1])
     residuals = np.asarray(best.volume(points.contraction)) - points.volume
     design = _design(best, points.contraction)
@@ -195,7 +250,9 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
 
 
 def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
-    """The braid of least squares, V = A s - B s^3 with s = 1 - eps; None if no braid has these coefficients."""
+    """The braid of least squares, V = A s - B s^3 with s = 1 - eps; None if no braid has these
+    coefficients.
+    """
     a, b = np.linalg.lstsq(_braid_terms(points.contraction), points.volume, rcond=None)[0]
     cosine_squared = float(b / a)
     if not a > 0.0 or not 0.0 < cosine_squared < 1.0:
@@ -210,7 +267,9 @@ def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
 def _design(law: Geometry, contraction: Array) -> Array:
     """Terms of the law, in whose coefficients the volume is linear, shape (N, P)."""
     if isinstance(law, ChebyshevGeometry):
-        return _chebyshev_terms(contraction, law.min_contraction, law.max_contraction, len(law.coefficients) - 1)
+        return _chebyshev_terms(
+            contraction, law.min_contraction, law.max_contraction, len(law.coefficients) - 1
+        )
     return _braid_terms(contraction)
 
 
@@ -225,10 +284,16 @@ def _chebyshev_terms(contraction: Array, low: float, high: float, degree: int) -
 
 
 def defect_values(defect: EnergyDefect) -> list[NamedValue]:
-    """The Maxwell defect and its place; it is zero where force and volume derive from one potential."""
+    """The Maxwell defect and its place; it is zero where force and volume derive from one
+    potential.
+    """
     return [
-        NamedValue("Maxwell defect", defect.worst, defect.unit, remark=f"|dF/dp + dV/dL| {defect.place}"),
-        NamedValue("relative Maxwell defect", defect.relative, "1", "%", remark="of the maximum of -dV/dL"),
+        NamedValue(
+            "Maxwell defect", defect.worst, defect.unit, remark=f"|dF/dp + dV/dL| {defect.place}"
+        ),
+        NamedValue(
+            "relative Maxwell defect", defect.relative, "1", "%", remark="of the maximum of -dV/dL"
+        ),
     ]
 
 
@@ -238,22 +303,42 @@ def _tables(fit: VolumeFit) -> tuple[Table, Table]:
     volumes = {
         "contraction": TableColumn(contraction, "1", "%"),
         "volume": TableColumn(np.asarray(fit.geometry.volume(contraction)), "m3", "cm3"),
-        "standard deviation": TableColumn(fit.standard_deviation(contraction), "m3", "cm3", digits=2),
+        "standard deviation": TableColumn(
+            fit.standard_deviation(contraction), "m3", "cm3", digits=2
+        ),
     }
-    names, least = sorted(fit.aicc, key=lambda name: fit.aicc[name]), min(fit.aicc.values())
+    names = sorted(fit.aicc, key=lambda name: fit.aicc[name])
+    least = min(fit.aicc.values())
     laws = {"law": names, "AICc above the best": [fit.aicc[name] - least for name in names]}
     brief = (0, VOLUMES // 2, VOLUMES - 1)
-    return Table("volume", "Volume of the muscle", volumes, brief=brief), Table("volume-laws", "Volume laws", laws)
+    return Table("volume", "Volume of the muscle", volumes, brief=brief), Table(
+        "volume-laws", "Volume laws", laws
+    )
 
 
 def _volume_figure(fit: VolumeFit) -> Any:
     figure, axes = plotting.new_figure()
     contraction = np.linspace(fit.points.contraction.min(), fit.points.contraction.max(), 201)
-    volume, error = np.asarray(fit.geometry.volume(contraction)), 2 * fit.standard_deviation(contraction)
-    axes.plot(100 * contraction, 1e6 * volume, color=plotting.LINES[0], label=type(fit.geometry).__name__)
-    axes.fill_between(100 * contraction, 1e6 * (volume - error), 1e6 * (volume + error), color=plotting.LINES[0],
-                      alpha=0.25, linewidth=0)  # fmt: skip
-    axes.plot(100 * fit.points.contraction, 1e6 * fit.points.volume, ".", color=plotting.BLACK, label="measured")
+    volume = np.asarray(fit.geometry.volume(contraction))
+    error = 2 * fit.standard_deviation(contraction)
+    axes.plot(
+        100 * contraction, 1e6 * volume, color=plotting.LINES[0], label=type(fit.geometry).__name__
+    )
+    axes.fill_between(
+        100 * contraction,
+        1e6 * (volume - error),
+        1e6 * (volume + error),
+        color=plotting.LINES[0],
+        alpha=0.25,
+        linewidth=0,
+    )
+    axes.plot(
+        100 * fit.points.contraction,
+        1e6 * fit.points.volume,
+        ".",
+        color=plotting.BLACK,
+        label="measured",
+    )
     axes.set(xlabel="contraction [%]", ylabel="volume [cm³]")
     axes.legend()
     return figure
@@ -263,12 +348,19 @@ def _reciprocity_figure(fit: VolumeFit, law: Characteristic, validity_range: Val
     figure, axes = plotting.new_figure()
     low, high = validity_range.contraction
     measured = fit.points.contraction
-    contraction = np.linspace(max(low, float(measured.min())), min(high, float(measured.max())), 121)
+    contraction = np.linspace(
+        max(low, float(measured.min())), min(high, float(measured.max())), 121
+    )
     for i, pressure in enumerate(np.linspace(*validity_range.pressure, LEVELS + 2)[1:-1]):
         pressures = np.full(contraction.size, pressure)
         taut = np.asarray(law.force(pressures, contraction)) > 0
         slope = np.where(taut, law.slopes(pressures, contraction).by_pressure, np.nan)
-        axes.plot(100 * contraction, 1e4 * slope, color=plotting.LINES[i + 1], label=f"dF/dp, {pressure / 1e3:.4g} kPa")
+        axes.plot(
+            100 * contraction,
+            1e4 * slope,
+            color=plotting.LINES[i + 1],
+            label=f"dF/dp, {pressure / 1e3:.4g} kPa",
+        )
     geometry = fit.geometry
     area = np.asarray(geometry.volume_derivative(contraction)) / geometry.resting_length
     axes.plot(100 * contraction, 1e4 * area, color=plotting.BLACK, linewidth=2, label="-dV/dL")

@@ -1,5 +1,5 @@
-"""Rules by which rows count in a fit: losses, censored observations (slack muscle, limits of the sensor), weights of
-different test rigs."""
+"""Rules by which rows count in a fit: losses, censored observations (slack muscle, limits of the
+sensor), weights of different test rigs."""
 
 import abc
 import dataclasses
@@ -19,7 +19,9 @@ ROBUST_LIMIT = 6.0
 
 
 class Loss(abc.ABC):
-    """A function rho of the squared scaled residuals; a fit minimises the sum of scale^2 rho((residual/scale)^2)."""
+    """A function rho of the squared scaled residuals; a fit minimises the sum of scale^2
+    rho((residual/scale)^2).
+    """
 
     scale: float
 
@@ -27,18 +29,23 @@ class Loss(abc.ABC):
         check_field_types(self)
         if not 0 < self.scale < np.inf:
             raise ParameterError(
-                f"{type(self).__name__}.scale is {self.scale!r}; it must be positive and finite, in the unit of the "
-                "fitted quantity. Use about three times the standard deviation of the noise."
+                f"{type(self).__name__}.scale is {self.scale!r}; it must be positive and finite, in"
+                " the unit of the fitted quantity. Use about three times the standard deviation of"
+                " the noise."
             )
 
     def limit(self, residuals: Array) -> float:
-        """The magnitude to which residuals (N,) are limited in errors of a robust fit; infinite for least squares. It
-        is six robust standard deviations, 1.4826 times the median magnitude, and at least `scale` (chosen)."""
+        """The magnitude to which residuals (N,) are limited in errors of a robust fit; infinite for
+        least squares. It is six robust standard deviations, 1.4826 times the median magnitude, and
+        at least `scale` (chosen).
+        """
         return max(self.scale, ROBUST_LIMIT * 1.4826 * float(np.median(np.abs(residuals))))
 
     @abc.abstractmethod
     def rho(self, z: Array) -> Array:
-        """rho(z) and its first and second derivative, shape (3, N), for z = (residual/scale)^2 >= 0, shape (N,)."""
+        """rho(z) and its first and second derivative, shape (3, N), for z = (residual/scale)^2 >=
+        0, shape (N,).
+        """
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,7 +66,8 @@ class Huber(Loss):
     """rho = z for z <= 1, 2 sqrt(z) - 1 beyond: residuals above `scale` contribute linearly.
 
     `scale` has the unit of the fitted quantity [SI].
-    Reference: Huber, P. J. (1964), "Robust estimation of a location parameter", Annals of Mathematical Statistics.
+    Reference: Huber, P. J. (1964), "Robust estimation of a location parameter", Annals of
+    Mathematical Statistics.
     """
 
     scale: float
@@ -67,17 +75,20 @@ class Huber(Loss):
     def rho(self, z: Array) -> Array:
         root = np.sqrt(np.maximum(z, 1.0))
         inside = z <= 1.0
-        return np.stack([np.where(inside, z, 2 * root - 1), 1 / root, np.where(inside, 0.0, -0.5 / root**3)])
+        return np.stack(
+            [np.where(inside, z, 2 * root - 1), 1 / root, np.where(inside, 0.0, -0.5 / root**3)]
+        )
 
 
 @dataclasses.dataclass(frozen=True)
 class Censoring:
-    """The range of force [N] within which a row is a measured value; at its limits and beyond it is a bound.
+    """The range of force [N] within which a row is a measured value; at its limits and beyond it is
+    a bound.
 
-    A row at or below `min_force` states that the force of the law is at most `min_force` there, since a slack muscle
-    cannot push; a row at or above `max_force`, that it is at least `max_force`. Such a censored row contributes to the
-    fit only where the law violates this bound. Set `min_force` to the resolution of the sensor where slack rows read
-    slightly more than 0.
+    A row at or below `min_force` states that the force of the law is at most `min_force` there,
+    since a slack muscle cannot push; a row at or above `max_force`, that it is at least
+    `max_force`. Such a censored row contributes to the fit only where the law violates this bound.
+    Set `min_force` to the resolution of the sensor where slack rows read slightly more than 0.
     """
 
     min_force: float = 0.0
@@ -87,7 +98,9 @@ class Censoring:
         check_field_types(self)
 
     def signs(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored above."""
+        """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored
+        above.
+        """
         return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
 
 
@@ -96,8 +109,10 @@ UNCENSORED = Censoring(-math.inf, math.inf)
 
 
 def default_censoring(law: Characteristic) -> Censoring:
-    """The range of force to which a force law is clamped, from zero if it has no clamp. Laws that give contraction or
-    pressure are measured with suspended loads, of which zero is an ordinary value: no row is censored."""
+    """The range of force to which a force law is clamped, from zero if it has no clamp. Laws that
+    give contraction or pressure are measured with suspended loads, of which zero is an ordinary
+    value: no row is censored.
+    """
     if not isinstance(law, ForceLaw):
         return UNCENSORED
     return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
@@ -105,40 +120,51 @@ def default_censoring(law: Characteristic) -> Censoring:
 
 @remembered
 def force_limits(runs: Sequence[Recording]) -> Censoring:
-    """The range of the force sensor, where the recordings show a limit at which it saturates. The limits are estimated
-    only if every recording has a time column and all come from one test rig; otherwise the range is unlimited."""
-    timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
+    """The range of the force sensor, where the recordings show a limit at which it saturates. The
+    limits are estimated only if every recording has a time column and all come from one test rig;
+    otherwise the range is unlimited.
+    """
+    timed = bool(runs) and all(
+        "time" in run.columns and "force" in run.columns and len(run) for run in runs
+    )
     if not timed or sensor_deviations(runs, "force") is not None:
         return UNCENSORED
-    sensor = estimate_sensors([Recording({"force": run.columns["force"]}, run.origin) for run in runs])["force"]
+    sensor = estimate_sensors(
+        [Recording({"force": run.columns["force"]}, run.origin) for run in runs]
+    )["force"]
     margin = 0.25 * sensor.resolution
     return Censoring(sensor.lower_limit + margin, sensor.upper_limit - margin)
 
 
 MIN_SENSOR_RATIO = 2.0
-"""Minimum ratio of neighbouring standard deviations of two different sensors (chosen: estimates of the standard
-deviation of one sensor differ less)."""
+"""Minimum ratio of neighbouring standard deviations of two different sensors (chosen: estimates of
+the standard deviation of one sensor differ less)."""
 
 
 @remembered
 def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
-    """The standard deviation of one observation in each recording [SI], shape (recordings,). It includes noise and
-    quantisation where every recording has a time column, otherwise quantisation alone, because the rows are then in no
-    known order. Recordings with similar standard deviations are attributed to one test rig and share their median. None
-    where all recordings are of one rig, or a sensor shows neither noise nor resolution."""
+    """The standard deviation of one observation in each recording [SI], shape (recordings,). It
+    includes noise and quantisation where every recording has a time column, otherwise quantisation
+    alone, because the rows are then in no known order. Recordings with similar standard deviations
+    are attributed to one test rig and share their median. None where all recordings are of one rig,
+    or a sensor shows neither noise nor resolution."""
     try:
-        deviations, quantisation = np.array([reading_deviations([run], quantity) for run in runs]).reshape(-1, 2).T
+        deviations, quantisation = (
+            np.array([reading_deviations([run], quantity) for run in runs]).reshape(-1, 2).T
+        )
     except ColumnError:
         return None
     timed = all("time" in run.columns for run in runs)
     single = deviations if timed else quantisation
     if not single.size or not (single > 0).all():
         return None
-    # With the whole resolution, because the noise of readings that change by few steps of the resolution is estimated
-    # as none or as a whole step.
+    # With the whole resolution, because the noise of readings that change by few steps of the
+    # resolution is estimated as none or as a whole step.
     coarse = np.hypot(deviations, quantisation * np.sqrt(12.0)) if timed else quantisation
     order = np.argsort(coarse)
-    rigs = np.split(order, np.flatnonzero(coarse[order][1:] > MIN_SENSOR_RATIO * coarse[order][:-1]) + 1)
+    rigs = np.split(
+        order, np.flatnonzero(coarse[order][1:] > MIN_SENSOR_RATIO * coarse[order][:-1]) + 1
+    )
     if len(rigs) < 2:
         return None
     result = np.empty(single.size)
@@ -149,9 +175,11 @@ def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
 
 @remembered
 def reading_deviations(runs: Sequence[Recording], quantity: str) -> tuple[float, float]:
-    """Standard deviations of one reading of a quantity [SI]: of noise and quantisation, and of quantisation alone; 0
-    where they cannot be estimated."""
+    """Standard deviations of one reading of a quantity [SI]: of noise and quantisation, and of
+    quantisation alone; 0 where they cannot be estimated."""
     columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
-    sensors = estimate_sensors([Recording({quantity: values}, "runs") for values in columns if values.size])
+    sensors = estimate_sensors(
+        [Recording({quantity: values}, "runs") for values in columns if values.size]
+    )
     sensor = sensors.get(quantity)
     return (0.0, 0.0) if sensor is None else (sensor.std, float(sensor.resolution / np.sqrt(12.0)))

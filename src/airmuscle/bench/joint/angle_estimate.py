@@ -1,4 +1,6 @@
-"""AngleEstimate: the angles of an arm from its pressures alone, by free runs from the poses in which episodes begin."""
+"""AngleEstimate: the angles of an arm from its pressures alone, by free runs from the poses in
+which episodes begin.
+"""
 
 import dataclasses
 import itertools
@@ -12,25 +14,33 @@ from .episodes import COVERAGE, Episode, Episodes, in_pairs
 from .free_run import angles
 from .result import ArmFit
 
-MEMBERS, CALIBRATED, EARLIER = 12, 800, 10
-"""Poses from which every episode is run, episodes of the fit whose errors make correction and band, and rows before a
-row whose pressures the correction sees, too (chosen)."""
+MEMBERS = 12
+CALIBRATED = 800
+EARLIER = 10
+"""Poses from which every episode is run, episodes of the fit whose errors make correction and band,
+and rows before a row whose pressures the correction sees, too (chosen)."""
 UNSEEN = 0.5
-"""Spread of the runs, relative to that of their poses, above which the pressures do not determine an angle (chosen)."""
-RIDGE, FEWEST, BLOCKS = 0.3, 10, 4
-"""Weight of the ridge relative to the number of episodes, least number of episodes in a row, and number of blocks of
-episodes that are left out in turn for the band (chosen)."""
+"""Spread of the runs, relative to that of their poses, above which the pressures do not determine
+an angle (chosen).
+"""
+RIDGE = 0.3
+FEWEST = 10
+BLOCKS = 4
+"""Weight of the ridge relative to the number of episodes, least number of episodes in a row, and
+number of blocks of episodes that are left out in turn for the band (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class AngleEstimate(ShortRepr):
-    """Angles of episodes from their pressures; N episodes of at most R rows, NaN after their ends; `print` it.
+    """Angles of episodes from their pressures; N episodes of at most R rows, NaN after their ends;
+    `print` it.
 
     angle     (N, R, J) [rad] mean of the runs from all poses, corrected
-    spread    (N, R, J) [rad] standard deviation of these runs: large where the joint has not moved since the start
-    band      (R, J) [rad] half-width that holds 95 % of the errors of the fitted episodes at this row
-    measured  (N, R, J) [rad]; `range` (J,) [rad] of the fitted angles between their 1 and 99 % quantiles
-    unseen    (J,) share of the rows where pressures alone do not determine the angle: motion is needed to see it
+    spread    (N, R, J) [rad] standard deviation of these runs: large where the joint has not moved
+    since the start band      (R, J) [rad] half-width that holds 95 % of the errors of the fitted
+    episodes at this row measured  (N, R, J) [rad]; `range` (J,) [rad] of the fitted angles between
+    their 1 and 99 % quantiles unseen    (J,) share of the rows where pressures alone do not
+    determine the angle: motion is needed to see it
     """
 
     angle: Array
@@ -48,47 +58,63 @@ class AngleEstimate(ShortRepr):
     @property
     def coverage(self) -> Array:
         """Share (J,) of the rows inside the band."""
-        inside = np.abs(self.angle - self.measured) <= self.band  # false after the end of an episode
+        inside = (
+            np.abs(self.angle - self.measured) <= self.band
+        )  # false after the end of an episode
         return np.asarray(inside.sum(axis=(0, 1)) / np.isfinite(self.measured).sum(axis=(0, 1)))
 
     def __str__(self) -> str:
-        joints = zip(itertools.count(1), self.rms, self.range, self.coverage, self.unseen, strict=False)
+        joints = zip(
+            itertools.count(1), self.rms, self.range, self.coverage, self.unseen, strict=False
+        )
         return "\n".join(
-            f"joint {j}: {np.degrees(error):.3g} deg rms from pressures alone, {100 * error / span:.3g} % of its "
-            f"range, {100 * inside:.3g} % inside the 95 % band; in {100 * unseen:.3g} % of the rows the angle is not "
-            "seen until the joint moves"
+            f"joint {j}: {np.degrees(error):.3g} deg rms from pressures alone,"
+            f" {100 * error / span:.3g} % of its range, {100 * inside:.3g} % inside the 95 % band;"
+            f" in {100 * unseen:.3g} % of the rows the angle is not seen until the joint moves"
             for j, error, span, inside, unseen in joints
         )
 
 
-def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, seed: int = 0) -> AngleEstimate:
+def estimate_angles(
+    fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, seed: int = 0
+) -> AngleEstimate:
     """Angles and bands of episodes that are known by their pressures only.
 
-    The identified arm runs freely from each of 12 poses. These are first rows of the fitted episodes, because an arm
-    begins in a place that is known from them; with `any_pose` they are rows anywhere in these episodes. What differs
-    between the runs is what the pressures do not tell: an angle that stiction holds is not seen until it moves. Speeds
-    at the start are 0; readings count until the delay of their sensors after each row. The mean of the runs is
-    corrected by what it lacked in fitted episodes: ridge regressions of every row on the angles so found and on the
-    pressures; the band holds the errors of a quarter of these episodes with the regressions of the others. The measured
-    angles serve only for `rms` and `coverage`. Raises ParameterError for other numbers of joints and muscles than those
-    of the fit.
+    The identified arm runs freely from each of 12 poses. These are first rows of the fitted
+    episodes, because an arm begins in a place that is known from them; with `any_pose` they are
+    rows anywhere in these episodes. What differs between the runs is what the pressures do not
+    tell: an angle that stiction holds is not seen until it moves. Speeds at the start are 0;
+    readings count until the delay of their sensors after each row. The mean of the runs is
+    corrected by what it lacked in fitted episodes: ridge regressions of every row on the angles so
+    found and on the pressures; the band holds the errors of a quarter of these episodes with the
+    regressions of the others. The measured angles serve only for `rms` and `coverage`. Raises
+    ParameterError for other numbers of joints and muscles than those of the fit.
     """
     if episodes.muscles != len(fit.arm.muscle) or episodes.joints != len(fit.pairs):
         raise ParameterError(
-            f"estimate_angles: the episodes have {episodes.joints} joints and {episodes.muscles} pressures, the fit "
-            f"{len(fit.pairs)} and {len(fit.arm.muscle)}; give episodes of the same arm."
+            f"estimate_angles: the episodes have {episodes.joints} joints and {episodes.muscles}"
+            f" pressures, the fit {len(fit.pairs)} and {len(fit.arm.muscle)}; give episodes of the"
+            " same arm."
         )
     fitted = in_pairs(fit.inspection.episodes[: fit.fitted], fit.pairs)
     rng = np.random.default_rng(seed)
     rows = fitted.rows("angle") if any_pose else np.array([run.angle[0] for run in fitted.runs])
     poses = rows[rng.choice(len(rows), min(MEMBERS, len(rows)), replace=False)]
-    known, own = fitted[-CALIBRATED:], in_pairs(episodes, fit.pairs)
+    known = fitted[-CALIBRATED:]
+    own = in_pairs(episodes, fit.pairs)
     before, _ = _runs(fit.arm, known.runs, known.sample_time, fit.inspection.delay, poses)
-    seen, errors = _seen(before, known.runs), before - _padded(known.runs, "angle")
-    block = np.arange(len(known)) * BLOCKS // len(known)  # in time, so that a drift of the arm widens the band
+    seen = _seen(before, known.runs)
+    errors = before - _padded(known.runs, "angle")
+    block = (
+        np.arange(len(known)) * BLOCKS // len(known)
+    )  # in time, so that a drift of the arm widens the band
     parts = [(block == b, block != b) for b in range(BLOCKS)]
-    left = [errors[out] - _predicted_errors(seen[rest], errors[rest], seen[out]) for out, rest in parts]
-    level = min(1.0, COVERAGE * (1 + 1 / len(known)))  # so that it holds for one further episode, too
+    left = [
+        errors[out] - _predicted_errors(seen[rest], errors[rest], seen[out]) for out, rest in parts
+    ]
+    level = min(
+        1.0, COVERAGE * (1 + 1 / len(known))
+    )  # so that it holds for one further episode, too
     limits = np.nanquantile(np.abs(np.concatenate(left)), level, axis=0, method="higher")
     angle, spread = _runs(fit.arm, own.runs, own.sample_time, fit.inspection.delay, poses)
     angle = angle - _predicted_errors(seen, errors, _seen(angle, own.runs))
@@ -100,24 +126,32 @@ def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, 
 
 
 def _predicted_errors(seen: Array, errors: Array, further: Array) -> Array:
-    """Errors (N', R', J) of further episodes by ridge regressions of errors (N, R, J), one for each row, on what is
-    `seen` (N, R, F) there; rows that fewer than FEWEST episodes reach have the regression of the row before."""
+    """Errors (N', R', J) of further episodes by ridge regressions of errors (N, R, J), one for each
+    row, on what is `seen` (N, R, F) there; rows that fewer than FEWEST episodes reach have the
+    regression of the row before.
+    """
     enough = np.isfinite(errors).all(axis=2).sum(axis=0) >= FEWEST
     last = max(int(np.count_nonzero(enough)) - 1, 0)
     found = np.zeros((len(further), further.shape[1], errors.shape[2]))
     for row in range(further.shape[1]) if enough.any() else ():
         k = min(row, last)
         there = np.isfinite(errors[:, k]).all(axis=1)
-        x, e = seen[there, k], errors[there, k]
-        mean, scale = x.mean(axis=0), x.std(axis=0) + 1e-9
+        x = seen[there, k]
+        e = errors[there, k]
+        mean = x.mean(axis=0)
+        scale = x.std(axis=0) + 1e-9
         z = (x - mean) / scale
-        slope = np.linalg.solve(z.T @ z + RIDGE * len(z) * np.eye(z.shape[1]), z.T @ (e - e.mean(axis=0)))
+        slope = np.linalg.solve(
+            z.T @ z + RIDGE * len(z) * np.eye(z.shape[1]), z.T @ (e - e.mean(axis=0))
+        )
         found[:, row] = e.mean(axis=0) + (further[:, row] - mean) / scale @ slope
     return found
 
 
 def _seen(angle: Array, runs: Sequence[Episode]) -> Array:
-    """What a correction sees in every row (N, R, F): angles of the runs, pressures of the row and of an earlier one."""
+    """What a correction sees in every row (N, R, F): angles of the runs, pressures of the row and
+    of an earlier one.
+    """
     pressure = _padded(runs, "pressure", held=True)
     earlier = np.maximum(np.arange(pressure.shape[1]) - EARLIER, 0)
     return np.concatenate([angle, pressure, pressure[:, earlier]], axis=-1)
@@ -126,23 +160,34 @@ def _seen(angle: Array, runs: Sequence[Episode]) -> Array:
 def _runs(
     arm: PressureDriven, runs: Sequence[Episode], sample_time: float, delay: int, poses: Array
 ) -> tuple[Array, Array]:
-    """Mean and standard deviation (N, R, J) of the free runs from all poses; NaN after the end of an episode."""
+    """Mean and standard deviation (N, R, J) of the free runs from all poses; NaN after the end of
+    an episode.
+    """
     pressure = _padded(runs, "pressure", held=True)
-    rows, names = pressure.shape[1], [c.name for c in arm.mechanism.coordinates]
+    rows = pressure.shape[1]
+    names = [c.name for c in arm.mechanism.coordinates]
     later = np.minimum(np.arange(rows) + delay, rows - 1)
     state = {s.name: np.zeros(len(runs) * len(poses)) for s in arm.states}
     state |= {name: np.tile(poses[:, j], len(runs)) for j, name in enumerate(names)}
-    state |= {f"{p}pressure": np.repeat(pressure[:, later[0], i], len(poses)) for i, p in enumerate(arm.prefixes)}
+    state |= {
+        f"{p}pressure": np.repeat(pressure[:, later[0], i], len(poses))
+        for i, p in enumerate(arm.prefixes)
+    }
     found = angles(arm, np.repeat(pressure[:, later], len(poses), axis=0), state, sample_time)
     stacked = found.reshape(len(runs), len(poses), rows, len(names))
     ended = np.isnan(_padded(runs, "angle"))
-    return np.where(ended, np.nan, stacked.mean(axis=1)), np.where(ended, np.nan, stacked.std(axis=1))
+    return np.where(ended, np.nan, stacked.mean(axis=1)), np.where(
+        ended, np.nan, stacked.std(axis=1)
+    )
 
 
 def _padded(runs: Sequence[Episode], name: str, held: bool = False) -> Array:
-    """One quantity of all episodes (N, R, columns), its last row held or NaN after the end of an episode."""
+    """One quantity of all episodes (N, R, columns), its last row held or NaN after the end of an
+    episode.
+    """
     columns = [getattr(run, name) for run in runs]
-    longest, padded = max(map(len, columns)), []
+    longest = max(map(len, columns))
+    padded = []
     for column in columns:
         end = column[-1:] if held else np.full_like(column[-1:], np.nan)
         padded.append(np.concatenate([column, np.repeat(end, longest - len(column), axis=0)]))

@@ -1,4 +1,6 @@
-"""Stochastic Gauss-Newton descent of the free run over windows, joint by joint, with exact gradients."""
+"""Stochastic Gauss-Newton descent of the free run over windows, joint by joint, with exact
+gradients.
+"""
 
 import dataclasses
 import functools
@@ -16,23 +18,56 @@ from .episodes import HISTORY, Windows, WindowSignal, start_of
 Arm = TypeVar("Arm", bound=System)
 SUBSTEPS = 3
 """Steps of the integrator in a row."""
-CLIP, OUTLIER = 0.3, 3.0
-"""Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor (chosen)."""
-MEMORY, RATE, DAMPING, LATE_DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 1e-3, 0.4
-"""Share of the past in the running averages, step, damping and that of the second half of a stage, without which a
-search stops far up a valley of two parameters that act alike; greatest relative change of a parameter (chosen)."""
-CHECKED, LOST, SAMPLE = 10, 1.5, 1600
-"""Iterations after which the cost of their mean is checked, its ratio to the best one from which the search has lost
-its way, and windows from which it is computed (chosen)."""
+CLIP = 0.3
+OUTLIER = 3.0
+"""Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor
+(chosen).
+"""
+MEMORY = 0.9
+RATE = 0.3
+DAMPING = 1e-2
+LATE_DAMPING = 1e-3
+MAX_CHANGE = 0.4
+"""Share of the past in the running averages, step, damping and that of the second half of a stage,
+without which a search stops far up a valley of two parameters that act alike; greatest relative
+change of a parameter (chosen)."""
+CHECKED = 10
+LOST = 1.5
+SAMPLE = 1600
+"""Iterations after which the cost of their mean is checked, its ratio to the best one from which
+the search has lost its way, and windows from which it is computed (chosen)."""
 PRIOR = 5.0
-"""Weight of a prior value, in windows times rows with an error of one standard deviation (chosen)."""
-LOW = {"presliding_angle": 1.5e-3, "lags": 2e-3, "rotor_inertia": 1e-3, "stribeck_speed": 0.1, "slack_width": 0.3}
-"""Lower limits of a search above those of the model, which the step of the integrator resolves (chosen)."""
+"""Weight of a prior value, in windows times rows with an error of one standard deviation
+(chosen).
+"""
+LOW = {
+    "presliding_angle": 1.5e-3,
+    "lags": 2e-3,
+    "rotor_inertia": 1e-3,
+    "stribeck_speed": 0.1,
+    "slack_width": 0.3,
+}
+"""Lower limits of a search above those of the model, which the step of the integrator resolves
+(chosen).
+"""
 SIZES = {
-    "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 1.0,
-    "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.2,
-    "slack_width": 5.0, "inertia": 0.03, "energies": 1.0, "friction_logs": 0.3, "bearing_arms": 0.05,
-}  # fmt: skip
+    "damping": 0.3,
+    "coulomb_torque": 0.5,
+    "load_arms": 4e-3,
+    "presliding_angle": 2e-3,
+    "lags": 0.01,
+    "mass": 1.0,
+    "static_excess": 0.3,
+    "stribeck_speed": 1.0,
+    "zero_angle": 1.0,
+    "rotor_inertia": 0.03,
+    "centre": 0.2,
+    "slack_width": 5.0,
+    "inertia": 0.03,
+    "energies": 1.0,
+    "friction_logs": 0.3,
+    "bearing_arms": 0.05,
+}
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
 
 
@@ -43,7 +78,9 @@ def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
 
 @dataclasses.dataclass(frozen=True)
 class SearchStage:
-    """Iterations with windows of `rows` rows, or of all if they have fewer, `batch` windows each."""
+    """Iterations with windows of `rows` rows, or of all if they have fewer, `batch` windows
+    each.
+    """
 
     rows: int
     iterations: int
@@ -52,7 +89,9 @@ class SearchStage:
 
 @dataclasses.dataclass(eq=False)
 class Descent:
-    """Search for the parameters of an arm, by their paths in it, on which the motion of one joint depends."""
+    """Search for the parameters of an arm, by their paths in it, on which the motion of one joint
+    depends.
+    """
 
     arm: PressureDriven
     windows: Windows
@@ -60,10 +99,14 @@ class Descent:
     names: Sequence[str]
     seed: int = 0
     prior: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Values towards which parameters are drawn that the record hardly determines, by path; with `ridge` as weight."""
+    """Values towards which parameters are drawn that the record hardly determines, by path; with
+    `ridge` as weight.
+    """
     ridge: float = PRIOR
     errors: Callable[[PressureDriven, int, Windows], Array] = joint_errors
-    """Errors (N, rows) [rad] of the joint, from which the cost comes: in its own free run or in that of all joints."""
+    """Errors (N, rows) [rad] of the joint, from which the cost comes: in its own free run or in
+    that of all joints.
+    """
     stopped: bool = False
     """Whether another thread has ended the search."""
 
@@ -71,27 +114,38 @@ class Descent:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
         self.values = np.array([float(leaves[path].value) for path in self.names])
         self.sizes = np.array([typical_size(path, leaves) for path in self.names])
-        self.low = np.array([max(leaves[p].declared.bounds[0], LOW.get(_field(p), -np.inf)) for p in self.names])
+        self.low = np.array(
+            [max(leaves[p].declared.bounds[0], LOW.get(_field(p), -np.inf)) for p in self.names]
+        )
         self.high = np.array([leaves[p].declared.bounds[1] for p in self.names])
         self.rng = np.random.default_rng(self.seed)
         self.spread = 0.1
 
     def run(self, schedule: SearchStage) -> float:
-        """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost, which is returned;
-        a search that has lost its way goes on from that mean with half the step."""
-        count, rate = len(self.names), RATE
-        normal, slope, tail = np.zeros((count, count)), np.zeros(count), []
+        """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost,
+        which is returned; a search that has lost its way goes on from that mean with half the
+        step."""
+        count = len(self.names)
+        rate = RATE
+        normal = np.zeros((count, count))
+        slope = np.zeros(count)
+        tail = []
         rows = min(schedule.rows, self.windows.rows)
-        best, cost = self.values.copy(), self._cost(self.values, rows)
+        best = self.values.copy()
+        cost = self._cost(self.values, rows)
         for step in range(1, schedule.iterations + 1):
             if self.stopped:
                 break
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
-            error, gradient = gradients(self.arm, self.joint, self.names, self.windows.part(np.sort(which), rows))
+            error, gradient = gradients(
+                self.arm, self.joint, self.names, self.windows.part(np.sort(which), rows)
+            )
             self.spread = 0.9 * self.spread + 0.1 * max(float(np.sqrt(np.mean(error**2))), 1e-3)
             weighted = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None]
             flat = weighted.reshape(-1, count).T
-            normal = MEMORY * normal + (1 - MEMORY) * (flat @ gradient.reshape(-1, count) / self.spread**2)
+            normal = MEMORY * normal + (1 - MEMORY) * (
+                flat @ gradient.reshape(-1, count) / self.spread**2
+            )
             slope = MEMORY * slope + (1 - MEMORY) * (flat @ error.ravel() / self.spread**2)
             late = step / schedule.iterations
             damping = DAMPING if late <= 0.5 else LATE_DAMPING
@@ -101,16 +155,21 @@ class Descent:
                 mean = np.mean(tail[-CHECKED:], axis=0)
                 reached = self._cost(mean, rows)
                 if reached < cost:
-                    best, cost = mean, reached
+                    best = mean
+                    cost = reached
                 elif not reached < LOST * cost:
-                    self.values, rate = best.copy(), 0.5 * rate
+                    self.values = best.copy()
+                    rate = 0.5 * rate
         self.values = best
         self.arm = with_values(self.arm, self.names, self.values)
         return cost
 
     def _cost(self, values: Array, rows: int) -> float:
-        """Robust mean square error [rad^2] of the free run of the joint over a fixed sample of the windows."""
-        arm, some = with_values(self.arm, self.names, values), self.windows.sample(SAMPLE, rows)
+        """Robust mean square error [rad^2] of the free run of the joint over a fixed sample of the
+        windows.
+        """
+        arm = with_values(self.arm, self.names, values)
+        some = self.windows.sample(SAMPLE, rows)
         errors = self.errors(arm, self.joint, some)
         errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
         errors = errors[some.counts[:, HISTORY + 1 :]]
@@ -122,45 +181,77 @@ class Descent:
         normal = normal + np.diag(pull)
         scale = np.sqrt(np.diag(normal))
         scale = scale + 1e-6 * np.max(scale * self.sizes) / self.sizes
-        change = -np.linalg.solve(normal / np.outer(scale, scale) + damping * np.eye(len(slope)), slope / scale) / scale
+        change = (
+            -np.linalg.solve(
+                normal / np.outer(scale, scale) + damping * np.eye(len(slope)), slope / scale
+            )
+            / scale
+        )
         limit = MAX_CHANGE * np.maximum(np.abs(self.values), self.sizes)
-        self.values = np.clip(self.values + np.clip(rate * change, -limit, limit), self.low, self.high)
+        self.values = np.clip(
+            self.values + np.clip(rate * change, -limit, limit), self.low, self.high
+        )
         self.arm = with_values(self.arm, self.names, self.values)
 
 
 def with_slopes(
-    system: System, paths: Sequence[str], inputs: Array, step: float, state: Mapping[str, Array], names: Sequence[str]
+    system: System,
+    paths: Sequence[str],
+    inputs: Array,
+    step: float,
+    state: Mapping[str, Array],
+    names: Sequence[str],
 ) -> tuple[Array, Array]:
-    """Columns (N, R, J) of a system from states (N,) under inputs (N, R, m) at rows of `step` [s], linear between them,
-    and their derivatives (N, R, J, P) by the parameters of these paths; `state` may have those of the initial state."""
-    observed, keep, own = system, list(names), [[sensitivity(n, k) for k in range(len(paths))] for n in names]
+    """Columns (N, R, J) of a system from states (N,) under inputs (N, R, m) at rows of `step` [s],
+    linear between them, and their derivatives (N, R, J, P) by the parameters of these paths;
+    `state` may have those of the initial state.
+    """
+    observed = system
+    keep = list(names)
+    own = [[sensitivity(n, k) for k in range(len(paths))] for n in names]
     if paths:
         zeros = np.zeros(len(inputs))
-        state = {sensitivity(s.name, k): zeros for s in system.states for k in range(len(paths))} | dict(state)
-        observed = WithSensitivities(system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names))
+        state = {
+            sensitivity(s.name, k): zeros for s in system.states for k in range(len(paths))
+        } | dict(state)
+        observed = WithSensitivities(
+            system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names)
+        )
         keep += itertools.chain(*own)
-    times, signals = step * np.arange(inputs.shape[1]), [WindowSignal(np.ascontiguousarray(u), step) for u in inputs]
+    times = step * np.arange(inputs.shape[1])
+    signals = [WindowSignal(np.ascontiguousarray(u), step) for u in inputs]
     run = simulate_batch(
-        observed, {}, signals, duration=float(times[-1]), initial_states=state, keep=keep, output_times=times,
+        observed,
+        {},
+        signals,
+        duration=float(times[-1]),
+        initial_states=state,
+        keep=keep,
+        output_times=times,
         integrator=RungeKutta4(step / SUBSTEPS),
-    )  # fmt: skip
+    )
     columns = np.stack([run[name] for name in names], axis=-1)
     slopes = [np.stack([run[name] for name in row], axis=-1) for row in own if row]
     return columns, np.stack(slopes, axis=2) if slopes else np.zeros((*columns.shape, 0))
 
 
-def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
-    """Errors (N, rows) [rad] of the free run of one joint and their derivatives (N, rows, P) by the parameters, both 0
-    in rows of outliers; the other joints move as measured."""
+def gradients(
+    arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows
+) -> tuple[Array, Array]:
+    """Errors (N, rows) [rad] of the free run of one joint and their derivatives (N, rows, P) by the
+    parameters, both 0 in rows of outliers; the other joints move as measured."""
     error, gradient = _run_of_joint(arm, joint, paths, windows)
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
     lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
     return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
 
 
-def _run_of_joint(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
+def _run_of_joint(
+    arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows
+) -> tuple[Array, Array]:
     """Errors and derivatives as of `gradients`, also those of outliers."""
-    system, known = OneJoint(arm, joint), start_of(arm, windows)
+    system = OneJoint(arm, joint)
+    known = start_of(arm, windows)
     names = [s.name for s in system.states]
     state = {name: known[name] for name in names}
     values = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm)}
@@ -191,7 +282,9 @@ def _field(path: str) -> str:
 
 
 def typical_size(path: str, leaves: Mapping[str, tree.Leaf]) -> float:
-    """Typical size of a parameter; the coefficients of a polynomial in the contraction grow tenfold with each power."""
+    """Typical size of a parameter; the coefficients of a polynomial in the contraction grow tenfold
+    with each power.
+    """
     field = _field(path)
     if field not in ("area", "passive_force"):
         return SIZES[field]
@@ -201,12 +294,14 @@ def typical_size(path: str, leaves: Mapping[str, tree.Leaf]) -> float:
 
 @model
 class OneJoint(System):
-    """Joint j of an arm: M_jj theta_j'' = tau_j - sum_i M_ji theta_i'' - h_j + Q_f, the other joints i as inputs.
+    """Joint j of an arm: M_jj theta_j'' = tau_j - sum_i M_ji theta_i'' - h_j + Q_f, the other
+    joints i as inputs.
 
-    M, h and the friction Q_f are those of the arm, so that a fit of all its joints in this form finds the parameters of
-    the arm, but no system has more states than one joint. Inputs are the measured pressures, and angle, speed and
-    acceleration of the other joints. The muscles of the joint act with their lags; the tensions of the others, which
-    load its friction, follow their readings at once.
+    M, h and the friction Q_f are those of the arm, so that a fit of all its joints in this form
+    finds the parameters of the arm, but no system has more states than one joint. Inputs are the
+    measured pressures, and angle, speed and acceleration of the other joints. The muscles of the
+    joint act with their lags; the tensions of the others, which load its friction, follow their
+    readings at once.
     """
 
     arm: PressureDriven
@@ -221,7 +316,9 @@ class OneJoint(System):
     @functools.cached_property
     def own(self) -> tuple[int, ...]:
         """Numbers of the muscles that cross the joint."""
-        return tuple(i for i, route in enumerate(self.mechanism.routes) if self.joint + 1 in route.joints)
+        return tuple(
+            i for i, route in enumerate(self.mechanism.routes) if self.joint + 1 in route.joints
+        )
 
     @functools.cached_property
     def others(self) -> tuple[int, ...]:
@@ -241,27 +338,40 @@ class OneJoint(System):
         return (*self.arm.inputs, *(n for c in motion for n in (c.name, c.speed, c.acceleration)))
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
-        mechanism, c = self.mechanism, self.mechanism.coordinates[self.joint]
-        place, lengths = {**inputs, **state}, self.arm.resting_lengths
+        mechanism = self.mechanism
+        c = self.mechanism.coordinates[self.joint]
+        place = {**inputs, **state}
+        lengths = self.arm.resting_lengths
         pressures = [
             state[f"{p}pressure"] if i in self.own else inputs[f"{p}measured_pressure"]
             for i, p in enumerate(self.arm.prefixes)
         ]
-        acting = zip(self.arm.muscle, pressures, mechanism.contractions(place, lengths), strict=True)
+        acting = zip(
+            self.arm.muscle, pressures, mechanism.contractions(place, lengths), strict=True
+        )
         tensions = [muscle.tension(p, eps) for muscle, p, eps in acting]
-        others = {mechanism.coordinates[i].name: inputs[mechanism.coordinates[i].acceleration] for i in self.others}
+        others = {
+            mechanism.coordinates[i].name: inputs[mechanism.coordinates[i].acceleration]
+            for i in self.others
+        }
         needed = mechanism.inverse_dynamics(place, place, {**others, c.name: 0.0})[c.name]
         outer = cast(WithStickSlip, self.arm.mechanism)
-        read = {f"{prefix}pressure": p for prefix, p in zip(self.arm.prefixes, pressures, strict=True)}
+        read = {
+            f"{prefix}pressure": p for prefix, p in zip(self.arm.prefixes, pressures, strict=True)
+        }
         forces = outer.generalised_forces({**place, **read}, tensions, lengths)
-        torque, load, element = forces[c.name], forces[friction_load(c)], outer.elements[self.joint]
+        torque = forces[c.name]
+        load = forces[friction_load(c)]
+        element = outer.elements[self.joint]
         bristle = state[self.states[2].name]
         if element.bearing_arms:
             load += outer.bearing_load(self.joint, place, place, others)
         friction = element.torque(bristle, load, state[c.speed])
         rates = {
             c.name: state[c.speed],
-            c.speed: (torque + friction - needed) / mechanism.mass_matrix(place)[self.joint][self.joint],
+            c.speed: (
+                (torque + friction - needed) / mechanism.mass_matrix(place)[self.joint][self.joint]
+            ),
             self.states[2].name: element.bristle_rate(bristle, state[c.speed]),
         }
         for i in self.own:

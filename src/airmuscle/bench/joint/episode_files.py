@@ -1,4 +1,5 @@
-"""Reader of episodes: a folder with one file or bag each, or one file for all, with what a mapping file says of them:
+"""Reader of episodes: a folder with one file or bag each, or one file for all, with what a mapping
+file says of them:
 
 sample_time = "10.46 ms"
 starts = "start"
@@ -41,23 +42,37 @@ TABLES = ("angles", "speeds", "pressures", "commands", "arm")
 KEYS = ("sample_time", "time", "starts", *TABLES)
 TABLE_KEYS = ("columns", "unit", "scale", "divisors")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
-AXES |= {f"+{name}": axis for name, axis in AXES.items()} | {f"-{n}": (-x, -y, -z) for n, (x, y, z) in AXES.items()}
+AXES |= {f"+{name}": axis for name, axis in AXES.items()} | {
+    f"-{n}": (-x, -y, -z) for n, (x, y, z) in AXES.items()
+}
 TIMES = ("t", "time", "stamp", "timestamp")
 """Names of columns of times, in seconds or a thousandth, millionth or billionth of them."""
 SAME_TIME = 0.02
-"""Difference of the decimal logarithms of two sample times, over 3, up to which they are the same (chosen)."""
+"""Difference of the decimal logarithms of two sample times, over 3, up to which they are the same
+(chosen).
+"""
 _DEGREE = 0.017453292519943295
 UNITS = {
     "angles": {"rad": 1.0, "deg": _DEGREE},
     "speeds": {"rad": 1.0, "deg": _DEGREE, "rad/s": 1.0, "deg/s": _DEGREE, "rpm": 6.0 * _DEGREE},
-    "pressures": {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "mbar": 100.0, "psi": 6894.757293168361},
+    "pressures": {
+        "Pa": 1.0,
+        "hPa": 100.0,
+        "kPa": 1e3,
+        "MPa": 1e6,
+        "bar": 1e5,
+        "mbar": 100.0,
+        "psi": 6894.757293168361,
+    },
 }
 """Units of gauge pressures, angles and their speeds, in SI units."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Channels:
-    """Columns of one quantity, or the name of one array with all of them; value = number * scale / divisors."""
+    """Columns of one quantity, or the name of one array with all of them; value = number * scale /
+    divisors.
+    """
 
     columns: tuple[str, ...]
     scale: float = 1.0
@@ -68,9 +83,10 @@ class Channels:
 class EpisodeMapping:
     """Contents of a file of episodes, as its mapping file states them.
 
-    sample_time  [s], or None if `time` names a column [s]; starts: array with the first row of every episode, where a
-    file holds all of them; angles, speeds, pressures, commands: Channels; pairs: for each joint the numbers, from 1, of
-    the muscle that raises its angle and of its antagonist; axes of the joints in the frames of their links.
+    sample_time  [s], or None if `time` names a column [s]; starts: array with the first row of
+    every episode, where a file holds all of them; angles, speeds, pressures, commands: Channels;
+    pairs: for each joint the numbers, from 1, of the muscle that raises its angle and of its
+    antagonist; axes of the joints in the frames of their links.
     """
 
     angles: Channels
@@ -91,10 +107,16 @@ def read_episode_mapping(path: str | Path) -> EpisodeMapping:
     _check_keys(path, "", tables, KEYS)
     for name in ("angles", "pressures"):
         if name not in tables:
-            raise FileError(f"{path}: no table [{name}]; name its columns: [{name}] columns = [...].")
+            raise FileError(
+                f"{path}: no table [{name}]; name its columns: [{name}] columns = [...]."
+            )
     if ("sample_time" in tables) == ("time" in tables):
-        raise FileError(f'{path}: state either sample_time = "10 ms" or time = "name of the column of times [s]".')
-    arm, step = tables.get("arm", {}), tables.get("sample_time")
+        raise FileError(
+            f'{path}: state either sample_time = "10 ms" or time = "name of the column of times'
+            ' [s]".'
+        )
+    arm = tables.get("arm", {})
+    step = tables.get("sample_time")
     _check_keys(path, "arm.", arm, ("pairs", "axes"))
     axes = arm.get("axes", ())
     for name in axes:
@@ -103,14 +125,18 @@ def read_episode_mapping(path: str | Path) -> EpisodeMapping:
     return EpisodeMapping(
         **{name: _channels(path, name, tables[name]) for name in TABLES[:4] if name in tables},
         sample_time=None if step is None else quantity(step, "s", where=f"{path}: sample_time"),
-        time=tables.get("time"), starts=tables.get("starts"), pairs=_pairs(path, arm.get("pairs", ())),
+        time=tables.get("time"),
+        starts=tables.get("starts"),
+        pairs=_pairs(path, arm.get("pairs", ())),
         axes=tuple(AXES[name] for name in axes),
-    )  # fmt: skip
+    )
 
 
 def _check_keys(path: Path, prefix: str, table: Any, known: tuple[str, ...]) -> None:
     if not isinstance(table, Mapping):
-        raise FileError(f"{path}: {prefix.rstrip('.')} must be a table with the keys {', '.join(known)}.")
+        raise FileError(
+            f"{path}: {prefix.rstrip('.')} must be a table with the keys {', '.join(known)}."
+        )
     for key in table:
         if key not in known:
             raise FileError(f"{path}: unknown key '{prefix}{key}'{alternatives(key, known)}")
@@ -120,13 +146,19 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
     _check_keys(path, f"{name}.", table, TABLE_KEYS)
     columns = table.get("columns")
     columns = (columns,) if isinstance(columns, str) else columns
-    if not isinstance(columns, list | tuple) or not columns or not all(isinstance(column, str) for column in columns):
-        raise FileError(f'{path}: {name}.columns must be a name or a list of names, columns = ["q1", "q2"].')
+    if (
+        not isinstance(columns, list | tuple)
+        or not columns
+        or not all(isinstance(column, str) for column in columns)
+    ):
+        raise FileError(
+            f'{path}: {name}.columns must be a name or a list of names, columns = ["q1", "q2"].'
+        )
     allowed = UNITS.get(name, {})
     if "unit" in table and table["unit"] not in tuple(allowed):
         raise FileError(
-            f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}. State other units as "
-            "a number, scale."
+            f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}."
+            " State other units as a number, scale."
         )
     factor = allowed[table["unit"]] if "unit" in table else 1.0
     target = "Pa" if name == "pressures" else "1"
@@ -135,46 +167,59 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
 
 
 def _pairs(path: Path, pairs: Any) -> tuple[tuple[int, int], ...]:
-    whole = isinstance(pairs, list | tuple) and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)
+    whole = isinstance(pairs, list | tuple) and all(
+        isinstance(pair, list) and len(pair) == 2 for pair in pairs
+    )
     flat = [muscle for pair in pairs for muscle in pair] if whole else [None]
-    if not all(isinstance(muscle, int) and muscle > 0 for muscle in flat) or len(set(flat)) < len(flat):
+    if not all(isinstance(muscle, int) and muscle > 0 for muscle in flat) or len(set(flat)) < len(
+        flat
+    ):
         raise FileError(
-            f"{path}: arm.pairs is {pairs}; give for each joint the numbers of two muscles, each muscle once: "
-            "[[1, 2], [3, 4]], first the one that raises the angle."
+            f"{path}: arm.pairs is {pairs}; give for each joint the numbers of two muscles, each"
+            " muscle once: [[1, 2], [3, 4]], first the one that raises the angle."
         )
     return tuple((int(a), int(b)) for a, b in pairs)
 
 
 def read_episodes(source: str | Path, mapping: str | Path | EpisodeMapping) -> Episodes:
-    """Read the episodes of an arm from NPZ, CSV, JSON, HDF5 or Parquet files, ROS bags or RLDS-like steps.
+    """Read the episodes of an arm from NPZ, CSV, JSON, HDF5 or Parquet files, ROS bags or RLDS-like
+    steps.
 
     source   one file or bag, or a folder, whose files and bags are read in the order of their names
     mapping  what the columns are, an EpisodeMapping or the path of a mapping file (TOML)
 
-    A JSON file holds an object of lists, or a list of such objects, one for each episode (.jsonl: one in each line). An
-    HDF5 file holds arrays, or a group for each episode. Steps with an observation and an action are one episode with
-    columns `observation.angle` and so on; so is a bag, with columns `joint_states.position.elbow` and so on. Angles
-    become radians, pressures Pa (or counts times their scale). Raises FileError for a file that cannot be read,
-    ColumnError for a column that is missing, has other rows or is not finite.
+    A JSON file holds an object of lists, or a list of such objects, one for each episode (.jsonl:
+    one in each line). An HDF5 file holds arrays, or a group for each episode. Steps with an
+    observation and an action are one episode with columns `observation.angle` and so on; so is a
+    bag, with columns `joint_states.position.elbow` and so on. Angles become radians, pressures Pa
+    (or counts times their scale). Raises FileError for a file that cannot be read, ColumnError for
+    a column that is missing, has other rows or is not finite.
     """
     path = Path(source)
     rules = mapping if isinstance(mapping, EpisodeMapping) else read_episode_mapping(mapping)
     files = find_episode_files(path)
     found = join([_episodes_of(each, rules) for each in files])
     kinds = sorted({each.suffix or "bags" for each in files})
-    count = f"{counted(len(found), 'episode')} from {counted(len(files), 'file')} ({', '.join(kinds)})"
+    count = (
+        f"{counted(len(found), 'episode')} from {counted(len(files), 'file')} ({', '.join(kinds)})"
+    )
     return dataclasses.replace(found, notes=(count, *found.notes))
 
 
 def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
     tables, notes = read_arrays(path, mapping.sample_time)
-    runs, times = [], []
+    runs = []
+    times = []
     for number, arrays in enumerate(tables):
         name = path.name if len(tables) == 1 else f"{path.name}, episode {number + 1}"
         whole, step = _episode(name, arrays, mapping)
         times.append(step)
         runs += _split(whole, arrays, mapping, step)
-    known = mapping.speeds is not None or mapping.time is not None or all(_times(arrays) for arrays in tables)
+    known = (
+        mapping.speeds is not None
+        or mapping.time is not None
+        or all(_times(arrays) for arrays in tables)
+    )
     return Episodes(tuple(runs), float(np.median(times)), notes, known)
 
 
@@ -184,16 +229,25 @@ def _split(whole: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float)
     marks = _array(whole.name, arrays, mapping.starts).ravel()
     flags = len(marks) == len(whole) and bool(np.isin(marks, (0, 1)).all())
     starts = np.flatnonzero(marks) if flags else marks
-    if not len(starts) or np.any(starts != starts.astype(int)) or np.any(np.diff([*starts, len(whole) + 0.5]) <= 0.0):
+    if (
+        not len(starts)
+        or np.any(starts != starts.astype(int))
+        or np.any(np.diff([*starts, len(whole) + 0.5]) <= 0.0)
+    ):
         raise ColumnError(
-            f"{whole.name}: starts, column '{mapping.starts}', must be the first rows of the episodes, from 0, whole "
-            f"and rising below {len(whole)} rows, or 1 in these rows and 0 elsewhere."
+            f"{whole.name}: starts, column '{mapping.starts}', must be the first rows of the"
+            f" episodes, from 0, whole and rising below {len(whole)} rows, or 1 in these rows and 0"
+            " elsewhere."
         )
-    edges, runs = [*(int(row) for row in starts if row < len(whole)), len(whole)], []
+    edges = [*(int(row) for row in starts if row < len(whole)), len(whole)]
+    runs = []
     for number, (a, b) in enumerate(itertools.pairwise(edges), start=1):
-        angle, command = whole.angle[a:b], None if whole.command is None else whole.command[a:b]
+        angle = whole.angle[a:b]
+        command = None if whole.command is None else whole.command[a:b]
         speed = whole.speed[a:b] if mapping.speeds else speed_of(angle, step)
-        runs.append(Episode(angle, speed, whole.pressure[a:b], command, f"{whole.name}, episode {number}"))
+        runs.append(
+            Episode(angle, speed, whole.pressure[a:b], command, f"{whole.name}, episode {number}")
+        )
     return runs
 
 
@@ -206,8 +260,9 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
         step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
         if not step > 0.0 or np.max(np.abs(np.diff(time) - step)) > 0.5 * step:
             raise ColumnError(
-                f"{name}: the times of column '{mapping.time}' have gaps or do not rise; they must be uniform to half "
-                "a row. Split the episode at its gaps, or state sample_time in the mapping file."
+                f"{name}: the times of column '{mapping.time}' have gaps or do not rise; they must"
+                " be uniform to half a row. Split the episode at its gaps, or state sample_time in"
+                " the mapping file."
             )
     else:
         step = mapping.sample_time or 0.0
@@ -215,15 +270,20 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
             ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
             if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
                 raise ColumnError(
-                    f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the mapping file states a "
-                    f'sample time of {1e3 * step:.4g} ms. Correct sample_time, or state time = "{column}" [s] in its '
+                    f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the"
+                    " mapping file states a "
+                    f"sample time of {1e3 * step:.4g} ms. Correct sample_time, or state time ="
+                    f' "{column}" [s] in its '
                     "place."
                 )
     speed = _columns(name, arrays, mapping.speeds) if mapping.speeds else speed_of(angle, step)
     command = _columns(name, arrays, mapping.commands) if mapping.commands else None
     for what, given in (("pressures", pressure), ("speeds", speed), ("commands", command)):
         if given is not None and len(given) != len(angle):
-            raise ColumnError(f"{name}: {what} have {len(given)} rows, angles {len(angle)}; they must have as many.")
+            raise ColumnError(
+                f"{name}: {what} have {len(given)} rows, angles {len(angle)}; they must have as"
+                " many."
+            )
     return Episode(angle, speed, pressure, command, name), step
 
 
@@ -234,15 +294,19 @@ def _times(arrays: Arrays) -> list[str]:
 def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:
     parts = [_array(name, arrays, column) for column in channels.columns]
     if not all(part.ndim and part.size for part in parts):
-        raise ColumnError(f"{name}: {', '.join(channels.columns)} has no row; leave the episode out.")
-    stacked = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1) * channels.scale
+        raise ColumnError(
+            f"{name}: {', '.join(channels.columns)} has no row; leave the episode out."
+        )
+    stacked = (
+        np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1) * channels.scale
+    )
     if channels.divisors is not None:
         stacked = stacked / _array(name, arrays, channels.divisors).ravel()
     if not np.isfinite(stacked).all():
         row, column = np.argwhere(~np.isfinite(stacked))[0]
         raise ColumnError(
-            f"{name}: row {row + 1} of {', '.join(channels.columns)} (column {column + 1}) is not a finite number; "
-            "leave the episode out, or split it there."
+            f"{name}: row {row + 1} of {', '.join(channels.columns)} (column {column + 1}) is not a"
+            " finite number; leave the episode out, or split it there."
         )
     return np.asarray(stacked, dtype=float)
 

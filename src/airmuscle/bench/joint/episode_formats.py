@@ -1,7 +1,9 @@
-"""Formats of episodes: NPZ, CSV, JSON, HDF5, Parquet, ROS bags and RLDS-like steps, as arrays by name.
+"""Formats of episodes: NPZ, CSV, JSON, HDF5, Parquet, ROS bags and RLDS-like steps, as arrays by
+name.
 
-An array inside another table has a dotted name: the steps of an RLDS episode have `observation.angle` and `action`, the
-messages of a bag `joint_states.position.elbow`. A row of an array is a step.
+An array inside another table has a dotted name: the steps of an RLDS episode have
+`observation.angle` and `action`, the messages of a bag `joint_states.position.elbow`. A row of an
+array is a step.
 """
 
 import json
@@ -26,19 +28,26 @@ MAX_GAP = 5.0
 STEPS = "steps"
 """The table of an RLDS episode whose name is left out."""
 TFRECORD = (
-    "TFRecord files are not read. Write each episode with the package that made them: numpy.savez('1.npz', "
-    "**{'observation.angle': angles, 'action': actions}), one array (rows, columns) for each quantity."
+    "TFRecord files are not read. Write each episode with the package that made them:"
+    " numpy.savez('1.npz', **{'observation.angle': angles, 'action': actions}), one array (rows,"
+    " columns) for each quantity."
 )
 
 
 def find_episode_files(path: Path) -> list[Path]:
-    """The files and bags of a folder by name, or the path itself if it is a file or a bag. Raises FileError."""
+    """The files and bags of a folder by name, or the path itself if it is a file or a bag. Raises
+    FileError.
+    """
     if not path.is_dir() or _is_bag(path):
         return [path]
-    found = sorted(each for each in path.iterdir() if each.suffix.lower() in SUPPORTED or _is_bag(each))
+    found = sorted(
+        each for each in path.iterdir() if each.suffix.lower() in SUPPORTED or _is_bag(each)
+    )
     if not found:
         steps = any(".tfrecord" in each.name for each in path.iterdir())
-        raise FileError(f"{path}: {TFRECORD if steps else f'the folder holds no file of episodes; {FORMATS}'}")
+        raise FileError(
+            f"{path}: {TFRECORD if steps else f'the folder holds no file of episodes; {FORMATS}'}"
+        )
     return found
 
 
@@ -46,9 +55,12 @@ def _is_bag(path: Path) -> bool:
     return path.is_dir() and (path / METADATA).exists()
 
 
-def read_arrays(path: Path, sample_time: float | None = None) -> tuple[list[Arrays], tuple[str, ...]]:
-    """The arrays of every episode in a file or a bag, which is interpolated to multiples of the sample time [s] or its
-    median interval, and notes on their reading. Raises FileError or ColumnError."""
+def read_arrays(
+    path: Path, sample_time: float | None = None
+) -> tuple[list[Arrays], tuple[str, ...]]:
+    """The arrays of every episode in a file or a bag, which is interpolated to multiples of the
+    sample time [s] or its median interval, and notes on their reading. Raises FileError or
+    ColumnError."""
     if _is_bag(path) or path.suffix == ".bag":
         return _read_bag(path, sample_time)
     if ".tfrecord" in path.name:
@@ -61,7 +73,11 @@ def read_arrays(path: Path, sample_time: float | None = None) -> tuple[list[Arra
 
 
 def _read_bag(path: Path, sample_time: float | None) -> tuple[list[Arrays], tuple[str, ...]]:
-    file = path if path.is_file() else min(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
+    file = (
+        path
+        if path.is_file()
+        else min(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
+    )
     (table,) = read_rosbag_tables(file)
     columns = _columns_of(table)
     time = columns.pop("time", np.zeros(0))
@@ -70,12 +86,15 @@ def _read_bag(path: Path, sample_time: float | None) -> tuple[list[Arrays], tupl
     longest = float(np.max(intervals, initial=0.0))
     if not step > 0.0 or longest > MAX_GAP * max(step, float(np.median(intervals))):
         raise ColumnError(
-            f"{path.name}: {len(time)} rows, with up to {longest:.3g} s between two messages; an episode needs "
-            "messages without a gap. Split the bag there, or leave it out."
+            f"{path.name}: {len(time)} rows, with up to {longest:.3g} s between two messages; an"
+            " episode needs messages without a gap. Split the bag there, or leave it out."
         )
     grid = step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
     uneven = 1e3 * float(np.ptp(intervals))
-    note = f"{path.name}: intervals of messages differ by {uneven:.2g} ms; rows are interpolated to {1e3 * step:.4g} ms"
+    note = (
+        f"{path.name}: intervals of messages differ by {uneven:.2g} ms; rows are interpolated to"
+        f" {1e3 * step:.4g} ms"
+    )
     arrays = {"time": grid, **{n: np.interp(grid, time - time[0], c) for n, c in columns.items()}}
     return [arrays], (*table.notes, *([note] if uneven > 100.0 * step else []))
 
@@ -84,15 +103,21 @@ def _numbers(path: Path, name: str, values: Any) -> Array:
     try:
         return np.asarray(values, dtype=float)
     except (TypeError, ValueError):
-        raise ColumnError(f"{path}: '{name}' is no array of numbers; its rows must have the same length.") from None
+        raise ColumnError(
+            f"{path}: '{name}' is no array of numbers; its rows must have the same length."
+        ) from None
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """The arrays of nested tables with dotted names; a list of objects, such as steps, becomes columns."""
+    """The arrays of nested tables with dotted names; a list of objects, such as steps, becomes
+    columns.
+    """
     for key, value in table.items():
         name = f"{prefix}{key}".replace("/", ".").removeprefix(f"{STEPS}.")
         if isinstance(value, list) and value and isinstance(value[0], Mapping):
-            value = {n: [each[n] for each in value] for n in value[0] if all(n in each for each in value)}
+            value = {
+                n: [each[n] for each in value] for n in value[0] if all(n in each for each in value)
+            }
         if isinstance(value, Mapping):
             yield from _flat(value, "" if name == STEPS else f"{name}.")
         else:
@@ -101,18 +126,41 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 def _read_npz(path: Path) -> list[Arrays]:
     with np.load(path, allow_pickle=False) as file:
-        return [dict(_flat({n: np.asarray(file[n], dtype=float) for n in file.files if file[n].dtype.kind in "fiub"}))]
+        return [
+            dict(
+                _flat(
+                    {
+                        n: np.asarray(file[n], dtype=float)
+                        for n in file.files
+                        if file[n].dtype.kind in "fiub"
+                    }
+                )
+            )
+        ]
 
 
 def _read_json(path: Path) -> list[Arrays]:
-    text, by_line = path.read_text(encoding="utf-8"), path.suffix == ".jsonl"
-    content = list(map(json.loads, filter(str.strip, text.splitlines()))) if by_line else json.loads(text)
+    text = path.read_text(encoding="utf-8")
+    by_line = path.suffix == ".jsonl"
+    content = (
+        list(map(json.loads, filter(str.strip, text.splitlines()))) if by_line else json.loads(text)
+    )
     tables = content.get("episodes", [content]) if isinstance(content, dict) else content
-    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
-        raise FileError(f"{path}: an object of lists is expected, or a list of such objects, one for each episode.")
+    if (
+        not isinstance(tables, list)
+        or not tables
+        or not all(isinstance(table, dict) for table in tables)
+    ):
+        raise FileError(
+            f"{path}: an object of lists is expected, or a list of such objects, one for each"
+            " episode."
+        )
     if "observation" in tables[0]:  # a list of steps, which have no lists of rows
         tables = [{STEPS: tables}]
-    return [{n: _numbers(path, n, v) for n, v in _flat(table) if isinstance(v, list)} for table in tables]
+    return [
+        {n: _numbers(path, n, v) for n, v in _flat(table) if isinstance(v, list)}
+        for table in tables
+    ]
 
 
 def _read_text(path: Path) -> list[Arrays]:
@@ -121,7 +169,11 @@ def _read_text(path: Path) -> list[Arrays]:
 
 def _columns_of(table: RawTable) -> dict[str, Array]:
     """The columns of numbers of a table."""
-    return {n: c for n, c in zip(table.headings, table.columns, strict=True) if isinstance(c, np.ndarray)}
+    return {
+        n: c
+        for n, c in zip(table.headings, table.columns, strict=True)
+        if isinstance(c, np.ndarray)
+    }
 
 
 def _read_hdf5(path: Path) -> list[Arrays]:
@@ -133,8 +185,14 @@ def _read_hdf5(path: Path) -> list[Arrays]:
 
     with h5py.File(path) as file:
         tables = contents(file)
-        inner = [v for n, v in sorted(tables.items()) if isinstance(v, dict) and n not in (STEPS, "observation")]
-        return [{n: np.asarray(d, dtype=float) for n, d in _flat(each)} for each in inner or [tables]]
+        inner = [
+            v
+            for n, v in sorted(tables.items())
+            if isinstance(v, dict) and n not in (STEPS, "observation")
+        ]
+        return [
+            {n: np.asarray(d, dtype=float) for n, d in _flat(each)} for each in inner or [tables]
+        ]
 
 
 def _read_parquet(path: Path) -> list[Arrays]:
@@ -144,9 +202,15 @@ def _read_parquet(path: Path) -> list[Arrays]:
 
 
 READERS = {
-    ".npz": _read_npz, ".json": _read_json, ".jsonl": _read_json, ".csv": _read_text, ".txt": _read_text,
-    ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".parquet": _read_parquet,
-}  # fmt: skip
+    ".npz": _read_npz,
+    ".json": _read_json,
+    ".jsonl": _read_json,
+    ".csv": _read_text,
+    ".txt": _read_text,
+    ".h5": _read_hdf5,
+    ".hdf5": _read_hdf5,
+    ".parquet": _read_parquet,
+}
 """Readers by the extension; each returns the arrays of every episode in the file."""
 SUPPORTED = (*READERS, ".bag")
 FORMATS = f"supported are {', '.join(SUPPORTED)}, and folders of ROS 2 bags."
@@ -156,7 +220,9 @@ FORMATS = f"supported are {', '.join(SUPPORTED)}, and folders of ROS 2 bags."
 
 ROLES = {
     "divisors": "divisors",
-    "commands": "u command commands cmd action actions setpoint setpoints desired target reference valve",
+    "commands": (
+        "u command commands cmd action actions setpoint setpoints desired target reference valve"
+    ),
     "pressures": "p pressure pressures counts",
     "speeds": "v dq qd speed speeds velocity velocities vel omega",
     "angles": "q angle angles position positions pos theta phi",
@@ -171,19 +237,28 @@ PRESSURE_SCALES = ((30.0, "1 bar"), (3000.0, "1 kPa"))
 
 
 def propose_mapping(source: str | Path) -> str:
-    """Text of a mapping file for a record, to be corrected by its user; its comments state what it is guessed from.
+    """Text of a mapping file for a record, to be corrected by its user; its comments state what it
+    is guessed from.
 
     Raises FileError or ColumnError for a record that cannot be read.
     """
     path = find_episode_files(Path(source))[0]
     arrays = read_arrays(path)[0][0]
-    found = {role: [n for n, a in arrays.items() if _role(n) == role and a.size > 1] for role in ROLES}
-    lines = [f"# arrays of the record: {', '.join(f'{n} {tuple(a.shape)}' for n, a in arrays.items())}"]
+    found = {
+        role: [n for n, a in arrays.items() if _role(n) == role and a.size > 1] for role in ROLES
+    }
+    lines = [
+        f"# arrays of the record: {', '.join(f'{n} {tuple(a.shape)}' for n, a in arrays.items())}"
+    ]
     if _is_bag(path) or path.suffix == ".bag":
         interval = 1e3 * float(arrays["time"][1])
-        lines.append(f'sample_time = "{interval:.2g} ms"  # of the messages, which are interpolated to it')
+        lines.append(
+            f'sample_time = "{interval:.2g} ms"  # of the messages, which are interpolated to it'
+        )
     else:
-        lines.append(f'time = "{found["time"][0]}"' if found["time"] else _sample_time(arrays, found))
+        lines.append(
+            f'time = "{found["time"][0]}"' if found["time"] else _sample_time(arrays, found)
+        )
     lines += [f'starts = "{found["starts"][0]}"'] if found["starts"] else []
     for role in ("angles", "speeds", "pressures", "commands"):
         if found[role] or role in ("angles", "pressures"):
@@ -198,7 +273,9 @@ def _role(name: str) -> str:
 
 
 def _size(names: Iterable[str], arrays: Arrays) -> float:
-    return max((float(np.quantile(np.abs(arrays[n]), 0.99)) for n in names if arrays[n].size), default=0.0)
+    return max(
+        (float(np.quantile(np.abs(arrays[n]), 0.99)) for n in names if arrays[n].size), default=0.0
+    )
 
 
 def _sample_time(arrays: Arrays, found: Mapping[str, list[str]]) -> str:
@@ -206,13 +283,24 @@ def _sample_time(arrays: Arrays, found: Mapping[str, list[str]]) -> str:
     for name, array in arrays.items():
         if array.size == 1 and STEP_WORDS & set(re.findall("[a-z]+", name.lower())):
             return f'sample_time = "{1e3 * float(array.ravel()[0]):.6g} ms"  # {name} of the record'
-    angles, speeds = (np.concatenate([arrays[n].reshape(len(arrays[n]), -1) for n in found[role]], axis=1)
-                      if found[role] else np.zeros((1, 0)) for role in ("angles", "speeds"))  # fmt: skip
+    angles, speeds = (
+        (
+            np.concatenate([arrays[n].reshape(len(arrays[n]), -1) for n in found[role]], axis=1)
+            if found[role]
+            else np.zeros((1, 0))
+        )
+        for role in ("angles", "speeds")
+    )
     if not angles.size or angles.shape != speeds.shape or len(angles) < 3:
         return 'sample_time = "10 ms"  # not in the record: state it'
     middle = speeds[1:-1]
-    step = np.median(np.sum((angles[2:] - angles[:-2]) * middle, axis=0) / np.sum(2.0 * middle**2, axis=0))
-    return f'sample_time = "{1e3 * step:.4g} ms"  # with which the angles move as fast as the speeds: check it'
+    step = np.median(
+        np.sum((angles[2:] - angles[:-2]) * middle, axis=0) / np.sum(2.0 * middle**2, axis=0)
+    )
+    return (
+        f'sample_time = "{1e3 * step:.4g} ms"  # with which the angles move as fast as the speeds:'
+        " check it"
+    )
 
 
 def _scale(role: str, found: Mapping[str, list[str]], arrays: Arrays) -> list[str]:
@@ -222,5 +310,10 @@ def _scale(role: str, found: Mapping[str, list[str]], arrays: Arrays) -> list[st
     if role == "commands":
         return []
     divisors = [f'divisors = "{name}"' for name in arrays if _role(name) == "divisors"]
-    unit = next((unit for limit, unit in PRESSURE_SCALES if _size(found[role], arrays) < limit), "1 Pa")
-    return [*divisors, f'scale = "{unit}"  # guessed from the size; counts need the pressure of one count']
+    unit = next(
+        (unit for limit, unit in PRESSURE_SCALES if _size(found[role], arrays) < limit), "1 Pa"
+    )
+    return [
+        *divisors,
+        f'scale = "{unit}"  # guessed from the size; counts need the pressure of one count',
+    ]

@@ -1,4 +1,6 @@
-"""Inspection of episodes: rates, ranges, which pressure acts on which angle, and what forbids an identification."""
+"""Inspection of episodes: rates, ranges, which pressure acts on which angle, and what forbids an
+identification.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -12,11 +14,16 @@ from .episodes import HISTORY, ROWS, Episodes, Windows, long_enough, speed_of
 
 MAX_DELAY = 8
 """Greatest delay of the pressure sensors that is looked for [rows] (chosen)."""
-CERTAIN, CLEAR = 5.0, 1.25
-"""t-value from which a pressure acts on an angle, and its ratio to that of the next joint (chosen)."""
-TURN, BURST = 10.0, 1e7
+CERTAIN = 5.0
+CLEAR = 1.25
+"""t-value from which a pressure acts on an angle, and its ratio to that of the next joint
+(chosen).
+"""
+TURN = 10.0
+BURST = 1e7
 """Greatest angle [rad] of a joint and gauge pressure [Pa] of a muscle (chosen)."""
-WIDE, NARROW = 1.5 * np.pi, 0.035
+WIDE = 1.5 * np.pi
+NARROW = 0.035
 """Range of an angle [rad] above and below which its unit is doubted (chosen)."""
 PIECES = 20
 """Independent pieces of the record at least, from which a t-value comes (chosen)."""
@@ -24,18 +31,24 @@ DEAD = 0.01
 """Spread of a reading, relative to the greatest of its kind, up to which it is none (chosen)."""
 JUMP = np.pi
 """Change of an angle between two rows [rad] that no arm makes."""
-SPEED_RATIO, TRAVEL = 1.15, 5
-"""Ratio of the motion to that of the speeds, or its inverse, that a wrong sample time explains; rows of it (chosen)."""
+SPEED_RATIO = 1.15
+TRAVEL = 5
+"""Ratio of the motion to that of the speeds, or its inverse, that a wrong sample time explains;
+rows of it (chosen).
+"""
 SATURATED = 0.02
 """Share of rows exactly at an end of the range of a reading that counts as saturation (chosen)."""
-SETTLED, LEAST = 3, 0.2
-"""Rows after which a wrong reading is forgotten before the start of a window; least share of rows of a fit (chosen)."""
+SETTLED = 3
+LEAST = 0.2
+"""Rows after which a wrong reading is forgotten before the start of a window; least share of rows
+of a fit (chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class PressureAction:
-    """Muscle (from 1) and the joint (from 1) on whose acceleration its pressure acts most. `sign` of the action,
-    t-value of its regression coefficient, and that of the next joint."""
+    """Muscle (from 1) and the joint (from 1) on whose acceleration its pressure acts most. `sign`
+    of the action, t-value of its regression coefficient, and that of the next joint."""
 
     muscle: int
     joint: int
@@ -48,14 +61,17 @@ class PressureAction:
         return self.t_value > CERTAIN and self.t_value > CLEAR * self.next_t_value
 
     def __str__(self) -> str:
-        way, doubt = "raises" if self.sign > 0 else "lowers", "" if self.certain else ", uncertain"
+        way = "raises" if self.sign > 0 else "lowers"
+        doubt = "" if self.certain else ", uncertain"
         t = f"t = {self.t_value:.0f}, next joint {self.next_t_value:.0f}{doubt}"
         return f"pressure {self.muscle} {way} angle {self.joint} ({t})"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class EpisodeInspection(Reported):
-    """Findings on episodes; `print` it. `errors` forbid a fit, `remarks` do not; `delay` of the pressures [rows]."""
+    """Findings on episodes; `print` it. `errors` forbid a fit, `remarks` do not; `delay` of the
+    pressures [rows].
+    """
 
     episodes: Episodes
     delay: int
@@ -65,50 +81,75 @@ class EpisodeInspection(Reported):
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """For each joint the muscle, from 1, that raises its angle and the one that lowers it. Raises
-        IdentificationError where the pressures do not show it with certainty."""
+        """For each joint the muscle, from 1, that raises its angle and the one that lowers it.
+        Raises IdentificationError where the pressures do not show it with certainty."""
         found = []
         for joint in range(1, self.episodes.joints + 1):
             own = [a for a in self.actions if a.joint == joint and a.certain]
-            up, down = [a.muscle for a in own if a.sign > 0], [a.muscle for a in own if a.sign < 0]
+            up = [a.muscle for a in own if a.sign > 0]
+            down = [a.muscle for a in own if a.sign < 0]
             if (len(up), len(down)) != (1, 1):
                 raise IdentificationError(
-                    f"joint {joint}: {counted(len(up), 'pressure')} with certainty for raising its angle, {len(down)} "
-                    "for lowering it; one of each is needed. State the muscles of each joint in the mapping file: "
-                    "pairs = [[1, 2], ...]."
+                    f"joint {joint}: {counted(len(up), 'pressure')} with certainty for raising its"
+                    f" angle, {len(down)} for lowering it; one of each is needed. State the muscles"
+                    " of each joint in the mapping file: pairs = [[1, 2], ...]."
                 )
             found.append((up[0], down[0]))
         return tuple(found)
 
     def chapter(self) -> Chapter:
-        """The description: ranges of the readings, which pressure acts on which angle, and findings."""
-        e, lengths = self.episodes, [len(run) for run in self.episodes.runs]
-        total, rows = sum(lengths) * e.sample_time, " to ".join(dict.fromkeys(map(str, (min(lengths), max(lengths)))))
+        """The description: ranges of the readings, which pressure acts on which angle, and
+        findings.
+        """
+        e = self.episodes
+        lengths = [len(run) for run in self.episodes.runs]
+        total = sum(lengths) * e.sample_time
+        rows = " to ".join(dict.fromkeys(map(str, (min(lengths), max(lengths)))))
         contents = (
-            f"{counted(len(e), 'episode')} of {rows} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
-            f"{counted(e.joints, 'joint')}, {counted(e.muscles, 'pressure')} with a lag of "
-            f"{counted(self.delay, 'row')} ({1e3 * self.delay * e.sample_time:.3g} ms) behind the motion"
+            f"{counted(len(e), 'episode')} of {rows} rows at {1 / e.sample_time:.4g} Hz,"
+            f" {total:.4g} s; {counted(e.joints, 'joint')}, {counted(e.muscles, 'pressure')} with a"
+            f" lag of {counted(self.delay, 'row')} ({1e3 * self.delay * e.sample_time:.3g} ms)"
+            " behind the motion"
         )
         counts = (e.joints, e.muscles)
-        names = [f"{kind} {i + 1}" for kind, n in zip(("angle", "pressure"), counts, strict=True) for i in range(n)]
+        names = [
+            f"{kind} {i + 1}"
+            for kind, n in zip(("angle", "pressure"), counts, strict=True)
+            for i in range(n)
+        ]
         readings = np.concatenate([e.rows("angle"), e.rows("pressure")], axis=1)
         low, middle, high = np.quantile(readings, (0.01, 0.5, 0.99), axis=0).tolist()
-        units, shown = (np.repeat(each, counts).tolist() for each in (("rad", "Pa"), ("deg", "kPa")))
+        units, shown = (
+            np.repeat(each, counts).tolist() for each in (("rad", "Pa"), ("deg", "kPa"))
+        )
         columns = {
-            "reading": names, "range of 98 %": TableColumn(list(zip(low, high, strict=True)), BY_ROW),
-            "median": TableColumn(middle, BY_ROW), "unit": TableColumn(units, shown=shown),
-        }  # fmt: skip
+            "reading": names,
+            "range of 98 %": TableColumn(list(zip(low, high, strict=True)), BY_ROW),
+            "median": TableColumn(middle, BY_ROW),
+            "unit": TableColumn(units, shown=shown),
+        }
         return Chapter(
-            "episodes", "Episodes", (contents, *e.notes, *map(str, self.actions)), problems=self.errors,
-            tables=(Table("readings", "Readings", columns, brief=len(names)),), notes=self.remarks,
-        )  # fmt: skip
+            "episodes",
+            "Episodes",
+            (contents, *e.notes, *map(str, self.actions)),
+            problems=self.errors,
+            tables=(Table("readings", "Readings", columns, brief=len(names)),),
+            notes=self.remarks,
+        )
 
     def __str__(self) -> str:
-        e, said = self.episodes, self.chapter().paragraphs
+        e = self.episodes
+        said = self.chapter().paragraphs
         lines = [
             *said[: 1 + len(e.notes)],
-            *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
-            *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
+            *(
+                _range_line(f"angle {i}", np.degrees(x), "deg")
+                for i, x in enumerate(e.rows("angle").T, 1)
+            ),
+            *(
+                _range_line(f"pressure {i}", x / 1e3, "kPa")
+                for i, x in enumerate(e.rows("pressure").T, 1)
+            ),
             *said[1 + len(e.notes) :],
             *(f"remark: {each}" for each in self.remarks),
             *(f"error: {each}" for each in self.errors),
@@ -116,8 +157,12 @@ class EpisodeInspection(Reported):
         return "\n".join(lines)
 
 
-def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), rows: int = ROWS) -> EpisodeInspection:
-    """Inspect episodes before a fit over `rows` rows; `pairs` are the muscles said to raise and lower each angle."""
+def inspect_episodes(
+    episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), rows: int = ROWS
+) -> EpisodeInspection:
+    """Inspect episodes before a fit over `rows` rows; `pairs` are the muscles said to raise and
+    lower each angle.
+    """
     errors = [*_units(episodes), *_jumps(episodes), *_constant(episodes)] or _sample_time(episodes)
     short = list[str]()
     try:
@@ -126,10 +171,15 @@ def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), 
         errors.append(str(error))
     delay, actions = (0, ()) if errors else _actions(episodes)
     certain = {a.muscle: a for a in actions if a.certain}
-    said = [(m, j, sign) for j, pair in enumerate(pairs, start=1) for m, sign in zip(pair, (1, -1), strict=True)]
+    said = [
+        (m, j, sign)
+        for j, pair in enumerate(pairs, start=1)
+        for m, sign in zip(pair, (1, -1), strict=True)
+    ]
     errors += [
-        f"muscles are exchanged: the mapping says that pressure {muscle} {'raises' if sign > 0 else 'lowers'} angle "
-        f"{joint}, the record that {certain[muscle]}. Correct pairs in the mapping file."
+        f"muscles are exchanged: the mapping says that pressure {muscle}"
+        f" {'raises' if sign > 0 else 'lowers'} angle {joint}, the record that {certain[muscle]}."
+        " Correct pairs in the mapping file."
         for muscle, joint, sign in said
         if muscle in certain and (certain[muscle].joint, certain[muscle].sign) != (joint, sign)
     ]
@@ -137,8 +187,12 @@ def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), 
     return EpisodeInspection(episodes, delay, actions, tuple(errors), remarks)
 
 
-def checked_inspection(episodes: Episodes, pairs: Sequence[tuple[int, int]], rows: int) -> EpisodeInspection:
-    """The inspection of episodes. Raises IdentificationError with the first finding that forbids a fit."""
+def checked_inspection(
+    episodes: Episodes, pairs: Sequence[tuple[int, int]], rows: int
+) -> EpisodeInspection:
+    """The inspection of episodes. Raises IdentificationError with the first finding that forbids a
+    fit.
+    """
     inspection = inspect_episodes(episodes, pairs, rows)
     if inspection.errors:
         raise IdentificationError(inspection.errors[0])
@@ -152,12 +206,15 @@ def _range_line(name: str, values: Array, unit: str) -> str:
 
 def _units(episodes: Episodes) -> list[str]:
     """Readings beyond what an arm has, whose unit is another one."""
-    turn, burst = ("rad", TURN, "further than a joint turns"), ("Pa", BURST, "more than a muscle bears")
+    turn = ("rad", TURN, "further than a joint turns")
+    burst = ("Pa", BURST, "more than a muscle bears")
     return [
-        f"{name} {i} reaches {high:.4g} {unit}, {why}: state its unit or scale in the mapping file, [{name}s]."
+        f"{name} {i} reaches {high:.4g} {unit}, {why}: state its unit or scale in the mapping file,"
+        f" [{name}s]."
         for name, (unit, limit, why) in (("angle", turn), ("pressure", burst))
-        for i, high in enumerate(np.quantile(np.abs(episodes.rows(name)), 0.99, axis=0), start=1) if high > limit
-    ]  # fmt: skip
+        for i, high in enumerate(np.quantile(np.abs(episodes.rows(name)), 0.99, axis=0), start=1)
+        if high > limit
+    ]
 
 
 def _jumps(episodes: Episodes) -> list[str]:
@@ -166,32 +223,39 @@ def _jumps(episodes: Episodes) -> list[str]:
         if len(rows):
             a, b = np.degrees(run.angle[rows[0] : rows[0] + 2, joints[0]])
             return [
-                f"{run.name}: angle {joints[0] + 1} jumps from {a:.4g} to {b:.4g} deg at row {rows[0] + 2}, as an "
-                "encoder does that wraps after a turn. Unwrap the angles (numpy.unwrap) and write the files again."
+                f"{run.name}: angle {joints[0] + 1} jumps from {a:.4g} to {b:.4g} deg at row"
+                f" {rows[0] + 2}, as an encoder does that wraps after a turn. Unwrap the angles"
+                " (numpy.unwrap) and write the files again."
             ]
     return []
 
 
 def _doubtful(episodes: Episodes) -> list[str]:
-    """Remarks on what may have another unit or scale: ranges of angles, sizes of pressures, and the sample time."""
-    spans, found = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0), list[str]()
+    """Remarks on what may have another unit or scale: ranges of angles, sizes of pressures, and the
+    sample time.
+    """
+    spans = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0)
+    found = list[str]()
     for i, x in enumerate(spans, 1):
         if not NARROW < x < WIDE:
             kind = "degrees read as radians" if x > WIDE else "radians read as degrees"
             text = f"angle {i} spans {np.degrees(x):.3g} deg, as {kind} do"
             found.append(f"{text}: check its unit in the mapping file, [angles]")
     pressure = episodes.rows("pressure")
-    high, whole = float(np.quantile(np.abs(pressure), 0.99)), bool(np.all(pressure == np.round(pressure)))
+    high = float(np.quantile(np.abs(pressure), 0.99))
+    whole = bool(np.all(pressure == np.round(pressure)))
     if high < 1e4 or whole:
         kind = "whole numbers, as counts" if whole else "small, as shares of a range"
         found.append(
-            f"pressures look like a scale and not like Pa: they are {kind}, up to {high:.4g}. Zero and gain are "
-            "absorbed by the reduced law; state pressures.scale for forces of the right size"
+            f"pressures look like a scale and not like Pa: they are {kind}, up to {high:.4g}. Zero"
+            " and gain are absorbed by the reduced law; state pressures.scale for forces of the"
+            " right size"
         )
     if not episodes.confirmed:
         found.append(
-            f"the sample time of {1e3 * episodes.sample_time:.4g} ms cannot be checked, because the record has neither "
-            "times nor speeds: with another one other inertias, dampings and lags explain the same rows"
+            f"the sample time of {1e3 * episodes.sample_time:.4g} ms cannot be checked, because the"
+            " record has neither times nor speeds: with another one other inertias, dampings and"
+            " lags explain the same rows"
         )
     return found
 
@@ -202,36 +266,57 @@ def _constant(episodes: Episodes) -> list[str]:
         low, high = np.quantile(episodes.rows(name), (0.01, 0.99), axis=0)
         dead = np.flatnonzero(high - low <= DEAD * np.max(high - low))
         found += [
-            f"{name} {i + 1} never varies, it is {low[i]:.4g} to {high[i]:.4g} {unit} in 98 % of the rows: its sensor "
-            "does not record. Leave its joint out, or give commands in place of pressures."
+            f"{name} {i + 1} never varies, it is {low[i]:.4g} to {high[i]:.4g} {unit} in 98 % of"
+            " the rows: its sensor does not record. Leave its joint out, or give commands in place"
+            " of pressures."
             for i in dead
         ]
     return found
 
 
 def _sample_time(episodes: Episodes) -> list[str]:
-    """Motion against that of the measured speeds, whose ratio a wrong sample time multiplies: medians of the quarter of
-    the rows with most motion, because single readings have noise and outliers."""
-    path = [np.cumsum(run.speed[1:] + run.speed[:-1], axis=0) * (0.5 * episodes.sample_time) for run in episodes.runs]
+    """Motion against that of the measured speeds, whose ratio a wrong sample time multiplies:
+    medians of the quarter of the rows with most motion, because single readings have noise and
+    outliers."""
+    path = [
+        np.cumsum(run.speed[1:] + run.speed[:-1], axis=0) * (0.5 * episodes.sample_time)
+        for run in episodes.runs
+    ]
     said = np.concatenate([each[TRAVEL:] - each[:-TRAVEL] for each in path])
-    moved = np.concatenate([run.angle[1 + TRAVEL :] - run.angle[1:-TRAVEL] for run in episodes.runs])
+    moved = np.concatenate(
+        [run.angle[1 + TRAVEL :] - run.angle[1:-TRAVEL] for run in episodes.runs]
+    )
     far = np.abs(said) >= np.maximum(np.quantile(np.abs(said), 0.75, axis=0), 1e-12)
-    ratio = np.nanmedian(np.nanmedian(np.where(far, moved, np.nan) / np.where(far, said, np.nan), axis=0))
+    ratio = np.nanmedian(
+        np.nanmedian(np.where(far, moved, np.nan) / np.where(far, said, np.nan), axis=0)
+    )
     if 1 / SPEED_RATIO < ratio < SPEED_RATIO:
         return []
-    hint = ', as speeds in degrees have: unit = "deg/s"' if 1 / SPEED_RATIO < np.degrees(ratio) < SPEED_RATIO else ""
+    hint = (
+        ', as speeds in degrees have: unit = "deg/s"'
+        if 1 / SPEED_RATIO < np.degrees(ratio) < SPEED_RATIO
+        else ""
+    )
     return [
-        f"angles move {ratio:.3g} times as fast as the speeds say: the sample time of {1e3 * episodes.sample_time:.4g} "
-        f"ms or the scale of the speeds is wrong. They agree with {1e3 * ratio * episodes.sample_time:.4g} ms, or with "
-        f"speeds multiplied by {ratio:.4g}{hint}. State sample_time or speeds.scale in the mapping file."
+        f"angles move {ratio:.3g} times as fast as the speeds say: the sample time of"
+        f" {1e3 * episodes.sample_time:.4g} ms or the scale of the speeds is wrong. They agree with"
+        f" {1e3 * ratio * episodes.sample_time:.4g} ms, or with speeds multiplied by"
+        f" {ratio:.4g}{hint}. State sample_time or speeds.scale in the mapping file."
     ]
 
 
 def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
-    """Delay of the pressures, and what each acts on: regression of accelerations on pressures, angles and speeds."""
+    """Delay of the pressures, and what each acts on: regression of accelerations on pressures,
+    angles and speeds.
+    """
     step = episodes.sample_time
-    moved = [(run, speed_of(run.angle, step)) for run in episodes.runs if len(run) >= 2 * MAX_DELAY + 8]
-    blocks = [(speed_of(v, step), np.concatenate([run.angle, v], axis=1), run.pressure) for run, v in moved]
+    moved = [
+        (run, speed_of(run.angle, step)) for run in episodes.runs if len(run) >= 2 * MAX_DELAY + 8
+    ]
+    blocks = [
+        (speed_of(v, step), np.concatenate([run.angle, v], axis=1), run.pressure)
+        for run, v in moved
+    ]
     if not blocks:
         return 0, ()
     found = [_regress(blocks, delay) for delay in range(MAX_DELAY + 1)]
@@ -240,38 +325,55 @@ def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
     for muscle, row in enumerate(found[delay][0], start=1):
         joint, *others = np.argsort(-np.abs(row)).tolist()
         following = float(abs(row[others[0]])) if others else 0.0
-        sign, t_value = int(np.sign(row[joint])), float(abs(row[joint]))
+        sign = int(np.sign(row[joint]))
+        t_value = float(abs(row[joint]))
         actions.append(PressureAction(muscle, joint + 1, sign, t_value, following))
     return delay, tuple(actions)
 
 
 def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[Array, float]:
-    """t-values (M, J) of the pressures, with errors independent between episodes or PIECES only; and the residual."""
+    """t-values (M, J) of the pressures, with errors independent between episodes or PIECES only;
+    and the residual.
+    """
     rows = slice(4, -MAX_DELAY - 1)
-    x = [np.concatenate([p[4 + delay : len(p) - MAX_DELAY - 1 + delay], s[rows]], axis=1) for _, s, p in blocks]
+    x = [
+        np.concatenate([p[4 + delay : len(p) - MAX_DELAY - 1 + delay], s[rows]], axis=1)
+        for _, s, p in blocks
+    ]
     y = [a[rows] for a, _, _ in blocks]
-    whole, target = np.concatenate(x), np.concatenate(y)
-    mean, spread = whole.mean(axis=0), whole.std(axis=0) + 1e-12
+    whole = np.concatenate(x)
+    target = np.concatenate(y)
+    mean = whole.mean(axis=0)
+    spread = whole.std(axis=0) + 1e-12
     design = np.column_stack([(whole - mean) / spread, np.ones(len(whole))])
     inverse = np.linalg.pinv(design.T @ design)
     coefficients = inverse @ (design.T @ target)
     residual = target - design @ coefficients
-    muscles, ends = blocks[0][2].shape[1], np.cumsum([len(each) for each in x])[:-1]
+    muscles = blocks[0][2].shape[1]
+    ends = np.cumsum([len(each) for each in x])[:-1]
     ends = ends if len(x) >= PIECES else np.linspace(0, len(whole), PIECES + 1).astype(int)[1:-1]
     pieces = zip(np.split(design, ends), np.split(residual, ends), strict=True)
     scores = np.array([a.T @ r for a, r in pieces])
     t_values = np.empty((muscles, target.shape[1]))
     for j in range(target.shape[1]):
         covariance = inverse @ (scores[:, :, j].T @ scores[:, :, j]) @ inverse
-        t_values[:, j] = coefficients[:muscles, j] / np.sqrt(np.maximum(np.diag(covariance)[:muscles], 1e-300))
+        t_values[:, j] = coefficients[:muscles, j] / np.sqrt(
+            np.maximum(np.diag(covariance)[:muscles], 1e-300)
+        )
     return t_values, float(np.sum(residual.var(axis=0) / target.var(axis=0)))
 
 
 def saturated(episodes: Episodes) -> tuple[Array, list[str]]:
-    """Upper ends (M,) of the readings at which they saturate, infinite without one, and remarks on both ends."""
-    top, remarks = np.full(episodes.muscles, np.inf), []
+    """Upper ends (M,) of the readings at which they saturate, infinite without one, and remarks on
+    both ends.
+    """
+    top = np.full(episodes.muscles, np.inf)
+    remarks = []
     for i, values in enumerate(episodes.rows("pressure").T):
-        ends = ((values.min(), "the muscle is empty"), (values.max(), "it has the pressure of its supply"))
+        ends = (
+            (values.min(), "the muscle is empty"),
+            (values.max(), "it has the pressure of its supply"),
+        )
         for edge, cause in ends if np.ptp(values) > 0.0 else ():
             count = int(np.sum(values == edge))
             if count > SATURATED * len(values):
@@ -284,15 +386,21 @@ def saturated(episodes: Episodes) -> tuple[Array, list[str]]:
 
 
 def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, list[str]]:
-    """The windows of a fit, in which rows after a reading at an upper end at which it saturates do not count, and a
-    remark on these; all rows count where less than LEAST would be left."""
+    """The windows of a fit, in which rows after a reading at an upper end at which it saturates do
+    not count, and a remark on these; all rows count where less than LEAST would be left."""
     ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= saturated(episodes)[0], axis=-1)
     hit = np.cumsum(ends, axis=1)[:, SETTLED:] > 0
     few = hit[:, 1:].mean() <= 1.0 - LEAST
     text = (
-        f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its upper end, whose "
-        "true value is unknown: they "
-        + ("do not count, except in the errors of the report" if few else "are too many to leave out")
+        f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its"
+        " upper end, whose true value is unknown: they "
+        + (
+            "do not count, except in the errors of the report"
+            if few
+            else "are too many to leave out"
+        )
     )
     counts = np.concatenate([windows.counts[:, :HISTORY], ~hit], axis=1)
-    return dataclasses.replace(windows, counts=counts) if few else windows, [text] if hit.any() else []
+    return dataclasses.replace(windows, counts=counts) if few else windows, (
+        [text] if hit.any() else []
+    )

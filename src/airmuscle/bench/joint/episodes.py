@@ -1,4 +1,6 @@
-"""Episodes: short records of an arm, each with its own initial state, in SI units; and their windows."""
+"""Episodes: short records of an arm, each with its own initial state, in SI units; and their
+windows.
+"""
 
 import dataclasses
 import functools
@@ -15,8 +17,9 @@ from ...physics import PressureDriven, WithStickSlip
 class Episode(ShortRepr):
     """One run of an arm, n rows at one sample time.
 
-    angle (n, J) [rad] and speed (n, J) [rad/s] of the joints, pressure (n, M) of the muscles [Pa, or counts times a
-    scale], command (n, M) in any unit or None, name of its file or place in the file.
+    angle (n, J) [rad] and speed (n, J) [rad/s] of the joints, pressure (n, M) of the muscles [Pa,
+    or counts times a scale], command (n, M) in any unit or None, name of its file or place in the
+    file.
     """
 
     angle: Array
@@ -31,8 +34,10 @@ class Episode(ShortRepr):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Episodes:
-    """Episodes of one arm with a common sample time [s], also a slice of others: `episodes[:2400]`; `notes` state what
-    the reader has found or corrected, `confirmed` whether times or speeds of the record confirm the sample time."""
+    """Episodes of one arm with a common sample time [s], also a slice of others: `episodes[:2400]`;
+    `notes` state what the reader has found or corrected, `confirmed` whether times or speeds of the
+    record confirm the sample time.
+    """
 
     runs: tuple[Episode, ...]
     sample_time: float
@@ -42,7 +47,9 @@ class Episodes:
     def __post_init__(self) -> None:
         if not self.runs or not self.sample_time > 0.0:
             given = f"{len(self.runs)} runs at a sample time of {self.sample_time:g} s are given"
-            raise ParameterError(f"Episodes: {given}; give one run at least and a sample time above 0.")
+            raise ParameterError(
+                f"Episodes: {given}; give one run at least and a sample time above 0."
+            )
         if len(shapes := {(each.angle.shape[1], each.pressure.shape[1]) for each in self.runs}) > 1:
             different = f"runs have different numbers of joints and muscles, {sorted(shapes)}"
             raise ParameterError(f"Episodes: {different}; fit each arm alone.")
@@ -69,18 +76,20 @@ class Episodes:
 
 
 ENOUGH = 19
-"""Episodes from which errors can hold 95 % of further ones: the greatest of n holds the next with n/(n + 1)."""
+"""Episodes from which errors can hold 95 % of further ones: the greatest of n holds the next with
+n/(n + 1).
+"""
 
 
 def count_fitted(episodes: Episodes, left_out: float | None) -> int:
-    """Number of the episodes, the first ones, that are fitted while a share of them is left out: by default a tenth, or
-    ENOUGH if that is more, but a third at most. Raises ParameterError."""
+    """Number of the episodes, the first ones, that are fitted while a share of them is left out: by
+    default a tenth, or ENOUGH if that is more, but a third at most. Raises ParameterError."""
     count = len(episodes)
     share = min(max(0.1, ENOUGH / count), 1 / 3) if left_out is None else left_out
     if not 0.0 < share < 1.0 or count < 4:
         raise ParameterError(
-            f"episodes: {count}, of which a share of {share:.3g} is left out; give 4 episodes or more, and a share "
-            "between 0 and 1."
+            f"episodes: {count}, of which a share of {share:.3g} is left out; give 4 episodes or"
+            " more, and a share between 0 and 1."
         )
     return max(1, round((1.0 - share) * count))
 
@@ -99,9 +108,12 @@ def join(parts: Sequence[Episodes]) -> Episodes:
     """Episodes of several files as one. Raises ParameterError for different sample times."""
     times = {round(each.sample_time, 6) for each in parts}
     if len(times) > 1:
-        raise ParameterError(f"Episodes: files have different sample times [s], {sorted(times)}; fit each alone.")
+        raise ParameterError(
+            f"Episodes: files have different sample times [s], {sorted(times)}; fit each alone."
+        )
     notes = tuple(dict.fromkeys(note for each in parts for note in each.notes))
-    runs, confirmed = tuple(run for each in parts for run in each.runs), all(each.confirmed for each in parts)
+    runs = tuple(run for each in parts for run in each.runs)
+    confirmed = all(each.confirmed for each in parts)
     return Episodes(runs, parts[0].sample_time, notes, confirmed)
 
 
@@ -110,25 +122,33 @@ def in_pairs(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
     order = [muscle - 1 for pair in pairs for muscle in pair]
     if min(order) < 0 or max(order) >= episodes.muscles or len(set(order)) < len(order):
         raise ParameterError(
-            f"fit_joint: pairs are {tuple(pairs)}; there are pressures 1 to {episodes.muscles}, each in one pair."
+            f"fit_joint: pairs are {tuple(pairs)}; there are pressures 1 to {episodes.muscles},"
+            " each in one pair."
         )
     runs = [dataclasses.replace(run, pressure=run.pressure[:, order]) for run in episodes.runs]
-    runs = [run if run.command is None else dataclasses.replace(run, command=run.command[:, order]) for run in runs]
+    runs = [
+        run if run.command is None else dataclasses.replace(run, command=run.command[:, order])
+        for run in runs
+    ]
     return dataclasses.replace(episodes, runs=tuple(runs))
 
 
 # Windows of multiple shooting: pieces that start from measured angles, and their initial states
 
-HISTORY, ROWS = 10, 40
-"""Rows before the start of a window, from which pressures and bristles are settled, and rows of its prediction."""
+HISTORY = 10
+ROWS = 40
+"""Rows before the start of a window, from which pressures and bristles are settled, and rows of its
+prediction.
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Windows:
     """N windows of HISTORY + 1 + `rows` rows; row HISTORY is the start.
 
-    angle, speed, rate (N, R, J), pressure (N, R, M); `speed` as measured, `rate` from the angles; `episode` and
-    `first` (N,): number of the episode and its row at the start; `counts` (N, R): whether a row counts in a fit.
+    angle, speed, rate (N, R, J), pressure (N, R, M); `speed` as measured, `rate` from the angles;
+    `episode` and `first` (N,): number of the episode and its row at the start; `counts` (N, R):
+    whether a row counts in a fit.
     """
 
     angle: Array
@@ -153,72 +173,102 @@ class Windows:
         """Accelerations [rad/s^2] of the joints (N, R, J): smoothed differences."""
         from scipy.ndimage import convolve1d
 
-        slope, weights = np.gradient(self.rate, self.sample_time, axis=1), np.array([1, 2, 3, 2, 1]) / 9
+        slope = np.gradient(self.rate, self.sample_time, axis=1)
+        weights = np.array([1, 2, 3, 2, 1]) / 9
         return np.asarray(convolve1d(slope, weights, axis=1, mode="nearest"))
 
     def part(self, which: Sequence[int] | Array, rows: int | None = None) -> "Windows":
         """Some of the windows, with the first `rows` rows of their predictions."""
         end = None if rows is None else HISTORY + 1 + rows
-        columns = {n: getattr(self, n)[which][:, :end] for n in ("angle", "speed", "rate", "pressure", "counts")}
-        return dataclasses.replace(self, **columns, episode=self.episode[which], first=self.first[which])
+        columns = {
+            n: getattr(self, n)[which][:, :end]
+            for n in ("angle", "speed", "rate", "pressure", "counts")
+        }
+        return dataclasses.replace(
+            self, **columns, episode=self.episode[which], first=self.first[which]
+        )
 
     def sample(self, count: int, rows: int | None = None) -> "Windows":
-        """At most `count` of the windows, evenly spaced, with the first `rows` rows of their predictions."""
+        """At most `count` of the windows, evenly spaced, with the first `rows` rows of their
+        predictions.
+        """
         return self.part(np.linspace(0, len(self) - 1, min(count, len(self))).astype(int), rows)
 
 
 def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
-    """The episodes that hold a window, and a remark on the others. Raises IdentificationError if none does."""
+    """The episodes that hold a window, and a remark on the others. Raises IdentificationError if
+    none does.
+    """
     needed = HISTORY + rows + 2
     kept = tuple(run for run in episodes.runs if len(run) >= needed)
     if not kept:
         raise IdentificationError(
-            f"no episode is as long as a window: the longest has {max(map(len, episodes.runs))} rows, a window needs "
-            f"{needed} ({HISTORY} before its start). Give longer episodes, or a shorter horizon (--horizon)."
+            f"no episode is as long as a window: the longest has {max(map(len, episodes.runs))}"
+            f" rows, a window needs {needed} ({HISTORY} before its start). Give longer episodes, or"
+            " a shorter horizon (--horizon)."
         )
     short = [f"{run.name} ({len(run)} rows)" for run in episodes.runs if len(run) < needed]
     text = (
-        f"{len(short)} of {counted(len(episodes), 'episode')}, shorter than a window of {needed} rows, left out: "
-        f"{', '.join(short[:3])}{', ...' if len(short) > 3 else ''}"
+        f"{len(short)} of {counted(len(episodes), 'episode')}, shorter than a window of {needed}"
+        f" rows, left out: {', '.join(short[:3])}{', ...' if len(short) > 3 else ''}"
     )
     return dataclasses.replace(episodes, runs=kept), [text] if short else []
 
 
 def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS) -> Windows:
-    """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows` further rows follow.
-    Pressures are read `delay` rows later, because their sensors lag; the last reading is held. Raises
-    IdentificationError if no episode is long enough."""
-    found = [(n, k) for n, run in enumerate(episodes.runs) for k in range(HISTORY, len(run) - rows - 1, stride)]
+    """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows`
+    further rows follow. Pressures are read `delay` rows later, because their sensors lag; the last
+    reading is held. Raises IdentificationError if no episode is long enough."""
+    found = [
+        (n, k)
+        for n, run in enumerate(episodes.runs)
+        for k in range(HISTORY, len(run) - rows - 1, stride)
+    ]
     if not found:
         long_enough(episodes, rows)  # raises
-    runs, at, step = episodes.runs, np.arange(-HISTORY, rows + 1), episodes.sample_time
+    runs = episodes.runs
+    at = np.arange(-HISTORY, rows + 1)
+    step = episodes.sample_time
     rates = {number: speed_of(runs[number].angle, step) for number, _ in found}
-    angle, speed = (np.array([getattr(runs[n], name)[k + at] for n, k in found]) for name in ("angle", "speed"))
+    angle, speed = (
+        np.array([getattr(runs[n], name)[k + at] for n, k in found]) for name in ("angle", "speed")
+    )
     rate = np.array([rates[n][k + at] for n, k in found])
     pressure = np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in found])
-    (episode, first), counts = np.array(found).T, np.ones(angle.shape[:2], dtype=bool)
+    episode, first = np.array(found).T
+    counts = np.ones(angle.shape[:2], dtype=bool)
     return Windows(angle, speed, rate, pressure, episode, first, step, counts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class WindowSignal(InputSignal):
-    """Inputs (R, m) at the rows of a window, linear between them; in the order of the inputs of the system."""
+    """Inputs (R, m) at the rows of a window, linear between them; in the order of the inputs of the
+    system.
+    """
 
     values: Array
     sample_time: float
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        times = np.asarray(start + self.sample_time * np.arange(1, len(self.values)), dtype=np.float64)
-        return PiecewiseLinear(times, self.values[:-1].copy(), np.diff(self.values, axis=0) / self.sample_time)
+        times = np.asarray(
+            start + self.sample_time * np.arange(1, len(self.values)), dtype=np.float64
+        )
+        return PiecewiseLinear(
+            times, self.values[:-1].copy(), np.diff(self.values, axis=0) / self.sample_time
+        )
 
 
 def start_of(arm: PressureDriven, windows: Windows) -> Mapping[str, Array]:
-    """State of the arm (N,) at the start of every window: measured motion, settled bristles and pressures."""
+    """State of the arm (N,) at the start of every window: measured motion, settled bristles and
+    pressures.
+    """
     mechanism = arm.mechanism
     assert isinstance(mechanism, WithStickSlip)
-    before, state = windows.angle[:, : HISTORY + 1], {}
+    before = windows.angle[:, : HISTORY + 1]
+    state = {}
     for j, (c, element) in enumerate(zip(mechanism.coordinates, mechanism.elements, strict=True)):
-        state[c.name], state[c.speed] = before[:, -1, j], windows.speed[:, HISTORY, j]
+        state[c.name] = before[:, -1, j]
+        state[c.speed] = windows.speed[:, HISTORY, j]
         state[mechanism.inner_states[j].name] = _bristle(before[:, :, j], element.presliding_angle)
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
         readings = windows.pressure[:, : HISTORY + 1, i]
@@ -230,14 +280,18 @@ def _bristle(angle: Array, presliding: float) -> Array:
     """Deflection of a bristle that was relaxed at the first of these rows (N, R)."""
     z = np.zeros(len(angle))
     for step in np.diff(angle, axis=1).T:
-        side, share = np.sign(step), np.exp(-np.abs(step) / presliding)
+        side = np.sign(step)
+        share = np.exp(-np.abs(step) / presliding)
         z = side + (z - side) * share
     return z
 
 
 def lagged(reading: Array, lag: float, sample_time: float) -> Array:
-    """Pressure behind readings (N, R) that are linear between the rows: the exact response of a first-order lag."""
-    p, share = reading[:, 0].copy(), np.exp(-sample_time / lag)
+    """Pressure behind readings (N, R) that are linear between the rows: the exact response of a
+    first-order lag.
+    """
+    p = reading[:, 0].copy()
+    share = np.exp(-sample_time / lag)
     for before, after in zip(reading[:, :-1].T, reading[:, 1:].T, strict=True):
         slope = (after - before) / sample_time
         p = after - slope * lag + (p - before + slope * lag) * share
@@ -256,13 +310,21 @@ def rms(errors: Array, axis: tuple[int, ...] = (0, 1)) -> Array:
 
 
 def band(errors: Array) -> Array:
-    """Half-width (rows, J) of the band that holds COVERAGE of these errors at every row, growing with the horizon."""
-    level = min(1.0, COVERAGE * (1 + 1 / len(errors)))  # so that it holds for one further window, too
-    return np.asarray(np.maximum.accumulate(np.quantile(np.abs(errors), level, axis=0, method="higher"), axis=0))
+    """Half-width (rows, J) of the band that holds COVERAGE of these errors at every row, growing
+    with the horizon.
+    """
+    level = min(
+        1.0, COVERAGE * (1 + 1 / len(errors))
+    )  # so that it holds for one further window, too
+    return np.asarray(
+        np.maximum.accumulate(np.quantile(np.abs(errors), level, axis=0, method="higher"), axis=0)
+    )
 
 
 def coverage(errors: Array, episode: Array) -> Array:
-    """Share (J,) of errors inside a band that comes from the other half of the episodes, both ways."""
+    """Share (J,) of errors inside a band that comes from the other half of the episodes, both
+    ways.
+    """
     odd = np.searchsorted(np.unique(episode), episode) % 2 == 1
     if odd.all() or not odd.any():
         return np.full(errors.shape[2], np.nan)

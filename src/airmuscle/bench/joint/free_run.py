@@ -1,5 +1,5 @@
-"""Free run of an arm over windows: its baselines, regulators that lead to it from commands, and the residual that
-physics leaves in it."""
+"""Free run of an arm over windows: its baselines, regulators that lead to it from commands, and the
+residual that physics leaves in it."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -17,8 +17,12 @@ from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of
 
 
 def free_run(arm: PressureDriven, windows: Windows) -> Array:
-    """Angles (N, rows, J) [rad] from the start of every window, which a run that fails keeps, and pressures alone."""
-    found = angles(arm, windows.pressure[:, HISTORY:], start_of(arm, windows), windows.sample_time)[:, 1:]
+    """Angles (N, rows, J) [rad] from the start of every window, which a run that fails keeps, and
+    pressures alone.
+    """
+    found = angles(arm, windows.pressure[:, HISTORY:], start_of(arm, windows), windows.sample_time)[
+        :, 1:
+    ]
     kept = windows.angle[:, HISTORY : HISTORY + 1]
     return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
 
@@ -33,37 +37,59 @@ def free_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     return np.asarray(run_errors(arm, windows)[..., joint])
 
 
-def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float) -> Array:
+def angles(
+    arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float
+) -> Array:
     """Angles (N, R, J) [rad] under the pressures (N, R, M) from states (N,)."""
-    return with_slopes(arm, (), pressure, sample_time, start, [c.name for c in arm.mechanism.coordinates])[0]
+    return with_slopes(
+        arm, (), pressure, sample_time, start, [c.name for c in arm.mechanism.coordinates]
+    )[0]
 
 
 # Baselines: persistence, and a linear ARX model of all joints
 
 LIMIT = 9.0
-"""Limit of an angle [rad], so that an unstable prediction ends in a large error and not in infinity."""
+"""Limit of an angle [rad], so that an unstable prediction ends in a large error and not in
+infinity.
+"""
 
 
 def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str, Array]:
-    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name."""
-    windows, begin = cut(judge, 0, rows), HISTORY - DEPTH + 1
-    arx = fit_arx([(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1], -LIMIT, LIMIT)
+    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by
+    its name.
+    """
+    windows = cut(judge, 0, rows)
+    begin = HISTORY - DEPTH + 1
+    arx = fit_arx(
+        [(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1], -LIMIT, LIMIT
+    )
     predicted = arx.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])
     by_name = {PERSISTENCE: windows.angle[:, HISTORY : HISTORY + 1], ARX: predicted}
     return {name: angle - windows.angle[:, HISTORY + 1 :] for name, angle in by_name.items()}
 
 
-# Pressures from commands: a proportional regulator for each muscle, identified from its command and its pressure
+# Pressures from commands: a proportional regulator for each muscle, identified from its command and
+# its pressure
 
 DELAYS = (0, 1, 2, 3)
-"""Delays of the command [rows] that are tried; longer ones, up to HISTORY, where the longest is the best."""
+"""Delays of the command [rows] that are tried; longer ones, up to HISTORY, where the longest is the
+best.
+"""
 UNEXPLAINED = 0.5
 """Error of the pressures from commands, relative to their changes, that is named (chosen)."""
-START, LOW, HIGH = (0.6, 0.6, 0.3, 0.3), (0.05, 0.05, 0.0, 0.0), (1.0, 1.0, 2.0, 2.0)
+START = (0.6, 0.6, 0.3, 0.3)
+LOW = (0.05, 0.05, 0.0, 0.0)
+HIGH = (1.0, 1.0, 2.0, 2.0)
 """First values and limits of both shares and both corrections (chosen)."""
-UNIT, LEVEL, ROBUST, SAMPLE = 1e5, 3e5, 0.1, 400
-"""Unit of the pressures in the search and a high one [Pa], errors that count less, number of its windows (chosen)."""
-TRIED, REFINED = 20, 40
+UNIT = 1e5
+LEVEL = 3e5
+ROBUST = 0.1
+SAMPLE = 400
+"""Unit of the pressures in the search and a high one [Pa], errors that count less, number of its
+windows (chosen).
+"""
+TRIED = 20
+REFINED = 40
 """Evaluations for each delay and kind of the commands, and for the best of them (chosen)."""
 
 
@@ -71,10 +97,10 @@ TRIED, REFINED = 20, 40
 class RegulatorLag:
     """Two first-order lags in series behind a limited level, row by row, for one muscle.
 
-    c = clip(c + K u, c_min, c_max) where commands u are increments, c = clip(c_0 + K u, ...) where they are levels;
-    x += a_1 (c - x),   p += a_2 (x - p). While the pressure is measured, its error e corrects c and x by k_c e and
-    k_x e, and p is the reading. `values`: K, a_1, a_2, k_c, k_x, c_min, c_max [1e5 Pa], and c_0; `delay` of the command
-    in rows. The form is chosen.
+    c = clip(c + K u, c_min, c_max) where commands u are increments, c = clip(c_0 + K u, ...) where
+    they are levels; x += a_1 (c - x),   p += a_2 (x - p). While the pressure is measured, its error
+    e corrects c and x by k_c e and k_x e, and p is the reading. `values`: K, a_1, a_2, k_c, k_x,
+    c_min, c_max [1e5 Pa], and c_0; `delay` of the command in rows. The form is chosen.
     """
 
     values: tuple[float, ...]
@@ -82,38 +108,50 @@ class RegulatorLag:
     increments: bool
 
     def pressures(self, pressure: Array, command: Array) -> Array:
-        """Pressures (N, R) [Pa] whose first HISTORY + 1 rows are the readings, and the others follow from commands."""
+        """Pressures (N, R) [Pa] whose first HISTORY + 1 rows are the readings, and the others
+        follow from commands.
+        """
         gain, first, second, to_level, to_pilot, low, high, zero = self.values
-        found, step = pressure / UNIT, gain * command
-        level, pilot, p = found[:, 0], found[:, 0], found[:, 0]
+        found = pressure / UNIT
+        step = gain * command
+        level = found[:, 0]
+        pilot = found[:, 0]
+        p = found[:, 0]
         for k in range(1, found.shape[1]):
             aim = (level if self.increments else zero) + step[:, max(k - self.delay, 0)]
             level = np.minimum(np.maximum(aim, low), high)  # np.clip takes ten times as long
             pilot = pilot + first * (level - pilot)
             p = p + second * (pilot - p)
             if k <= HISTORY:
-                error, p = found[:, k] - p, found[:, k]
-                level, pilot = level + to_level * error, pilot + to_pilot * error
+                error = found[:, k] - p
+                p = found[:, k]
+                level = level + to_level * error
+                pilot = pilot + to_pilot * error
             else:
                 found[:, k] = p
         return found * UNIT
 
 
 def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorLag, ...]:
-    """The regulator of each muscle whose pressures over `rows` further rows are nearest to the measured ones. Empty if
-    an episode has no commands."""
+    """The regulator of each muscle whose pressures over `rows` further rows are nearest to the
+    measured ones. Empty if an episode has no commands."""
     if any(run.command is None for run in episodes.runs):
         return ()
-    pressure, command = cut(episodes, 0, rows).pressure, _commands(episodes, rows)
+    pressure = cut(episodes, 0, rows).pressure
+    command = _commands(episodes, rows)
     some = np.linspace(0, len(pressure) - 1, min(SAMPLE, len(pressure))).astype(int)
     columns = zip(pressure[some].transpose(2, 0, 1), command[some].transpose(2, 0, 1), strict=True)
     return tuple(_fit(p, u) for p, u in columns)
 
 
 def _fit(p: Array, u: Array) -> RegulatorLag:
-    """The regulator of readings (N, R) in any unit; a high one is LEVEL, the deviation of commands 1 in the search."""
-    scale, unit = (float(np.quantile(np.abs(p), 0.99)) or LEVEL) / LEVEL, float(np.std(u)) or 1.0
-    p, u = p / scale, u / unit
+    """The regulator of readings (N, R) in any unit; a high one is LEVEL, the deviation of commands
+    1 in the search.
+    """
+    scale = (float(np.quantile(np.abs(p), 0.99)) or LEVEL) / LEVEL
+    unit = float(np.std(u)) or 1.0
+    p = p / scale
+    u = u / unit
     low, high = np.quantile(p, (0.01, 0.99)) / UNIT
     spread = high - low + 1e-6
 
@@ -123,44 +161,71 @@ def _fit(p: Array, u: Array) -> RegulatorLag:
             return (found - p)[:, HISTORY + 1 :].ravel() / UNIT
 
         fit = least_squares(
-            errors, model.values, loss="soft_l1", f_scale=ROBUST, max_nfev=evaluations,
-            bounds=([-np.inf, *LOW, low - spread, high - spread / 2, -np.inf],
-                    [np.inf, *HIGH, low + spread / 2, high + spread, np.inf]),
+            errors,
+            model.values,
+            loss="soft_l1",
+            f_scale=ROBUST,
+            max_nfev=evaluations,
+            bounds=(
+                [-np.inf, *LOW, low - spread, high - spread / 2, -np.inf],
+                [np.inf, *HIGH, low + spread / 2, high + spread, np.inf],
+            ),
             x_scale=np.maximum(np.abs(model.values), 0.1),
-        )  # fmt: skip
+        )
         return float(fit.cost), dataclasses.replace(model, values=tuple(fit.x.tolist()))
 
     gains = np.array([np.std(np.diff(p)), np.std(p)]) / UNIT / max(float(np.std(u)), 1e-12)
     first = [
-        RegulatorLag((gain, *START, low, high, float(np.mean(p / UNIT - gain * u))), delay, increments)
+        RegulatorLag(
+            (gain, *START, low, high, float(np.mean(p / UNIT - gain * u))), delay, increments
+        )
         for gain, increments in zip(gains.tolist(), (True, False), strict=True)
         for delay in DELAYS
     ]
-    best, longest = min((search(model, TRIED) for model in first), key=lambda trial: trial[0]), DELAYS[-1]
+    best = min((search(model, TRIED) for model in first), key=lambda trial: trial[0])
+    longest = DELAYS[-1]
     while best[1].delay == longest < HISTORY:
         longest += 1
-        best = min(best, search(dataclasses.replace(best[1], delay=longest), TRIED), key=lambda trial: trial[0])
+        best = min(
+            best,
+            search(dataclasses.replace(best[1], delay=longest), TRIED),
+            key=lambda trial: trial[0],
+        )
     found = search(best[1], REFINED)[1]
     gain, *shares = found.values[:5]
-    return dataclasses.replace(found, values=(gain * scale / unit, *shares, *(scale * v for v in found.values[5:])))
+    return dataclasses.replace(
+        found, values=(gain * scale / unit, *shares, *(scale * v for v in found.values[5:]))
+    )
 
 
 def from_commands(
-    regulators: Sequence[RegulatorLag], episodes: Episodes, delay: int, rows: int, pairs: Sequence[tuple[int, int]]
+    regulators: Sequence[RegulatorLag],
+    episodes: Episodes,
+    delay: int,
+    rows: int,
+    pairs: Sequence[tuple[int, int]],
 ) -> tuple[Windows, list[str]]:
-    """The windows of `cut`, in which the pressures after the start follow from the commands, and a remark on muscles
-    whose pressures hardly do."""
-    windows, command = cut(episodes, 0, rows), _commands(episodes, rows)
-    found = [r.pressures(windows.pressure[:, :, i], command[:, :, i]) for i, r in enumerate(regulators)]
+    """The windows of `cut`, in which the pressures after the start follow from the commands, and a
+    remark on muscles whose pressures hardly do."""
+    windows = cut(episodes, 0, rows)
+    command = _commands(episodes, rows)
+    found = [
+        r.pressures(windows.pressure[:, :, i], command[:, :, i]) for i, r in enumerate(regulators)
+    ]
     later = np.minimum(np.arange(HISTORY + 1 + rows) + delay, HISTORY + rows)
-    commanded, true = np.stack(found, axis=-1)[:, later], windows.pressure[:, later]
+    commanded = np.stack(found, axis=-1)[:, later]
+    true = windows.pressure[:, later]
     errors = rms((commanded - true)[:, HISTORY + 1 :])
     changes = rms(true[:, HISTORY + 1 :] - true[:, HISTORY : HISTORY + 1])
-    muscles = zip((str(muscle) for pair in pairs for muscle in pair), errors > UNEXPLAINED * changes, strict=True)
+    muscles = zip(
+        (str(muscle) for pair in pairs for muscle in pair),
+        errors > UNEXPLAINED * changes,
+        strict=True,
+    )
     names = ", ".join(name for name, wrong in muscles if wrong)
     text = (
-        f"the commands hardly explain the pressures of muscle {names}: they never vary, are of another muscle, or "
-        f"act after more than {HISTORY} rows"
+        f"the commands hardly explain the pressures of muscle {names}: they never vary, are of"
+        f" another muscle, or act after more than {HISTORY} rows"
     )
     return dataclasses.replace(windows, pressure=commanded), [text] if names else []
 
@@ -171,7 +236,8 @@ def _commands(episodes: Episodes, rows: int) -> Array:
     return cut(dataclasses.replace(episodes, runs=tuple(runs)), 0, rows).pressure
 
 
-# Hybrid law: what physics leaves in the free run, fitted as a residual and judged on episodes held back
+# Hybrid law: what physics leaves in the free run, fitted as a residual and judged on episodes held
+# back
 
 CENTRES = 100
 """Number of centres, rows of the fitted episodes drawn at random (chosen)."""
@@ -180,17 +246,23 @@ RIDGES = (50.0, 5.0)
 SEARCH_OF_RESIDUAL = SearchStage(40, 20, 240)
 """The search with each ridge, from the result of the one before (chosen)."""
 HELD_BACK = 0.1
-"""Share of the fitted episodes, the last ones, that chooses the ridge and the joints with a residual (chosen)."""
-FAR, GAIN, LOSS = 0.05, 0.15, 0.05
-"""Share of the windows, by the distance of their episodes, that counts as far from the data; gain and loss of a law
-that is accepted."""
+"""Share of the fitted episodes, the last ones, that chooses the ridge and the joints with a
+residual (chosen).
+"""
+FAR = 0.05
+GAIN = 0.15
+LOSS = 0.05
+"""Share of the windows, by the distance of their episodes, that counts as far from the data; gain
+and loss of a law that is accepted."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ResidualGain:
-    """Errors (N, rows, J) [rad] of the free run of physics alone and of the hybrid law over the same windows.
+    """Errors (N, rows, J) [rad] of the free run of physics alone and of the hybrid law over the
+    same windows.
 
-    distance (N,) of the episode of each window from the centres of the residual, relative to its scales.
+    distance (N,) of the episode of each window from the centres of the residual, relative to its
+    scales.
     """
 
     physics: Array
@@ -203,36 +275,56 @@ class ResidualGain:
         return np.asarray(rms(self.hybrid[which]) / rms(self.physics[which]) - 1.0)
 
     def accepts(self, joint: int) -> bool:
-        """Whether a joint gains GAIN near the data, loses LOSS at most far from it, and no other loses more."""
-        near, far = self.change(far=False), self.change(far=True)
+        """Whether a joint gains GAIN near the data, loses LOSS at most far from it, and no other
+        loses more.
+        """
+        near = self.change(far=False)
+        far = self.change(far=True)
         return bool(near[joint] <= -GAIN and far[joint] <= LOSS and np.all(near <= LOSS))
 
     def __str__(self) -> str:
-        near, far = (", ".join(f"{100 * c:+.0f}" for c in self.change(far)) for far in (False, True))
-        return f"{near} % of the rms error of joints 1 to {self.hybrid.shape[2]} near the data, {far} % far from it"
+        near, far = (
+            ", ".join(f"{100 * c:+.0f}" for c in self.change(far)) for far in (False, True)
+        )
+        return (
+            f"{near} % of the rms error of joints 1 to {self.hybrid.shape[2]} near the data, {far}"
+            " % far from it"
+        )
 
 
 def fit_residual(
-    arm: PressureDriven, episodes: Episodes, *, delay: int = 0, rows: int = ROWS, centres: int = CENTRES, seed: int = 0,
+    arm: PressureDriven,
+    episodes: Episodes,
+    *,
+    delay: int = 0,
+    rows: int = ROWS,
+    centres: int = CENTRES,
+    seed: int = 0,
     progress: Callable[[str], None] = lambda text: None,
-) -> tuple[PressureDriven, list[int]]:  # fmt: skip
-    """The arm with a residual, joint after joint, and the joints (from 1) whose gain episodes held back confirm.
+) -> tuple[PressureDriven, list[int]]:
+    """The arm with a residual, joint after joint, and the joints (from 1) whose gain episodes held
+    back confirm.
 
-    arm      with stick-slip; its pressures are those of the episodes, in their order, `delay` rows later
-    centres  number of the Gaussian functions
+    arm      with stick-slip; its pressures are those of the episodes, in their order, `delay` rows
+    later centres  number of the Gaussian functions
 
-    Physics stays as it is. The ridge draws towards the residual of the joints before; of its weights that episodes held
-    back confirm, the one with the smallest error of the joint there is taken. A residual without any joint is zero.
+    Physics stays as it is. The ridge draws towards the residual of the joints before; of its
+    weights that episodes held back confirm, the one with the smallest error of the joint there is
+    taken. A residual without any joint is zero.
     """
     split = max(1, round((1.0 - HELD_BACK) * len(episodes)))
-    every, held = cut(episodes[:split], delay, rows, stride=max(1, rows // 2)), cut(episodes[split:], delay, rows)
+    every = cut(episodes[:split], delay, rows, stride=max(1, rows // 2))
+    held = cut(episodes[split:], delay, rows)
     train, _ = without_saturated(every, episodes)
-    residual, accepted = _gaussian_residual(arm, episodes[:split], centres, seed), list[int]()
+    residual = _gaussian_residual(arm, episodes[:split], centres, seed)
+    accepted = list[int]()
     hybrid_mechanism = dataclasses.replace(cast(WithStickSlip, arm.mechanism), residual=residual)
     found = dataclasses.replace(arm, mechanism=hybrid_mechanism)
     far = distance(found, held)
     for joint in range(episodes.joints):
-        before, trials, count = run_errors(found, held), [], len(residual.energies)
+        before = run_errors(found, held)
+        trials = []
+        count = len(residual.energies)
         paths = [f"mechanism.residual.energies[{k}]" for k in range(count)]
         paths += [f"mechanism.residual.friction_logs[{joint * count + k}]" for k in range(count)]
         values = {leaf.path: float(leaf.value) for leaf in tree.leaves(found)}
@@ -245,42 +337,78 @@ def fit_residual(
             progress(f"residual of joint {joint + 1}, ridge of {ridge:g}: {gain}")
         _, hybrid, gain = min(trials, key=lambda trial: (not trial[2].accepts(joint), trial[0]))
         if gain.accepts(joint):
-            found, accepted = hybrid, [*accepted, joint + 1]
+            found = hybrid
+            accepted = [*accepted, joint + 1]
     return found, accepted
 
 
 def judged_residual(
-    arm: PressureDriven, fitted: Episodes, judge: Windows, delay: int, seed: int, progress: Callable[[str], None]
+    arm: PressureDriven,
+    fitted: Episodes,
+    judge: Windows,
+    delay: int,
+    seed: int,
+    progress: Callable[[str], None],
 ) -> tuple[PressureDriven, ResidualGain, str]:
-    """The arm with the residual that episodes held back confirm, or as it is; its gain on other windows; in words."""
-    hybrid, joints = fit_residual(arm, fitted, delay=delay, rows=judge.rows, seed=seed, progress=progress)
+    """The arm with the residual that episodes held back confirm, or as it is; its gain on other
+    windows; in words.
+    """
+    hybrid, joints = fit_residual(
+        arm, fitted, delay=delay, rows=judge.rows, seed=seed, progress=progress
+    )
     gain = ResidualGain(run_errors(arm, judge), run_errors(hybrid, judge), distance(hybrid, judge))
     if not joints:
-        return arm, gain, f"physics suffices: no residual gains {100 * GAIN:g} % on fitted episodes held back"
+        return (
+            arm,
+            gain,
+            f"physics suffices: no residual gains {100 * GAIN:g} % on fitted episodes held back",
+        )
     names = ", ".join(map(str, joints))
     rest = "" if len(joints) == judge.angle.shape[2] else "; for the other joints physics suffices"
-    return hybrid, gain, f"hybrid law, with a residual for joint {names}{rest}: on the episodes left out {gain}"
+    return (
+        hybrid,
+        gain,
+        f"hybrid law, with a residual for joint {names}{rest}: on the episodes left out {gain}",
+    )
 
 
-def _gaussian_residual(arm: PressureDriven, episodes: Episodes, centres: int, seed: int) -> GaussianResidual:
-    """A residual without effect, whose centres are rows of the episodes and whose scales are their deviations."""
+def _gaussian_residual(
+    arm: PressureDriven, episodes: Episodes, centres: int, seed: int
+) -> GaussianResidual:
+    """A residual without effect, whose centres are rows of the episodes and whose scales are their
+    deviations.
+    """
     rows = [episodes.rows(name) for name in ("angle", "pressure")]
-    scales = [np.maximum(each.std(axis=0), least) for each, least in zip(rows, (1e-3, 1e3), strict=True)]
-    scaled = np.concatenate([each / scale for each, scale in zip(rows, scales, strict=True)], axis=1)
-    count, joints = min(centres, len(scaled)), episodes.joints
+    scales = [
+        np.maximum(each.std(axis=0), least) for each, least in zip(rows, (1e-3, 1e3), strict=True)
+    ]
+    scaled = np.concatenate(
+        [each / scale for each, scale in zip(rows, scales, strict=True)], axis=1
+    )
+    count = min(centres, len(scaled))
+    joints = episodes.joints
     some = scaled[np.random.default_rng(seed).permutation(len(scaled))[:count]]
     return GaussianResidual(
-        tuple(f"{prefix}pressure" for prefix in arm.prefixes), tuple(scales[0].tolist()), tuple(scales[1].tolist()),
-        tuple(some.ravel().tolist()), (0.0,) * count, (0.0,) * (count * joints),
-    )  # fmt: skip
+        tuple(f"{prefix}pressure" for prefix in arm.prefixes),
+        tuple(scales[0].tolist()),
+        tuple(scales[1].tolist()),
+        tuple(some.ravel().tolist()),
+        (0.0,) * count,
+        (0.0,) * (count * joints),
+    )
 
 
 def distance(arm: PressureDriven, windows: Windows) -> Array:
-    """Distance (N,) of the episode of each window from the nearest centres, rms over rows and coordinates."""
+    """Distance (N,) of the episode of each window from the nearest centres, rms over rows and
+    coordinates.
+    """
     residual = cast(GaussianResidual, cast(WithStickSlip, arm.mechanism).residual)
     scales = np.array([*residual.angle_scales, *residual.pressure_scales])
     centres = np.array(residual.centres).reshape(-1, len(scales))
-    x = np.concatenate([windows.angle[:, HISTORY:], windows.pressure[:, HISTORY:]], axis=-1) / scales
+    x = (
+        np.concatenate([windows.angle[:, HISTORY:], windows.pressure[:, HISTORY:]], axis=-1)
+        / scales
+    )
     nearest = np.min([np.mean((x - centre) ** 2, axis=-1) for centre in centres], axis=0)
     total, count = (np.bincount(windows.episode, w) for w in (np.mean(nearest, axis=1), None))
     return np.asarray(np.sqrt(total / np.maximum(count, 1))[windows.episode])

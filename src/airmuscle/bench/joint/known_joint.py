@@ -1,11 +1,24 @@
-"""Identification of the few unknown numbers of an arm of library muscles and mechanisms, from episodes."""
+"""Identification of the few unknown numbers of an arm of library muscles and mechanisms, from
+episodes.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError, StateVariable, System, Value, Values, model, parameter, suggestion, tree
+from ...core import (
+    Array,
+    ParameterError,
+    StateVariable,
+    System,
+    Value,
+    Values,
+    model,
+    parameter,
+    suggestion,
+    tree,
+)
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, with_slopes, with_values
 from .episode_inspection import checked_inspection, without_saturated
@@ -18,23 +31,30 @@ FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")
 """Fields of a mechanism that are estimated unless others are named."""
 READINGS = {"zeros": " Pa", "gains": ""}
 """Names that stand for the zeros and the gains of all pressures, with the units of their values."""
-SAMPLE, EVALUATIONS = 300, 40
+SAMPLE = 300
+EVALUATIONS = 40
 """Windows and evaluations of the search (chosen)."""
 FAR = 10.0
-"""Ratio of an estimate to its first value, or of what must be positive its inverse, that is doubted (chosen)."""
+"""Ratio of an estimate to its first value, or of what must be positive its inverse, that is doubted
+(chosen).
+"""
 SIZES = {"zeros": 1e4, "gains": 1.0, "offset": 0.05}
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
 
 
 @model
 class ReadPressures(System):
-    """An arm whose pressures are read with a gain and a zero, p = g (r - z); states and inputs are the readings r."""
+    """An arm whose pressures are read with a gain and a zero, p = g (r - z); states and inputs are
+    the readings r.
+    """
 
     from_file: ClassVar[bool] = False
 
     arm: PressureDriven
     gains: tuple[float, ...] = parameter("1", "g", "pressure over reading", bounds=(0.1, 10.0))
-    zeros: tuple[float, ...] = parameter("Pa", "z", "reading at ambient pressure", bounds=(-5e5, 5e5))
+    zeros: tuple[float, ...] = parameter(
+        "Pa", "z", "reading at ambient pressure", bounds=(-5e5, 5e5)
+    )
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -45,10 +65,13 @@ class ReadPressures(System):
         return self.arm.inputs
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
-        acting, given = dict(state), dict(inputs)
+        acting = dict(state)
+        given = dict(inputs)
         for prefix, gain, zero in zip(self.arm.prefixes, self.gains, self.zeros, strict=True):
             acting[f"{prefix}pressure"] = gain * (state[f"{prefix}pressure"] - zero)
-            given[f"{prefix}measured_pressure"] = gain * (inputs[f"{prefix}measured_pressure"] - zero)
+            given[f"{prefix}measured_pressure"] = gain * (
+                inputs[f"{prefix}measured_pressure"] - zero
+            )
         found = self.arm.rates(acting, given)
         for prefix, gain in zip(self.arm.prefixes, self.gains, strict=True):
             found[f"{prefix}pressure"] = found[f"{prefix}pressure"] / gain
@@ -59,55 +82,82 @@ class ReadPressures(System):
 
 
 def fit_known_joint(
-    arm: PressureDriven, episodes: Episodes, free: Sequence[str] = (), *, pairs: Sequence[tuple[int, int]] = (),
-    left_out: float | None = None, rows: int = ROWS, progress: Callable[[str], None] = lambda text: None,
-) -> ArmFit:  # fmt: skip
-    """Estimate the unknown numbers of an arm of known muscles and geometry, such as those of the library.
+    arm: PressureDriven,
+    episodes: Episodes,
+    free: Sequence[str] = (),
+    *,
+    pairs: Sequence[tuple[int, int]] = (),
+    left_out: float | None = None,
+    rows: int = ROWS,
+    progress: Callable[[str], None] = lambda text: None,
+) -> ArmFit:
+    """Estimate the unknown numbers of an arm of known muscles and geometry, such as those of the
+    library.
 
-    arm   muscle i has the pressure i of the episodes, coordinate j their angle j; the search starts from its values
-    free  paths of its parameters, `zeros`, `gains` and `lags` for those of all pressure readings; by default inertia,
+    arm   muscle i has the pressure i of the episodes, coordinate j their angle j; the search starts
+    from its values free  paths of its parameters, `zeros`, `gains` and `lags` for those of all
+    pressure readings; by default inertia,
           damping, offset, weight and dry friction of the mechanism, the lags and the zeros
 
-    The objective is the robust error of the free run over windows, with exact gradients. Gains and inertia together are
-    separated by forces alone that do not grow with the pressure, such as that of the rubber. Other arguments and the
-    result are those of `fit_joint`. Raises IdentificationError for episodes that `inspect_episodes` refuses,
-    ParameterError for another number of pressures or angles, other pairs, and a path that the arm does not have.
+    The objective is the robust error of the free run over windows, with exact gradients. Gains and
+    inertia together are separated by forces alone that do not grow with the pressure, such as that
+    of the rubber. Other arguments and the result are those of `fit_joint`. Raises
+    IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for another
+    number of pressures or angles, other pairs, and a path that the arm does not have.
     """
-    count, joints = len(arm.muscle), len(arm.mechanism.coordinates)
+    count = len(arm.muscle)
+    joints = len(arm.mechanism.coordinates)
     episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
     if (episodes.muscles, episodes.joints, count) != (count, joints, 2 * joints):
         raise ParameterError(
-            f"fit_known_joint: the episodes have {episodes.muscles} pressures and {episodes.joints} angles, the arm "
-            f"{count} muscles and {joints} coordinates; give two muscles for each angle, in the order of the columns."
+            f"fit_known_joint: the episodes have {episodes.muscles} pressures and {episodes.joints}"
+            f" angles, the arm {count} muscles and {joints} coordinates; give two muscles for each"
+            " angle, in the order of the columns."
         )
     own = _pairs(arm, episodes)
     if pairs and tuple(pairs) != own:
         raise ParameterError(
-            f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has {list(own)}; leave pairs out "
-            "of the mapping file, or order its columns of pressures as the muscles of the joint."
+            f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has"
+            f" {list(own)}; leave pairs out of the mapping file, or order its columns of pressures"
+            " as the muscles of the joint."
         )
     inspection = checked_inspection(episodes, own, rows)
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
-    judge, whole = (cut(part, inspection.delay, rows) for part in (episodes[split:], episodes[:split]))
+    judge, whole = (
+        cut(part, inspection.delay, rows) for part in (episodes[split:], episodes[:split])
+    )
     train, clipped = without_saturated(whole, episodes)
     search = KnownSearch(system, paths, train.part(range(0, len(train), -(-len(train) // SAMPLE))))
     system = search.run()
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
-    progress(f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes left out")
+    progress(
+        f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes"
+        " left out"
+    )
     estimates, covariance, remarks = search.separate(system)
     of_arm = [i for i, path in enumerate(paths) if path.startswith("arm.")]
     return ArmFit(
-        system.arm, inspection, own, errors, judge.episode,
-        baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in of_arm),
-        (*short, *inspection.remarks, *clipped, *remarks), split, covariance=covariance[np.ix_(of_arm, of_arm)],
-    )  # fmt: skip
+        system.arm,
+        inspection,
+        own,
+        errors,
+        judge.episode,
+        baseline_errors(episodes[:split], episodes[split:], rows),
+        band(errors),
+        tuple(estimates[i] for i in of_arm),
+        (*short, *inspection.remarks, *clipped, *remarks),
+        split,
+        covariance=covariance[np.ix_(of_arm, of_arm)],
+    )
 
 
 def _pairs(arm: PressureDriven, episodes: Episodes) -> tuple[tuple[int, int], ...]:
-    """For each coordinate its muscles, from 1, first the one with the greater moment arm at the median angles."""
+    """For each coordinate its muscles, from 1, first the one with the greater moment arm at the
+    median angles.
+    """
     names = [c.name for c in arm.mechanism.coordinates]
     at = dict(zip(names, np.median(episodes.rows("angle"), axis=0).tolist(), strict=True))
     unit = np.eye(len(arm.muscle)).tolist()
@@ -120,7 +170,11 @@ def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
     """The paths in the system of what is estimated."""
     leaves = [leaf.path for leaf in tree.leaves(system)]
     if not free:
-        fields = [path for path in leaves if path.startswith("arm.mechanism.") and path.rsplit(".")[-1] in FIELDS]
+        fields = [
+            path
+            for path in leaves
+            if path.startswith("arm.mechanism.") and path.rsplit(".")[-1] in FIELDS
+        ]
         free = [*(path.removeprefix("arm.") for path in fields), "lags", "zeros"]
     found = []
     for name in free:
@@ -128,16 +182,20 @@ def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
         own = [path for path in leaves if path == whole or path.startswith(f"{whole}[")]
         if not own:
             raise ParameterError(
-                f"fit_known_joint: the arm has no parameter '{name}'; allowed are zeros, gains and the paths of its "
-                f"parameters, such as {leaves[-1].removeprefix('arm.')}.{suggestion(whole, leaves)}"
+                f"fit_known_joint: the arm has no parameter '{name}'; allowed are zeros, gains and"
+                " the paths of its parameters, such as"
+                f" {leaves[-1].removeprefix('arm.')}.{suggestion(whole, leaves)}"
             )
         found += own
     return list(dict.fromkeys(found))
 
 
 def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
-    """Errors (N, rows, J) [rad] of the free run, and their derivatives (N, rows, J, P) by the parameters."""
-    arm, step = system.arm, windows.sample_time
+    """Errors (N, rows, J) [rad] of the free run, and their derivatives (N, rows, J, P) by the
+    parameters.
+    """
+    arm = system.arm
+    step = windows.sample_time
     state = {s.name: np.zeros(len(windows)) for s in arm.states}
     for j, c in enumerate(arm.mechanism.coordinates):
         state |= {c.name: windows.angle[:, HISTORY, j], c.speed: windows.speed[:, HISTORY, j]}
@@ -145,12 +203,15 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
         state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, step)
     names = [c.name for c in arm.mechanism.coordinates]
     found, slopes = with_slopes(system, paths, windows.pressure[:, HISTORY:], step, state, names)
-    error, counts = found[:, 1:] - windows.angle[:, HISTORY + 1 :], windows.counts[:, HISTORY + 1 :, None]
+    error = found[:, 1:] - windows.angle[:, HISTORY + 1 :]
+    counts = windows.counts[:, HISTORY + 1 :, None]
     return np.where(counts, error, 0.0), np.where(counts[..., None], slopes[:, 1:], 0.0)
 
 
 class KnownSearch:
-    """Robust least squares of the free run over windows, in parameters that are scaled by their sizes."""
+    """Robust least squares of the free run over windows, in parameters that are scaled by their
+    sizes.
+    """
 
     def __init__(self, system: ReadPressures, paths: Sequence[str], windows: Windows) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(system)}
@@ -158,15 +219,24 @@ class KnownSearch:
         self.start = np.array([float(leaves[path].value) for path in paths])
         fields = [path.rsplit(".", 1)[-1].split("[")[0] for path in paths]
         pairs = zip(fields, np.abs(self.start), strict=True)
-        self.sizes = np.array([max(value, SIZES.get(field, value or 1.0)) for field, value in pairs])
-        self.low, self.high = (np.array([leaves[path].declared.bounds[i] for path in paths]) for i in (0, 1))
+        self.sizes = np.array(
+            [max(value, SIZES.get(field, value or 1.0)) for field, value in pairs]
+        )
+        self.low, self.high = (
+            np.array([leaves[path].declared.bounds[i] for path in paths]) for i in (0, 1)
+        )
         self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros(0))
 
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
         if self._last[0] != scaled.tobytes():
-            error, slope = _run(with_values(self.system, self.paths, scaled * self.sizes), self.paths, self.windows)
-            lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(slope).all(axis=-1)
-            error, slope = np.where(lost, OUTLIER, error), np.where(lost[..., None], 0.0, slope)
+            error, slope = _run(
+                with_values(self.system, self.paths, scaled * self.sizes), self.paths, self.windows
+            )
+            lost = (
+                ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(slope).all(axis=-1)
+            )
+            error = np.where(lost, OUTLIER, error)
+            slope = np.where(lost[..., None], 0.0, slope)
             self._last = scaled.tobytes(), error, slope * self.sizes
         return self._last[1:]
 
@@ -175,14 +245,20 @@ class KnownSearch:
         from scipy.optimize import least_squares
 
         found = least_squares(
-            lambda x: self._evaluate(x)[0].ravel(), np.clip(self.start, self.low, self.high) / self.sizes,
-            jac=lambda x: self._evaluate(x)[1].reshape(-1, len(self.paths)), loss="soft_l1", f_scale=CLIP,
-            bounds=(self.low / self.sizes, self.high / self.sizes), max_nfev=EVALUATIONS,
-        )  # fmt: skip
+            lambda x: self._evaluate(x)[0].ravel(),
+            np.clip(self.start, self.low, self.high) / self.sizes,
+            jac=lambda x: self._evaluate(x)[1].reshape(-1, len(self.paths)),
+            loss="soft_l1",
+            f_scale=CLIP,
+            bounds=(self.low / self.sizes, self.high / self.sizes),
+            max_nfev=EVALUATIONS,
+        )
         return with_values(self.system, self.paths, found.x * self.sizes)
 
     def separate(self, system: ReadPressures) -> tuple[list[ArmParameter], Array, list[str]]:
-        """Estimates, their covariance along what the record separates, and remarks; a window is one observation."""
+        """Estimates, their covariance along what the record separates, and remarks; a window is one
+        observation.
+        """
         leaves = {leaf.path: float(leaf.value) for leaf in tree.leaves(system)}
         values = np.array([leaves[path] for path in self.paths])
         error, slope = self._evaluate(values / self.sizes)
@@ -193,16 +269,25 @@ class KnownSearch:
         remarks = [
             f"{field[:-1]} of pressure {int(number[:-1]) + 1}: {each.value:.4g} ± "
             f"{float(f'{each.standard_error:.2g}'):g}{READINGS[field]}"
-            for each in estimates for field, _, number in [each.path.partition("[")] if field in READINGS
-        ]  # fmt: skip
+            for each in estimates
+            for field, _, number in [each.path.partition("[")]
+            if field in READINGS
+        ]
         far = []  # estimates that no such joint has
-        for name, value, own, *ends in zip(names, values, self.start, self.low, self.high, strict=True):
+        for name, value, own, *ends in zip(
+            names, values, self.start, self.low, self.high, strict=True
+        ):
             if abs(value) > FAR * abs(own) > 0.0 or (ends[0] > 0.0 and value < own / FAR):
                 far.append(f"{name} is {value:.3g}, {value / own:.3g} times its first value")
             elif value and np.isclose(value, ends, 1e-3).any():
                 far.append(f"{name} ends at the limit of its range, {value:.3g}")
         text = (
-            f"{'; '.join(far)}: another joint, or a wrong sample time (inertia grows with its square, damping and lags "
-            "with it), or a wrong scale of angles or pressures; do not use the numbers before this is explained"
+            f"{'; '.join(far)}: another joint, or a wrong sample time (inertia grows with its"
+            " square, damping and lags with it), or a wrong scale of angles or pressures; do not"
+            " use the numbers before this is explained"
         )
-        return estimates, covariance, [*remarks, *([text] if far else []), *not_separated("", names, shares)]
+        return (
+            estimates,
+            covariance,
+            [*remarks, *([text] if far else []), *not_separated("", names, shares)],
+        )

@@ -1,4 +1,6 @@
-"""ArmFit: an arm identified from episodes, with its free-run errors beside the baselines, and its plant."""
+"""ArmFit: an arm identified from episodes, with its free-run errors beside the baselines, and its
+plant.
+"""
 
 import dataclasses
 import re
@@ -22,7 +24,9 @@ SUPPLY = 6e5
 
 @dataclasses.dataclass(frozen=True)
 class ArmParameter:
-    """A parameter by its path in the arm, its value and its standard error [SI], a window as one observation."""
+    """A parameter by its path in the arm, its value and its standard error [SI], a window as one
+    observation.
+    """
 
     path: str
     value: float
@@ -35,17 +39,17 @@ class ArmFit(Reported):
 
     arm          the arm along measured pressures, with the identified parameters
     inspection   of all episodes
-    pairs        muscles, from 1, that raise and lower each angle; muscle 2j and 2j + 1 of `arm` are the pair of joint j
-    errors       (N, rows, J) [rad] of the free run on the episodes left out; `episode` (N,) their numbers
-    by_baseline  errors of the same windows by the name of the baseline
-    band         (rows, J) half-width of the band of the free run that holds 95 % of these errors [rad]
-    estimates    parameters with their standard errors
-    remarks      what the record does not separate, and what the fit left out
-    fitted       number of the episodes, the first ones, of the fit
-    regulators   of the muscles of `arm`, between command and pressure; empty where the episodes have no commands
-    commanded    errors as `errors`, of the free run from the commands alone, or None
-    covariance   (P, P) of `estimates` [SI] along what the record separates; with others the arm moves alike
-    gain         errors of the physics alone and of the hybrid law, where one was asked for, or None
+    pairs        muscles, from 1, that raise and lower each angle; muscle 2j and 2j + 1 of `arm` are
+    the pair of joint j errors       (N, rows, J) [rad] of the free run on the episodes left out;
+    `episode` (N,) their numbers by_baseline  errors of the same windows by the name of the baseline
+    band         (rows, J) half-width of the band of the free run that holds 95 % of these errors
+    [rad] estimates    parameters with their standard errors remarks      what the record does not
+    separate, and what the fit left out fitted       number of the episodes, the first ones, of the
+    fit regulators   of the muscles of `arm`, between command and pressure; empty where the episodes
+    have no commands commanded    errors as `errors`, of the free run from the commands alone, or
+    None covariance   (P, P) of `estimates` [SI] along what the record separates; with others the
+    arm moves alike gain         errors of the physics alone and of the hybrid law, where one was
+    asked for, or None
     """
 
     arm: PressureDriven
@@ -77,56 +81,87 @@ class ArmFit(Reported):
 
     @property
     def skill(self) -> Array:
-        """1 - error/error of the best baseline (J,): 1 for a perfect prediction, 0 for none beyond the baseline."""
-        return np.asarray(1.0 - self.rms / np.min([rms(errors) for errors in self.by_baseline.values()], axis=0))
+        """1 - error/error of the best baseline (J,): 1 for a perfect prediction, 0 for none beyond
+        the baseline.
+        """
+        return np.asarray(
+            1.0 - self.rms / np.min([rms(errors) for errors in self.by_baseline.values()], axis=0)
+        )
 
     @property
     def coverage(self) -> Array:
-        """Share (J,) of errors on one half of the episodes left out inside a band from the other half."""
+        """Share (J,) of errors on one half of the episodes left out inside a band from the other
+        half.
+        """
         return coverage(self.errors, self.episode)
 
     @property
     def horizon(self) -> Array:
         """Times [s] after the start of a window at which `band` and the errors stand."""
-        return np.asarray(self.inspection.episodes.sample_time * np.arange(1, self.errors.shape[1] + 1))
+        return np.asarray(
+            self.inspection.episodes.sample_time * np.arange(1, self.errors.shape[1] + 1)
+        )
 
     def plant(self) -> Plant:
-        """The arm with a proportional regulator for each muscle, whose time constant is the lag of its pressure.
+        """The arm with a proportional regulator for each muscle, whose time constant is the lag of
+        its pressure.
 
         Supply, orifices and volumes of the muscles are chosen: the record does not contain them.
         """
         valve = Valve(3e-8, 0.3)
         regulators = tuple(
-            ProportionalRegulator(Supply(SUPPLY), valve, valve, SecondOrderLag(1 / (2 * np.pi * lag), 1.0), 2e4, SUPPLY)
+            ProportionalRegulator(
+                Supply(SUPPLY),
+                valve,
+                valve,
+                SecondOrderLag(1 / (2 * np.pi * lag), 1.0),
+                2e4,
+                SUPPLY,
+            )
             for lag in self.arm.lags
         )
         return Plant(self.arm.muscle, regulators, self.arm.mechanism)
 
     def uncertainty(self) -> PlantUncertainty:
-        """That of `plant()`, for randomisation: rms errors of its angles, and the covariance of its parameters, where a
-        parameter at a bound of its range has no variance."""
-        paths, slopes = [], []
+        """That of `plant()`, for randomisation: rms errors of its angles, and the covariance of its
+        parameters, where a parameter at a bound of its range has no variance."""
+        paths = []
+        slopes = []
         bounds = {leaf.path: leaf.declared.bounds for leaf in tree.leaves(self.arm)}
         for each in self.estimates:
             lag = re.fullmatch(r"lags(\[\d+\])", each.path)
             paths.append((f"circuit{lag[1]}.lag.frequency" if lag else each.path,))
-            slopes.append(-1 / (2 * np.pi * each.value**2) if lag else float(each.value not in bounds[each.path]))
-        errors = {c.name: float(rms) for c, rms in zip(self.arm.mechanism.coordinates, self.rms, strict=True)}
+            slopes.append(
+                -1 / (2 * np.pi * each.value**2)
+                if lag
+                else float(each.value not in bounds[each.path])
+            )
+        errors = {
+            c.name: float(rms)
+            for c, rms in zip(self.arm.mechanism.coordinates, self.rms, strict=True)
+        }
         return PlantUncertainty(errors, tuple(paths), self.covariance * np.outer(slopes, slopes))
 
     def chapter(self) -> Chapter:
-        """The description of the fit: errors beside those of the baselines, skill, band, muscles and parameters."""
-        end, count = self.horizon[-1], len(np.unique(self.episode))
+        """The description of the fit: errors beside those of the baselines, skill, band, muscles
+        and parameters.
+        """
+        end = self.horizon[-1]
+        count = len(np.unique(self.episode))
         skill = ", ".join(f"joint {j}: {value:.2f}" for j, value in enumerate(self.skill, start=1))
         band = (
-            "the 95 % band of the model (shaded), which is the 95th percentile of the errors at each row."
-            if count >= ENOUGH else f"the greatest errors of {count} episodes (shaded), which are no 95 % band."
-        )  # fmt: skip
-        caption = f"Root mean square error against the horizon: the model, its baselines, and {band}"
+            "the 95 % band of the model (shaded), which is the 95th percentile of the errors at"
+            " each row."
+            if count >= ENOUGH
+            else f"the greatest errors of {count} episodes (shaded), which are no 95 % band."
+        )
+        caption = (
+            f"Root mean square error against the horizon: the model, its baselines, and {band}"
+        )
         summary = (
-            f"Angles are predicted from the state at the start of a window and from the pressures alone: free run over "
-            f"{end:.3g} s on {count} episodes left out, {len(self.errors)} windows. Skill, 1 - error/error of the best "
-            f"baseline: {skill}."
+            "Angles are predicted from the state at the start of a window and from the pressures"
+            f" alone: free run over {end:.3g} s on {count} episodes left out, {len(self.errors)}"
+            f" windows. Skill, 1 - error/error of the best baseline: {skill}."
         )
         values = (
             NamedValue("horizon", float(end), "s", digits=3, brief=False),
@@ -134,31 +169,45 @@ class ArmFit(Reported):
             NamedValue("delay in rows", self.inspection.delay, brief=False),
         )
         bands: dict[str, Any] = {"horizon": TableColumn(self.horizon, "s")}
-        bands |= {f"joint {j}": TableColumn(each, "rad", "deg") for j, each in enumerate(self.band.T, start=1)}
+        bands |= {
+            f"joint {j}": TableColumn(each, "rad", "deg")
+            for j, each in enumerate(self.band.T, start=1)
+        }
         parameters = {
             "parameter": [each.path for each in self.estimates],
             "value [SI]": [each.value for each in self.estimates],
             "standard error [SI]": [each.standard_error for each in self.estimates],
         }
         tables = (
-            self._error_table(), self._joint_table(),
+            self._error_table(),
+            self._joint_table(),
             Table("joint-band", "Half width of the 95 % band", bands, shown=False),
             Table("joint-parameters", "Identified parameters", parameters, key="parameters"),
-        )  # fmt: skip
-        plots, notes = (Plot("horizon", caption, self._horizon_figure),), (*self._doubt(count), *self.remarks)
-        return Chapter("joint", "Identified arm", summary, values=values, tables=tables, plots=plots, notes=notes)
+        )
+        plots = (Plot("horizon", caption, self._horizon_figure),)
+        notes = (*self._doubt(count), *self.remarks)
+        return Chapter(
+            "joint",
+            "Identified arm",
+            summary,
+            values=values,
+            tables=tables,
+            plots=plots,
+            notes=notes,
+        )
 
     def _doubt(self, count: int) -> list[str]:
         """What a band of few episodes means, and joints whose baseline is better."""
         text = (
-            f"the band comes from {count} episodes left out: it is no 95 % band. Their greatest errors hold those of a "
-            f"further episode with {100 * count / (count + 1):.0f} %, n/(n + 1), and {ENOUGH} episodes are needed; "
-            "record more, or leave out a greater share"
+            f"the band comes from {count} episodes left out: it is no 95 % band. Their greatest"
+            f" errors hold those of a further episode with {100 * count / (count + 1):.0f} %, n/(n"
+            f" + 1), and {ENOUGH} episodes are needed; record more, or leave out a greater share"
         )
         worse = [
             f"joint {j}: {name} predicts better than the model, which is of no use there"
-            for j, (name, skill) in enumerate(zip(self.best_baseline, self.skill, strict=True), 1) if skill < 0.0
-        ]  # fmt: skip
+            for j, (name, skill) in enumerate(zip(self.best_baseline, self.skill, strict=True), 1)
+            if skill < 0.0
+        ]
         return [*([text] if count < ENOUGH else []), *worse]
 
     def _error_table(self) -> Table:
@@ -168,8 +217,12 @@ class ArmFit(Reported):
         rows = {name: rms(errors) for name, errors in found.items() if errors is not None}
         columns: dict[str, Any] = {"prediction by": list(rows)}
         for j in range(self.errors.shape[2]):
-            columns[f"joint {j + 1}"] = TableColumn([values[j] for values in rows.values()], "rad", "deg", 3)
-        return Table("joint-errors", "Root mean square error of the free run", columns, brief=len(rows))
+            columns[f"joint {j + 1}"] = TableColumn(
+                [values[j] for values in rows.values()], "rad", "deg", 3
+            )
+        return Table(
+            "joint-errors", "Root mean square error of the free run", columns, brief=len(rows)
+        )
 
     def _joint_table(self) -> Table:
         known = 1.0 if len(np.unique(self.episode)) >= ENOUGH else np.nan
@@ -180,7 +233,9 @@ class ArmFit(Reported):
             "skill": TableColumn(self.skill, digits=3),
             "best baseline": TableColumn(list(self.best_baseline), brief=False),
             "95 % band at the horizon ±": TableColumn(self.band[-1], "rad", "deg", 3),
-            "share inside the band": TableColumn(known * self.coverage, "1", "%", 3, short="inside"),
+            "share inside the band": TableColumn(
+                known * self.coverage, "1", "%", 3, short="inside"
+            ),
         }
         return Table("joints", "Joints", columns, brief=len(self.pairs))
 
@@ -189,10 +244,19 @@ class ArmFit(Reported):
         figure, panels = plotting.new_figure(1, self.errors.shape[2], squeeze=False)
         for j, axes in enumerate(panels[0]):
             for i, (name, errors) in enumerate([("model", self.errors), *self.by_baseline.items()]):
-                axes.plot(self.horizon, np.degrees(rms(errors, axis=(0,))[:, j]), color=plotting.LINES[i], label=name)
+                axes.plot(
+                    self.horizon,
+                    np.degrees(rms(errors, axis=(0,))[:, j]),
+                    color=plotting.LINES[i],
+                    label=name,
+                )
             band = np.degrees(self.band[:, j])
-            axes.fill_between(self.horizon, 0.0, band, color=plotting.LINES[0], alpha=0.15, linewidth=0)
-            axes.set(title=f"joint {j + 1}", xlabel="horizon [s]", ylabel="error [deg]" if j == 0 else "")
+            axes.fill_between(
+                self.horizon, 0.0, band, color=plotting.LINES[0], alpha=0.15, linewidth=0
+            )
+            axes.set(
+                title=f"joint {j + 1}", xlabel="horizon [s]", ylabel="error [deg]" if j == 0 else ""
+            )
         lines, names = panels[0][0].get_legend_handles_labels()
         figure.legend(lines, names, loc="outside upper center", ncols=len(names))
         return figure

@@ -1,4 +1,6 @@
-"""Follower of a growing table: rows of a file, a pipe or a serial log as they arrive, in SI units."""
+"""Follower of a growing table: rows of a file, a pipe or a serial log as they arrive, in SI
+units.
+"""
 
 import csv
 import time
@@ -8,7 +10,15 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ...core import AMBIENT_PRESSURE, ColumnError, FileError, ParameterError, UnitConversion, abridged, listed
+from ...core import (
+    AMBIENT_PRESSURE,
+    ColumnError,
+    FileError,
+    ParameterError,
+    UnitConversion,
+    abridged,
+    listed,
+)
 from ...recording.columns import displacement_columns, find_quantity_name
 from .channels import RawTable
 from .file_kind import readable
@@ -18,22 +28,33 @@ from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
 from .text_format import TextFormat, has_content, is_comment, parse_header, split_cells
 
-MAX_UNREADABLE, MAX_HEADER_LINES, MAX_LINE = 100, 1000, 65536
-"""Unreadable rows in succession, lines before the first numbers, and characters of a line that are refused (chosen)."""
+MAX_UNREADABLE = 100
+MAX_HEADER_LINES = 1000
+MAX_LINE = 65536
+"""Unreadable rows in succession, lines before the first numbers, and characters of a line that are
+refused (chosen).
+"""
 
 
 class RowReader:
-    """Reader of one row at a time: the header first, then each row of numbers as quantities in SI units.
+    """Reader of one row at a time: the header first, then each row of numbers as quantities in SI
+    units.
 
-    mapping  columns, units, constants and `skip_rows` of the stream; nothing else of a mapping applies to one
+    mapping  columns, units, constants and `skip_rows` of the stream; nothing else of a mapping
+    applies to one
 
-    `skipped` counts rows that could not be read, such as damaged lines. `notes` are those of `read_csv` on units.
+    `skipped` counts rows that could not be read, such as damaged lines. `notes` are those of
+    `read_csv` on units.
     """
 
     def __init__(self, origin: str, mapping: ColumnMapping = ColumnMapping()) -> None:
         if not isinstance(mapping, ColumnMapping):
-            raise ParameterError(f"RowReader: mapping must be a ColumnMapping; it is {abridged(mapping)}.")
-        self.origin, self.mapping, self.skipped = origin, mapping, 0
+            raise ParameterError(
+                f"RowReader: mapping must be a ColumnMapping; it is {abridged(mapping)}."
+            )
+        self.origin = origin
+        self.mapping = mapping
+        self.skipped = 0
         self.notes: tuple[str, ...] = ()
         self._names = {str(key): heading for key, heading in mapping.columns.items()}
         self._head: list[tuple[int, str]] = []
@@ -41,8 +62,10 @@ class RowReader:
         self._line = self._unreadable = 0
 
     def read(self, line: str) -> dict[str, float] | None:
-        """The quantities of a line [SI]; None for a line of the header, a comment, or a row that cannot be read. Raises
-        ColumnError, FileError or UnitError for a header without known quantities, or too many unreadable rows."""
+        """The quantities of a line [SI]; None for a line of the header, a comment, or a row that
+        cannot be read. Raises ColumnError, FileError or UnitError for a header without known
+        quantities, or too many unreadable rows.
+        """
         self._line += 1
         if not has_content(line) or self._line <= (self.mapping.skip_rows or 0):
             return None
@@ -53,8 +76,11 @@ class RowReader:
     def _read_header(self, line: str) -> dict[str, float] | None:
         self._head.append((self._line, line))
         if len(self._head) > MAX_HEADER_LINES:
-            raise FileError(f"{self.origin}: no row of numbers in the first {MAX_HEADER_LINES} lines.")
-        text_format, place = TextFormat(headerless=bool(self._names)), f"{self.origin}, line {self._line}"
+            raise FileError(
+                f"{self.origin}: no row of numbers in the first {MAX_HEADER_LINES} lines."
+            )
+        text_format = TextFormat(headerless=bool(self._names))
+        place = f"{self.origin}, line {self._line}"
         delimiter = text_format.detect_delimiter(line)
         cells = split_cells(line, delimiter)
         while cells and not cells[-1]:
@@ -64,31 +90,52 @@ class RowReader:
         header = parse_header(self.origin, self._head, text_format)
         if header.delimiter != delimiter and len(cells) > 1:
             signs = f"{delimiter!r}, the headings by {header.delimiter!r}"
-            raise ColumnError(f"{place}: the numbers are separated by {signs}. Separate both alike.")
-        self._delimiter, self._comma = header.delimiter, header.delimiter != ","
+            raise ColumnError(
+                f"{place}: the numbers are separated by {signs}. Separate both alike."
+            )
+        self._delimiter = header.delimiter
+        self._comma = header.delimiter != ","
         first = [float(self._point(cell)) for cell in cells]
-        headings = tuple(self._names.get(text, self._names.get(str(i), text))
-                         for i, text in enumerate(header.headings, 1))  # fmt: skip
+        headings = tuple(
+            self._names.get(text, self._names.get(str(i), text))
+            for i, text in enumerate(header.headings, 1)
+        )
         headings = headings[: len(first)] if not any(headings[len(first) :]) else headings
-        missing = [name for name in self._names if name not in {*header.headings, *map(str, range(1, len(first) + 1))}]
+        missing = [
+            name
+            for name in self._names
+            if name not in {*header.headings, *map(str, range(1, len(first) + 1))}
+        ]
         if missing:
             raise ColumnError(
-                f"{self.origin}: there is no column '{missing[0]}'; the columns are {listed(header.headings)}."
+                f"{self.origin}: there is no column '{missing[0]}'; the columns are"
+                f" {listed(header.headings)}."
             )
         if len(headings) != len(first):
             raise ColumnError(
-                f"{place}: the line must have {len(headings)} cells ({listed(headings)}); it has {len(first)}."
+                f"{place}: the line must have {len(headings)} cells ({listed(headings)}); it has"
+                f" {len(first)}."
             )
-        columns, rows = tuple(np.array([value]) for value in first), np.array([self._line], dtype=np.int64)
-        table = RawTable(self.origin, headings, header.units, columns, rows, constants=header.constants)
+        columns = tuple(np.array([value]) for value in first)
+        rows = np.array([self._line], dtype=np.int64)
+        table = RawTable(
+            self.origin, headings, header.units, columns, rows, constants=header.constants
+        )
         recording = interpret(table, self.mapping)  # which checks the first row
-        self._first, self.notes = recording, recording.notes
+        self._first = recording
+        self.notes = recording.notes
         self._ambient = ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
         held = {find_quantity_name(name) for name in self.mapping.constants}
         self._held = {name: float(recording[name][0]) for name in recording if name in held}
         self._width = len(headings)
-        known = ((i, each) for i, each in enumerate(resolve_headings(table, self.mapping.units)) if each.known)
-        self._conversions = [(i, each.name, unit_conversion(table, each, ambient)) for i, each in known]
+        known = (
+            (i, each)
+            for i, each in enumerate(resolve_headings(table, self.mapping.units))
+            if each.known
+        )
+        self._conversions = [
+            (i, each.name, unit_conversion(table, each, ambient)) for i, each in known
+        ]
         return self._read_row(line)
 
     def _read_row(self, line: str) -> dict[str, float] | None:
@@ -98,18 +145,26 @@ class RowReader:
                 raise ValueError
             values = [float(self._point(cell)) for cell in cells[: self._width]]
             assert self._conversions is not None
-            row = {**self._held, **{name: float(convert(values[i])) for i, name, convert in self._conversions}}
+            row = {
+                **self._held,
+                **{name: float(convert(values[i])) for i, name, convert in self._conversions},
+            }
             for name, value in row.items():  # a damaged number may still be a number
-                ranges = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}
+                ranges = {
+                    "pressure": (-self._ambient, MAX_MAGNITUDE),
+                    "contraction": CONTRACTION_RANGE,
+                }
                 low, high = ranges.get(name.rpartition(".")[2], (-MAX_MAGNITUDE, MAX_MAGNITUDE))
                 if not low < value < high:
                     raise ValueError
         except (ValueError, csv.Error):  # such as a carriage return within the line
-            self.skipped, self._unreadable = self.skipped + 1, self._unreadable + 1
+            self.skipped = self.skipped + 1
+            self._unreadable = self._unreadable + 1
             if self._unreadable > MAX_UNREADABLE:
                 raise ColumnError(
-                    f"{self.origin}, line {self._line}: {MAX_UNREADABLE} successive lines are no rows of {self._width} "
-                    "numbers. Check the baud rate and the format of the stream."
+                    f"{self.origin}, line {self._line}: {MAX_UNREADABLE} successive lines are no"
+                    f" rows of {self._width} numbers. Check the baud rate and the format of the"
+                    " stream."
                 ) from None
             return None
         self._unreadable = 0
@@ -124,19 +179,29 @@ class RowReader:
 
 
 def follow_lines(
-    source: str | Path | TextIO, *, idle: float, poll: float = 0.005, clock: Callable[[], float] = time.monotonic,
+    source: str | Path | TextIO,
+    *,
+    idle: float,
+    poll: float = 0.005,
+    clock: Callable[[], float] = time.monotonic,
     pause: Callable[[float], Any] = time.sleep,
-) -> Iterator[str]:  # fmt: skip
-    """Complete lines of a growing file, or of an open stream, until nothing has arrived for `idle` seconds.
+) -> Iterator[str]:
+    """Complete lines of a growing file, or of an open stream, until nothing has arrived for `idle`
+    seconds.
 
-    A line without its end is held back until the rest of it comes, or until the end. A stream that is closed, such as
-    a pipe, ends at once. Raises FileError if the file cannot be opened, or for a line of more than 65 536 characters.
+    A line without its end is held back until the rest of it comes, or until the end. A stream that
+    is closed, such as a pipe, ends at once. Raises FileError if the file cannot be opened, or for a
+    line of more than 65 536 characters.
     """
     if not isinstance(source, str | Path):
         yield from source
         return
-    with readable(source), Path(source).open(encoding="utf-8", errors="replace", newline="") as file:
-        partial, last = "", clock()
+    with (
+        readable(source),
+        Path(source).open(encoding="utf-8", errors="replace", newline="") as file,
+    ):
+        partial = ""
+        last = clock()
         while True:
             line = file.readline(MAX_LINE)
             if not line:
@@ -144,9 +209,13 @@ def follow_lines(
                     break
                 pause(poll)
                 continue
-            partial, last = partial + line, clock()
+            partial = partial + line
+            last = clock()
             if len(partial) >= MAX_LINE:
-                raise FileError(f"{source}: a line has more than {MAX_LINE} characters. It is not a table of text.")
+                raise FileError(
+                    f"{source}: a line has more than {MAX_LINE} characters. It is not a table of"
+                    " text."
+                )
             if partial.endswith("\n"):
                 yield partial
                 partial = ""

@@ -12,7 +12,13 @@ import numpy as np
 from ...core import Array, ColumnError, Hint, HintedText, UnitError, listed, suggestion
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion
 from ...recording import columns as headed
-from ...recording.columns import QUANTITIES, UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
+from ...recording.columns import (
+    QUANTITIES,
+    UNIT_SPELLINGS,
+    Heading,
+    find_quantity_name,
+    parse_heading,
+)
 from ...recording.recording import Recording
 from . import constants as fixed
 from .channels import Cells, RawTable
@@ -23,14 +29,21 @@ from .time_base import seconds_from_clock
 
 MAX_QUOTED = 180
 """Maximum number of characters of headings in a message (chosen)."""
-MAX_LABELS, MIN_LABEL_ROWS = 8, 3
-"""Maximum number of different texts of a column that is kept, and minimum number of rows of each (chosen)."""
+MAX_LABELS = 8
+MIN_LABEL_ROWS = 3
+"""Maximum number of different texts of a column that is kept, and minimum number of rows of each
+(chosen).
+"""
 
 
-def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, float | str] | None = None) -> Recording:
-    """Convert a table with the headings of a mapping to a Recording; what the mapping states overrides the file.
+def interpret(
+    table: RawTable, mapping: ColumnMapping, constants: Mapping[str, float | str] | None = None
+) -> Recording:
+    """Convert a table with the headings of a mapping to a Recording; what the mapping states
+    overrides the file.
 
-    constants  constants of this table, by default those of the mapping; the name of a quantity, `length`, gives a
+    constants  constants of this table, by default those of the mapping; the name of a quantity,
+    `length`, gives a
                column with this value in every row
 
     Raises ColumnError or UnitError; the message names file, row, value and remedy.
@@ -38,16 +51,23 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     constants = mapping.constants_of() if constants is None else constants
     check_width(table)
     table = without_repeated_columns(table)
-    held = {n: value for n, value in constants.items() if parse_constant_name(n) is None and parse_heading(n).known}
+    held = {
+        n: value
+        for n, value in constants.items()
+        if parse_constant_name(n) is None and parse_heading(n).known
+    }
     run_constants = fixed.collect_constants(
-        table.origin, {**table.constants, **{n: value for n, value in constants.items() if n not in held}}
+        table.origin,
+        {**table.constants, **{n: value for n, value in constants.items() if n not in held}},
     )
     headings = resolve_headings(table, mapping.units)
     table = mapping.missing.treat(table, headings)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
-            run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
+            run_constants = (
+                {constant[0]: constant[1], **run_constants} if constant else run_constants
+            )
     fixed.check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns, notes = _converted_columns(table, headings, ambient, "ambient" in run_constants)
@@ -55,18 +75,26 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
         heading = parse_heading(text)
         where = f"{table.origin}: {heading.name}"
         if heading.name in columns:
-            raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
+            raise ColumnError(
+                f"{where} is stated as a constant, but a column contains it. Omit one of them."
+            )
         si = fixed.held_value(heading, value, ambient, where)
         columns[heading.name] = np.full(len(table.rows), si)
         unit = "" if heading.target == "1" else f" {heading.target}"
-        notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
+        notes.append(
+            f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user."
+        )
     columns, displaced = headed.displacement_columns(columns, run_constants)
     notes += displaced
     if "time" in columns:
         time, note = mapping.time.apply(table, columns["time"])
-        columns = {name: values for name, values in {**columns, "time": time}.items() if values is not None}
+        columns = {
+            name: values for name, values in {**columns, "time": time}.items() if values is not None
+        }
         notes += [note] if note else []
-    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered)
+    check_plausible(
+        table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered
+    )
     written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
 
@@ -74,13 +102,17 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
 def _converted_columns(
     table: RawTable, headings: list[Heading], ambient: float, is_stated: bool
 ) -> tuple[dict[str, Array], list[str]]:
-    """The columns in SI units, and notes on overridden and assumed units, on unknown columns, and on the ambient
-    pressure of absolute pressures where it is not stated."""
+    """The columns in SI units, and notes on overridden and assumed units, on unknown columns, and
+    on the ambient pressure of absolute pressures where it is not stated."""
     columns: dict[str, Array] = {}
-    notes, unknown = [*table.notes], list[str]()
+    notes = [*table.notes]
+    unknown = list[str]()
     for h, below in zip(headings, [*(table.units or ()), *[""] * len(headings)], strict=False):
         if (unit := below or parse_heading(h.text).unit) and h.unit and unit != h.unit:
-            notes.append(f"The {h.name} is read in {h.unit}, as specified by the user; the file states {unit}.")
+            notes.append(
+                f"The {h.name} is read in {h.unit}, as specified by the user; the file states"
+                f" {unit}."
+            )
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
             columns[heading.name], note = _convert_column(table, heading, cells, ambient)
@@ -89,25 +121,40 @@ def _converted_columns(
         notes += [note] if note and note not in notes else []
     if unknown:
         one = len(unknown) == 1
-        what = "Column {} is not a known quantity and is" if one else "Columns {} are not known quantities and are"
+        what = (
+            "Column {} is not a known quantity and is"
+            if one
+            else "Columns {} are not known quantities and are"
+        )
         notes.append(f"{what.format(listed(unknown))} kept without conversion.")
-    absolute = [h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, ambient).offset]
+    absolute = [
+        h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, ambient).offset
+    ]
     if absolute and not is_stated:
         notes.append(
-            f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it is converted to "
-            f"gauge with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa."
+            f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it"
+            f" is converted to gauge with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g}"
+            " kPa."
         )
     return columns, notes
 
 
 def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
-    """The headings with their units, from the user, the unit row or the heading itself, in this order of precedence."""
-    parsed = [Heading(h, h, None, False) if h in table.fields else parse_heading(h) for h in table.headings]
+    """The headings with their units, from the user, the unit row or the heading itself, in this
+    order of precedence.
+    """
+    parsed = [
+        Heading(h, h, None, False) if h in table.fields else parse_heading(h)
+        for h in table.headings
+    ]
     user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
     names = [heading.name for heading in parsed]
-    for key in (each for each in user_units if each not in {*names, *(heading.text for heading in parsed)}):
+    for key in (
+        each for each in user_units if each not in {*names, *(heading.text for heading in parsed)}
+    ):
         raise ColumnError(
-            f"{table.origin}: a unit is given for '{key}', but the columns are {listed(names)}.{suggestion(key, names)}"
+            f"{table.origin}: a unit is given for '{key}', but the columns are"
+            f" {listed(names)}.{suggestion(key, names)}"
         )
     row = table.units or ()
     headings = []
@@ -119,46 +166,68 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
     check_unique(table, headings)
     if not any(heading.known for heading in headings):
         texts = [heading.text for heading in headings]
-        near = [n for text in texts for n in difflib.get_close_matches(text.lower(), QUANTITIES, n=1)]
+        near = [
+            n for text in texts for n in difflib.get_close_matches(text.lower(), QUANTITIES, n=1)
+        ]
         hint = f" Did you mean '{near[0]}'?" if near else ""
         raise ColumnError(
-            f"{table.origin}: no column is a known quantity ({listed(texts, MAX_QUOTED)}); known quantities are "
-            f"{', '.join(QUANTITIES)}.{hint}",
-            hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
+            f"{table.origin}: no column is a known quantity ({listed(texts, MAX_QUOTED)}); known"
+            f" quantities are {', '.join(QUANTITIES)}.{hint}",
+            hint=Hint(
+                "To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"
+            ),
         )
     return headings
 
 
 def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
-    """Raise ColumnError where the unit in the row below a heading contradicts that in the heading."""
+    """Raise ColumnError where the unit in the row below a heading contradicts that in the
+    heading.
+    """
     if not below or heading.unit is None or below == heading.unit:
         return
     with contextlib.suppress(UnitError):  # of a unit that is none; its conversion states the reason
         one, other = (conversion(unit, heading.target or "1") for unit in (heading.unit, below))
-        reference_differs = one.offset != other.offset and not (one.assumed_gauge or other.assumed_gauge)
+        reference_differs = one.offset != other.offset and not (
+            one.assumed_gauge or other.assumed_gauge
+        )
         if one.factor != other.factor or reference_differs:
             raise ColumnError(
-                f"{table.origin}: the heading '{heading.text}' states {heading.unit}, but the row of units below it "
-                f"{below}. Correct one of them.",
+                f"{table.origin}: the heading '{heading.text}' states {heading.unit}, but the row"
+                f" of units below it {below}. Correct one of them.",
                 hint=Hint("To state the unit", "units", {heading.name: ...}, "ColumnMapping"),
             )
 
 
-def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
+def _convert_column(
+    table: RawTable, heading: Heading, cells: Cells, ambient: float
+) -> tuple[Array, str]:
     """A known column in SI units, and a note on any assumption about its unit."""
     if heading.name == "time" and isinstance(cells, list):
         seconds = seconds_from_clock(cells)
         if seconds is not None:
-            return seconds, f"The time column contains clock times; time is counted from the first, {cells[0]}."
+            return (
+                seconds,
+                (
+                    "The time column contains clock times; time is counted from the first,"
+                    f" {cells[0]}."
+                ),
+            )
     change = unit_conversion(table, heading, ambient)
     values = np.array(cells, dtype=float)
     if change.assumed_gauge:
-        reason = f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute pressure."
+        reason = (
+            f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute"
+            " pressure."
+        )
         return change(values), f"The {heading.name} is read as gauge: {reason}"
     if heading.unit is None:
         return values, f"The {heading.name} has no unit and is read as a ratio."
     if heading.target == "N" and fixed.is_mass(heading.unit):
-        assumption = f"stated in {heading.unit} and converted with standard gravity, {STANDARD_GRAVITY} m/s2."
+        assumption = (
+            f"stated in {heading.unit} and converted with standard gravity, {STANDARD_GRAVITY}"
+            " m/s2."
+        )
         return change(values), f"The {heading.name} is {assumption}"
     return change(values), ""
 
@@ -172,8 +241,8 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
             return UnitConversion(1.0)
         example = f"{heading.name} [{UNIT_SPELLINGS[target][1 % len(UNIT_SPELLINGS[target])]}]"
         raise UnitError(
-            f"{where}: no unit is stated. State that of the values in the column header, for example "
-            f"'{example}'; usual units are {usual}.",
+            f"{where}: no unit is stated. State that of the values in the column header, for"
+            f" example '{example}'; usual units are {usual}.",
             hint=Hint("To state the unit", "units", {heading.name: ...}, "ColumnMapping"),
         )
     try:
@@ -181,18 +250,26 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
     except UnitError as reason:
         cases = {spelling.lower(): spelling for spelling in UNIT_SPELLINGS[target]}
         near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
-        hint = f" Did you mean '{cases[near[0]]}'?" if near else f" Usual units of the {heading.name} are {usual}."
+        hint = (
+            f" Did you mean '{cases[near[0]]}'?"
+            if near
+            else f" Usual units of the {heading.name} are {usual}."
+        )
         raise UnitError(HintedText(reason.message, hint)) from None
 
 
 def _keep_unknown_column(
     table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array], unknown: list[str]
 ) -> str:
-    """Keep an unknown column without conversion; its note, or if it has numbers and none, its text in `unknown`."""
+    """Keep an unknown column without conversion; its note, or if it has numbers and none, its text
+    in `unknown`.
+    """
     if isinstance(cells, list) and not any(cells):
         return ""
     if isinstance(cells, list):  # a few different texts are kept as their numbers
-        values, numbers, counts = np.unique(fixed.label_texts(cells), return_inverse=True, return_counts=True)
+        values, numbers, counts = np.unique(
+            fixed.label_texts(cells), return_inverse=True, return_counts=True
+        )
         if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
             return f"Column '{heading.text}' contains text and is ignored."
         columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
@@ -200,15 +277,26 @@ def _keep_unknown_column(
         return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."
     constant = constant_from_column(table, heading.text, heading.unit, cells)
     if constant:
-        return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
+        return (
+            f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g}"
+            " (SI)."
+        )
     columns[heading.text or "unnamed"] = cells
     if heading.text in table.fields:
-        quantity = next((name for name, each in QUANTITIES.items() if each.unit == heading.unit), "")
+        quantity = next(
+            (name for name, each in QUANTITIES.items() if each.unit == heading.unit), ""
+        )
         mapped = f"'{heading.text}' = '{quantity or 'force'} [{heading.unit if quantity else 'N'}]'"
         unit = f" in {heading.unit}" if heading.unit else ""
-        return f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns] {mapped} maps it."
+        return (
+            f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns]"
+            f" {mapped} maps it."
+        )
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = headed.proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
     if not hint:
         unknown.append(f"'{heading.text}'")
-    return hint and f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+    return (
+        hint
+        and f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+    )

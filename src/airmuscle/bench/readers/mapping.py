@@ -30,7 +30,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core import AirmuscleError, ColumnError, ParameterError, abridged, check_field_types, listed, suggestion
+from ...core import (
+    AirmuscleError,
+    ColumnError,
+    ParameterError,
+    abridged,
+    check_field_types,
+    listed,
+    suggestion,
+)
 from ...core.errors import check_known
 from ...core.units import AMBIENT_PRESSURE
 from ...recording.columns import QUANTITIES, parse_heading
@@ -48,34 +56,45 @@ OTHERS = ("ambient_temperature", "run")
 """Further constants of a run, beside the quantities that were held."""
 CONSTANT_NAMES = (*STATED, *OTHERS)
 OUTLIERS = {"keep": False, "drop": True}
-"""Whether suspected outliers are left out, by the words of mapping files and of the command line."""
+"""Whether suspected outliers are left out, by the words of mapping files and of the command
+line.
+"""
 _TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name")
-_WORDS: Mapping[str, Mapping[str, Any]] = {"time": TIME_BASES, "missing": MISSING_VALUES, "outliers": OUTLIERS}
+_WORDS: Mapping[str, Mapping[str, Any]] = {
+    "time": TIME_BASES,
+    "missing": MISSING_VALUES,
+    "outliers": OUTLIERS,
+}
 _TABLES = ("columns", "units", "constants")
 _KEYS = (*_TABLES, *CONSTANT_NAMES, *_TEXTS, *_WORDS, "skip_rows", "missing_codes")
 
 
 @dataclasses.dataclass(frozen=True)
 class ColumnMapping:
-    """Interpretation of files of one kind. Information that the mapping does not state is read from the file.
+    """Interpretation of files of one kind. Information that the mapping does not state is read from
+    the file.
 
-    columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`; `specimen` for
-               the names of the specimens, each of which is a recording; an empty text excludes the column
+    columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`;
+    `specimen` for
+               the names of the specimens, each of which is a recording; an empty text excludes the
+               column
     units      units by quantity or heading: {"pressure": "kPa(a)"}
-    resting_length, ambient, displacement_zero  constants of the runs, lengths [m] and a pressure [Pa], or texts with a
-               unit: the length L0 without pressure and load, which allows conversion between length and contraction;
-               the ambient pressure, which is subtracted from absolute pressures; and the reading of a displacement at
-               the resting length
+    resting_length, ambient, displacement_zero  constants of the runs, lengths [m] and a pressure
+    [Pa], or texts with a
+               unit: the length L0 without pressure and load, which allows conversion between length
+               and contraction; the ambient pressure, which is subtracted from absolute pressures;
+               and the reading of a displacement at the resting length
     specimen   name of the specimen
-    constants  further constants of the runs; a quantity, {"length": "7.3 cm"}, was held and becomes a column
-    file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in FileNamePattern
-    delimiter, decimal  of text files
-    skip_rows  number of lines above the headings of a text file or worksheet; by default they are detected, or found
+    constants  further constants of the runs; a quantity, {"length": "7.3 cm"}, was held and becomes
+    a column file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in
+    FileNamePattern delimiter, decimal  of text files skip_rows  number of lines above the headings
+    of a text file or worksheet; by default they are detected, or found
                by the headings that `columns` names
     sheet      worksheet of an Excel file
     group      group of a TDMS or MDF file, struct of a MAT file
-    time       RecordedTime(ordered=True), UniformTime() for stamps that the logger rounded, or NoTime()
-    missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with the numbers and texts that
+    time       RecordedTime(ordered=True), UniformTime() for stamps that the logger rounded, or
+    NoTime() missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with
+    the numbers and texts that
                stand for missing values, such as -999
     drop_outliers  whether the rows of suspected outliers are left out
     """
@@ -107,26 +126,34 @@ class ColumnMapping:
         if self.skip_rows is not None and self.skip_rows < 0:
             raise ColumnError(f"mapping: skip_rows is {self.skip_rows}; it must be 0 or more.")
         for name in others:
-            if name not in CONSTANT_NAMES and not (parse_constant_name(name) or parse_heading(name).known):
+            if name not in CONSTANT_NAMES and not (
+                parse_constant_name(name) or parse_heading(name).known
+            ):
                 raise ColumnError(
-                    f"mapping: '{name}' is no constant of a run; allowed range: {', '.join(CONSTANT_NAMES)}, or a "
-                    f"quantity that was held, such as length.{suggestion(name, (*CONSTANT_NAMES, *QUANTITIES))}"
+                    f"mapping: '{name}' is no constant of a run; allowed range:"
+                    f" {', '.join(CONSTANT_NAMES)}, or a quantity that was held, such as"
+                    f" length.{suggestion(name, (*CONSTANT_NAMES, *QUANTITIES))}"
                 )
         if self.file_name is not None:
             FileNamePattern(self.file_name)  # raises for placeholders that are no quantity
         for column, heading in self.columns.items():
-            if heading and not (parse_heading(heading).known or parse_constant_name(heading) or heading == SPECIMEN):
+            if heading and not (
+                parse_heading(heading).known or parse_constant_name(heading) or heading == SPECIMEN
+            ):
                 name = heading.partition("[")[0].strip()
                 raise ColumnError(
-                    f"mapping: column '{column}' is mapped to '{heading}', which is not a known quantity; known "
-                    f"quantities are {', '.join(QUANTITIES)}, resting_length, specimen.{suggestion(name, QUANTITIES)}"
+                    f"mapping: column '{column}' is mapped to '{heading}', which is not a known"
+                    f" quantity; known quantities are {', '.join(QUANTITIES)}, resting_length,"
+                    f" specimen.{suggestion(name, QUANTITIES)}"
                 )
 
     @property
     def text_format(self) -> TextFormat:
         """The part of the mapping that applies to text files."""
         names = tuple(name for name in map(str, self.columns) if not name.isdecimal())
-        return TextFormat(self.delimiter, self.decimal, len(names) < len(self.columns), names, self.skip_rows)
+        return TextFormat(
+            self.delimiter, self.decimal, len(names) < len(self.columns), names, self.skip_rows
+        )
 
     def constants_of(self, path: Path | None = None) -> dict[str, float | str]:
         """The constants of one file: those in its name take precedence over those of all files."""
@@ -136,26 +163,38 @@ class ColumnMapping:
 
 
 def read_mapping(path: str | Path, base: ColumnMapping = ColumnMapping()) -> ColumnMapping:
-    """Read a mapping from a TOML file, which completes `base`. Raises FileError, ParameterError or ColumnError."""
+    """Read a mapping from a TOML file, which completes `base`. Raises FileError, ParameterError or
+    ColumnError.
+    """
     path = Path(path)
     return mapping_of_tables(read_toml(path), path.name, base)
 
 
-def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMapping = ColumnMapping()) -> ColumnMapping:
-    """The mapping `base` with what the keys of a TOML table state; tables are merged, and None states nothing. `where`
-    begins the messages. Raises as `read_mapping`."""
+def mapping_of_tables(
+    content: Mapping[str, Any], where: str, base: ColumnMapping = ColumnMapping()
+) -> ColumnMapping:
+    """The mapping `base` with what the keys of a TOML table state; tables are merged, and None
+    states nothing. `where` begins the messages. Raises as `read_mapping`."""
     given = {key: value for key, value in content.items() if value is not None}
     for key, value in given.items():
         _check_entry(key, value, where)
-    columns = {name: _parse_entry(where, name, value) for name, value in given.pop("columns", {}).items()}
+    columns = {
+        name: _parse_entry(where, name, value) for name, value in given.pop("columns", {}).items()
+    }
     codes = tuple(parse_code(each) for each in given.pop("missing_codes", base.missing.codes))
     treatment = MISSING_VALUES.get(given.pop("missing", ""))
     values = {
         "columns": {**{str(key): heading for key, heading in base.columns.items()}, **columns},
         "units": {**base.units, **given.pop("units", {})},
-        "constants": base.constants | given.pop("constants", {}) | {n: given.pop(n) for n in OTHERS if n in given},
+        "constants": (
+            base.constants
+            | given.pop("constants", {})
+            | {n: given.pop(n) for n in OTHERS if n in given}
+        ),
         "time": TIME_BASES.get(given.pop("time", ""), base.time),
-        "missing": treatment(codes) if treatment else dataclasses.replace(base.missing, codes=codes),
+        "missing": (
+            treatment(codes) if treatment else dataclasses.replace(base.missing, codes=codes)
+        ),
         "drop_outliers": OUTLIERS.get(given.pop("outliers", ""), base.drop_outliers),
     }
     try:
@@ -172,7 +211,9 @@ def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMappin
 
 
 def _check_entry(key: str, value: Any, where: str) -> None:
-    """Raise ParameterError or ColumnError for an unknown key of a mapping file, or a value of the wrong kind."""
+    """Raise ParameterError or ColumnError for an unknown key of a mapping file, or a value of the
+    wrong kind.
+    """
     check_known(f"{where}: unknown key", key, _KEYS, "allowed are")
     required = ""
     if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
@@ -180,15 +221,21 @@ def _check_entry(key: str, value: Any, where: str) -> None:
     if key == "skip_rows" and (not isinstance(value, int) or isinstance(value, bool)):
         required = "a number of lines, such as 7"
     codes = value if isinstance(value, list | tuple) else [None]
-    if key == "missing_codes" and not all(isinstance(c, float | int | str) and not isinstance(c, bool) for c in codes):
+    if key == "missing_codes" and not all(
+        isinstance(c, float | int | str) and not isinstance(c, bool) for c in codes
+    ):
         required = 'a list, such as [-999, "OL"]'
     if required:
         raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be {required}.")
     if key in _WORDS and value not in _WORDS[key]:
-        raise ColumnError(f"{where}: {key} is {abridged(value)}; allowed range: {', '.join(_WORDS[key])}.")
+        raise ColumnError(
+            f"{where}: {key} is {abridged(value)}; allowed range: {', '.join(_WORDS[key])}."
+        )
     if key in _TABLES and not isinstance(value, Mapping):
         line = key.removesuffix("s")
-        raise ParameterError(f"{where}: {key} must be a table: [{key}], followed by one line per {line}.")
+        raise ParameterError(
+            f"{where}: {key} must be a table: [{key}], followed by one line per {line}."
+        )
 
 
 def _parse_entry(where: str, column: str, value: Any) -> str:
@@ -197,7 +244,11 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
         return value
     texts = isinstance(value, dict) and all(isinstance(each, str) for each in value.values())
     if texts and set(value) <= {"quantity", "unit"}:
-        return f"{value.get('quantity', '')} [{value['unit']}]" if value.get("unit") else value["quantity"]
+        return (
+            f"{value.get('quantity', '')} [{value['unit']}]"
+            if value.get("unit")
+            else value["quantity"]
+        )
     raise ParameterError(
         f"{where}: column '{column}' is mapped to {abridged(value)}; write 'pressure [bara]' or "
         '{ quantity = "pressure", unit = "bara" }.'
@@ -205,10 +256,13 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
 
 
 def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
-    """The table with the headings of a mapping, and a note for each mapped column. Raises ColumnError if the mapping
-    names a column that does not exist."""
-    mapped = {_column_index(table, str(column)): heading for column, heading in mapping.columns.items()}
-    headings, units = list(table.headings), list(table.units or ("",) * len(table.headings))
+    """The table with the headings of a mapping, and a note for each mapped column. Raises
+    ColumnError if the mapping names a column that does not exist."""
+    mapped = {
+        _column_index(table, str(column)): heading for column, heading in mapping.columns.items()
+    }
+    headings = list(table.headings)
+    units = list(table.units or ("",) * len(table.headings))
     notes = list(table.notes)
     for index, heading in mapped.items():
         action = f"read as {heading}" if heading else "ignored"
@@ -217,18 +271,24 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
         constant = parse_constant_name(heading)
         if constant[1] if constant else parse_heading(heading).unit is not None:
             units[index] = ""
-    changed = dataclasses.replace(table, headings=tuple(headings), units=tuple(units) if table.units else None)
-    return changed.of_columns([i for i in range(len(headings)) if mapped.get(i, "kept")], notes=tuple(notes))
+    changed = dataclasses.replace(
+        table, headings=tuple(headings), units=tuple(units) if table.units else None
+    )
+    return changed.of_columns(
+        [i for i in range(len(headings)) if mapped.get(i, "kept")], notes=tuple(notes)
+    )
 
 
 def _column_index(table: RawTable, column: str) -> int:
-    """The index of a column, by its heading, by its heading without unit, or by its number from 1."""
+    """The index of a column, by its heading, by its heading without unit, or by its number from
+    1.
+    """
     for names in (table.headings, tuple(map(bare_heading, table.headings))):
         if names.count(column) == 1:
             return names.index(column)
     if column.isdecimal() and 1 <= int(column) <= len(table.headings):
         return int(column) - 1
     raise ColumnError(
-        f"{table.origin}: the mapping names column '{column}', but the columns are {listed(table.headings)}."
-        f"{suggestion(column, table.headings)}"
+        f"{table.origin}: the mapping names column '{column}', but the columns are"
+        f" {listed(table.headings)}.{suggestion(column, table.headings)}"
     )

@@ -1,4 +1,6 @@
-"""Missing values: cells that are empty, markers, stated codes or no numbers; refused, left out or interpolated."""
+"""Missing values: cells that are empty, markers, stated codes or no numbers; refused, left out or
+interpolated.
+"""
 
 import abc
 import dataclasses
@@ -16,9 +18,14 @@ from .channels import Cells, RawTable, taken
 from .constants import parse_constant_name
 from .time_base import seconds_from_clock
 
-MAX_QUOTED, MAX_LISTED = 40, 8
-"""Maximum number of characters of a cell among several, and of cells or rows that a message lists (chosen)."""
-_MARKERS = re.compile(r"[-–—.?*/]*|nan|n/?a|null|none|missing|k\.?\s?a\.?|#[\w/]+[!?]?", re.IGNORECASE)
+MAX_QUOTED = 40
+MAX_LISTED = 8
+"""Maximum number of characters of a cell among several, and of cells or rows that a message lists
+(chosen).
+"""
+_MARKERS = re.compile(
+    r"[-–—.?*/]*|nan|n/?a|null|none|missing|k\.?\s?a\.?|#[\w/]+[!?]?", re.IGNORECASE
+)
 Mask = npt.NDArray[np.bool_]
 
 
@@ -45,18 +52,30 @@ class ExaminedColumn:
     def brief(self, row: int) -> str:
         """Quantity and cell, for a list."""
         cell = self.cells[row]
-        text = f"{cell:g}" if not isinstance(cell, str) else f"'{one_line(cell)[:MAX_QUOTED]}'" if cell else "empty"
+        text = (
+            f"{cell:g}"
+            if not isinstance(cell, str)
+            else f"'{one_line(cell)[:MAX_QUOTED]}'"
+            if cell
+            else "empty"
+        )
         return f"{self.heading.name} {text}"
 
 
-def _examined(index: int, heading: Heading, cells: Cells, codes: Sequence[float | str]) -> ExaminedColumn:
-    numeric = [number(code) if isinstance(code, str) else code for code in codes]  # NaN equals no cell
+def _examined(
+    index: int, heading: Heading, cells: Cells, codes: Sequence[float | str]
+) -> ExaminedColumn:
+    numeric = [
+        number(code) if isinstance(code, str) else code for code in codes
+    ]  # NaN equals no cell
     if not isinstance(cells, list):
         missing = np.isnan(cells) | np.isin(cells, numeric)
         return ExaminedColumn(index, heading, cells, missing, ~np.isfinite(cells) & ~missing)
     texts = {code.strip().lower() for code in codes if isinstance(code, str)}
     values = np.array([number(cell) for cell in cells])
-    marked = np.array([cell.strip().lower() in texts or bool(_MARKERS.fullmatch(cell.strip())) for cell in cells])
+    marked = np.array(
+        [cell.strip().lower() in texts or bool(_MARKERS.fullmatch(cell.strip())) for cell in cells]
+    )
     missing = marked | np.isin(values, numeric)
     bad = ~np.isfinite(values) & ~missing
     if heading.name == "time" and bad.any():
@@ -76,20 +95,31 @@ def _describe_faulty(table: RawTable, found: Sequence[tuple[int, ExaminedColumn]
     """The cells with their rows in the file, and what to do."""
     if len(found) == 1:
         ((row, each),) = found
-        return f"{table.location(row)}: {each.describe(row)}. Correct the cell or delete the {table.row_label}."
-    listed = [f"{table.row_label} {table.rows[row]} ({each.brief(row)})" for row, each in found[:MAX_LISTED]]
+        return (
+            f"{table.location(row)}: {each.describe(row)}. Correct the cell or delete the"
+            f" {table.row_label}."
+        )
+    listed = [
+        f"{table.row_label} {table.rows[row]} ({each.brief(row)})"
+        for row, each in found[:MAX_LISTED]
+    ]
     more = f" and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else ""
     rows = len({row for row, _ in found})
     return (
-        f"{table.origin}: {len(found)} cells in {rows} of {len(table.rows)} {table.row_label}s are no finite numbers: "
-        f"{', '.join(listed)}{more}. Correct the cells or delete the {table.row_label}s."
+        f"{table.origin}: {len(found)} cells in {rows} of {len(table.rows)} {table.row_label}s are"
+        f" no finite numbers: {', '.join(listed)}{more}. Correct the cells or delete the"
+        f" {table.row_label}s."
     )
 
 
 MAX_GAP = 5.0
-"""Longest gap that is interpolated, in sample times between its neighbours (chosen; a longer one is a gap in time)."""
+"""Longest gap that is interpolated, in sample times between its neighbours (chosen; a longer one is
+a gap in time).
+"""
 MAX_CODE = 20
-"""Maximum number of characters of a text that is proposed as the code of a missing value (chosen)."""
+"""Maximum number of characters of a text that is proposed as the code of a missing value
+(chosen).
+"""
 _GROUPED = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*|[-+]?\d{1,3}(,\d{3})+\.\d*")
 _HELD = ("branch", "fill", "discharge", "latched")
 
@@ -98,8 +128,9 @@ _HELD = ("branch", "fill", "discharge", "latched")
 class MissingValues(abc.ABC):
     """Treatment of missing values in the columns of known quantities.
 
-    A value is missing where a cell is empty, not a number (NaN), a marker (`---`, `n/a`, `#N/A`, `#DIV/0!`), or one of
-    the `codes`, numbers or texts that the data acquisition writes for missing values, such as -999.
+    A value is missing where a cell is empty, not a number (NaN), a marker (`---`, `n/a`, `#N/A`,
+    `#DIV/0!`), or one of the `codes`, numbers or texts that the data acquisition writes for missing
+    values, such as -999.
     """
 
     codes: tuple[float | str, ...] = ()
@@ -108,8 +139,12 @@ class MissingValues(abc.ABC):
         check_field_types(self)
 
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
-        """The table with a number or time in each cell of a known quantity. Raises ColumnError, which lists others."""
-        known = [i for i, each in enumerate(headings) if each.known or parse_constant_name(each.text)]
+        """The table with a number or time in each cell of a known quantity. Raises ColumnError,
+        which lists others.
+        """
+        known = [
+            i for i, each in enumerate(headings) if each.known or parse_constant_name(each.text)
+        ]
         cells = [_examined(i, headings[i], table.columns[i], self.codes) for i in known]
         strict = isinstance(self, RefuseMissing)
         faulty = [(each, each.bad | each.missing if strict else each.bad) for each in cells]
@@ -121,7 +156,9 @@ class MissingValues(abc.ABC):
 
     @abc.abstractmethod
     def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
-        """The table without missing values, of which the cells of known quantities and of constants were examined."""
+        """The table without missing values, of which the cells of known quantities and of constants
+        were examined.
+        """
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,15 +174,20 @@ class DropMissing(MissingValues):
     """Rows with a missing value are left out; a note reports them."""
 
     def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
-        return _without_rows(table, np.any([each.missing for each in cells], axis=0)) if cells else table
+        return (
+            _without_rows(table, np.any([each.missing for each in cells], axis=0))
+            if cells
+            else table
+        )
 
 
 @dataclasses.dataclass(frozen=True)
 class InterpolateMissing(MissingValues):
-    """Missing values are interpolated linearly in time where the gap is short; the other rows are left out.
+    """Missing values are interpolated linearly in time where the gap is short; the other rows are
+    left out.
 
-    A gap is short if the readings before and after it are at most MAX_GAP = 5 sample times (median steps) apart. Valve
-    commands, branches and latches keep the value before the gap. Requires time.
+    A gap is short if the readings before and after it are at most MAX_GAP = 5 sample times (median
+    steps) apart. Valve commands, branches and latches keep the value before the gap. Requires time.
     """
 
     def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
@@ -154,12 +196,20 @@ class InterpolateMissing(MissingValues):
         timed = next((each for each in cells if each.heading.name == "time"), None)
         if timed is None:
             raise ColumnError(
-                f"{table.origin}: missing values are interpolated in time, but there is no time column.",
-                hint=Hint("To leave out the rows", "missing", DropMissing(self.codes), "ColumnMapping"),
+                f"{table.origin}: missing values are interpolated in time, but there is no time"
+                " column.",
+                hint=Hint(
+                    "To leave out the rows", "missing", DropMissing(self.codes), "ColumnMapping"
+                ),
             )
-        kept, table = np.flatnonzero(~timed.missing), _without_rows(table, timed.missing)
-        cells = [dataclasses.replace(c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept])
-                 for c in cells]  # fmt: skip
+        kept = np.flatnonzero(~timed.missing)
+        table = _without_rows(table, timed.missing)
+        cells = [
+            dataclasses.replace(
+                c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept]
+            )
+            for c in cells
+        ]
         time = taken(timed.cells, kept)  # [in the unit of the file]
         if isinstance(time, list):
             clock = seconds_from_clock(time)
@@ -168,21 +218,28 @@ class InterpolateMissing(MissingValues):
         for each in cells:
             if each.missing.any():
                 columns[each.index], done = _interpolated(each, time)
-                filled, left = filled | done, left | (each.missing & ~done)
+                filled = filled | done
+                left = left | (each.missing & ~done)
         table = dataclasses.replace(table, columns=tuple(columns))
         if (filled & ~left).any():
-            table = table.noted(_row_note(table, "with values interpolated in time", filled & ~left))
+            table = table.noted(
+                _row_note(table, "with values interpolated in time", filled & ~left)
+            )
         return _without_rows(table, left)
 
 
 MISSING_VALUES: dict[str, type[MissingValues]] = {
-    "error": RefuseMissing, "drop": DropMissing, "interpolate": InterpolateMissing,
-}  # fmt: skip
+    "error": RefuseMissing,
+    "drop": DropMissing,
+    "interpolate": InterpolateMissing,
+}
 """Treatments by their names in mapping files and on the command line."""
 
 
 def parse_code(code: float | str) -> float | str:
-    """The code of a missing value: the number that a text states, or else the text without outer blanks."""
+    """The code of a missing value: the number that a text states, or else the text without outer
+    blanks.
+    """
     try:
         return float(code)
     except ValueError:
@@ -196,10 +253,18 @@ def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
     if grouped is not None:
         sign = "," if grouped.rfind(",") > grouped.rfind(".") else "."
         yield Hint("To specify the decimal sign", "decimal", sign, "ColumnMapping")
-    elif len(bad) == len(texts) == 1 and len(texts[0]) <= MAX_CODE and not any(map(str.isdigit, texts[0])):
-        yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping")
+    elif (
+        len(bad) == len(texts) == 1
+        and len(texts[0]) <= MAX_CODE
+        and not any(map(str.isdigit, texts[0]))
+    ):
+        yield Hint(
+            "If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping"
+        )
     if any(each.missing[row] for row, each in found):
-        yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping")
+        yield Hint(
+            "To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping"
+        )
         yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "ColumnMapping")
 
 
@@ -214,20 +279,34 @@ def _without_rows(table: RawTable, left_out: Mask) -> RawTable:
 
 def _row_note(table: RawTable, what: str, rows: Mask) -> RowNote:
     listed = list_rows(table.row_label, table.rows[rows], MAX_LISTED)
-    return RowNote(f"{table.origin}: rows {what}: {np.count_nonzero(rows)} of {len(rows)} ({listed}).")
+    return RowNote(
+        f"{table.origin}: rows {what}: {np.count_nonzero(rows)} of {len(rows)} ({listed})."
+    )
 
 
 def _interpolated(column: ExaminedColumn, time: Array) -> tuple[Array, Mask]:
     """The values (N,) with short gaps filled, and the filled rows."""
-    values = np.array([number(c) for c in column.cells] if isinstance(column.cells, list) else column.cells)
-    known, rows, steps = np.flatnonzero(~column.missing), np.flatnonzero(column.missing), np.diff(time)
+    values = np.array(
+        [number(c) for c in column.cells] if isinstance(column.cells, list) else column.cells
+    )
+    known = np.flatnonzero(~column.missing)
+    rows = np.flatnonzero(column.missing)
+    steps = np.diff(time)
     sample_time = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     after = np.searchsorted(known, rows)
     inside = (after > 0) & (after < len(known))
-    rows, after = rows[inside], after[inside]
+    rows = rows[inside]
+    after = after[inside]
     span = time[known[after]] - time[known[after - 1]]
     short = (span > 0) & (span <= (MAX_GAP + 1e-6) * sample_time)
-    rows, first, last, span = rows[short], known[after - 1][short], known[after][short], span[short]
-    share = 0.0 if column.heading.name.rpartition(".")[2] in _HELD else (time[rows] - time[first]) / span
+    rows = rows[short]
+    first = known[after - 1][short]
+    last = known[after][short]
+    span = span[short]
+    share = (
+        0.0
+        if column.heading.name.rpartition(".")[2] in _HELD
+        else (time[rows] - time[first]) / span
+    )
     values[rows] = values[first] + share * (values[last] - values[first])
     return values, np.isin(np.arange(len(time)), rows)

@@ -1,6 +1,8 @@
-"""Plausibility of recordings, consistency of units across the files of a bench, several columns of one quantity.
+"""Plausibility of recordings, consistency of units across the files of a bench, several columns of
+one quantity.
 
-Two files with similar numbers under different units contradict each other: at least one of the units is wrong.
+Two files with similar numbers under different units contradict each other: at least one of the
+units is wrong.
 """
 
 import itertools
@@ -20,36 +22,49 @@ from .missing_values import DropMissing, Mask
 from .time_base import AS_RECORDED, UNIFORM, WITHOUT_TIME
 
 CONTRACTION_RANGE = (-0.5, 1.0)
-"""Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the length."""
+"""Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the
+length.
+"""
 
 MAX_MAGNITUDE = 1e15
-"""Maximum magnitude of a measured value in SI units (chosen: no measurement, but its powers do not overflow)."""
+"""Maximum magnitude of a measured value in SI units (chosen: no measurement, but its powers do not
+overflow).
+"""
 
 
 def check_plausible(
-    table: RawTable, columns: Mapping[str, Array], resting_length: float | None, ambient: float, *, ordered: bool = True
+    table: RawTable,
+    columns: Mapping[str, Array],
+    resting_length: float | None,
+    ambient: float,
+    *,
+    ordered: bool = True,
 ) -> None:
     """Raise ColumnError, with row and value, at the first value that cannot be a measurement."""
     for name, values in columns.items():
         limit = f"no measurement exceeds {MAX_MAGNITUDE:g}. Correct the value, or delete the row."
-        _refuse(table, values, np.abs(values) > MAX_MAGNITUDE, f"{name} is {{}} in SI units; {limit}")
+        _refuse(
+            table, values, np.abs(values) > MAX_MAGNITUDE, f"{name} is {{}} in SI units; {limit}"
+        )
         quantity = name.rpartition(".")[2]
         if quantity == "time" and ordered:
             steps = np.diff(values)
             row = int(np.argmax(steps <= 0)) + 1 if (steps <= 0).any() else 0
             if row:
-                hints = (WITHOUT_TIME,) if (steps < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
+                hints = (
+                    (WITHOUT_TIME,) if (steps < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
+                )
                 relation = "is less than" if steps[row - 1] < 0 else "repeats"
                 message = (
-                    f"{table.location(row)}: time {values[row]:.9g} s {relation} the time of the previous row "
-                    f"({values[row - 1]:.9g} s). Time must increase: sort the rows, delete the repeated one, or write "
-                    "two runs to two files."
+                    f"{table.location(row)}: time {values[row]:.9g} s {relation} the time of the"
+                    f" previous row ({values[row - 1]:.9g} s). Time must increase: sort the rows,"
+                    " delete the repeated one, or write two runs to two files."
                 )
                 raise ColumnError(HintedText(message, *hints))
         elif quantity == "pressure":
             text = (
-                f"a gauge pressure of {{}} kPa is not above absolute vacuum ({-ambient / 1e3:.4g} kPa gauge). Check "
-                "the unit, and whether the pressure is gauge or absolute."
+                f"a gauge pressure of {{}} kPa is not above absolute vacuum ({-ambient / 1e3:.4g}"
+                " kPa gauge). Check the unit, and whether the pressure is gauge or absolute."
             )
             _refuse(table, values, ~(values + ambient > 0), text, unit=1e3)
         elif quantity == "contraction":
@@ -71,38 +86,63 @@ def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: 
 
 
 def _refuse(
-    table: RawTable, values: Array, wrong: Mask, text: str, *, unit: float = 1.0, may_be_code: bool = True
+    table: RawTable,
+    values: Array,
+    wrong: Mask,
+    text: str,
+    *,
+    unit: float = 1.0,
+    may_be_code: bool = True,
 ) -> None:
-    """Raise ColumnError at the first wrong value, which stands for `{}` in the text, in this unit."""
+    """Raise ColumnError at the first wrong value, which stands for `{}` in the text, in this
+    unit.
+    """
     if wrong.any():
         row = int(np.argmax(wrong))
         code = code_of(float(values[row])) if may_be_code else None
         purpose = f"If {code or 0:g} is a code for a missing value"
-        hint = Hint(purpose, "missing", DropMissing((code,)), "ColumnMapping") if code is not None else None
-        raise ColumnError(f"{table.location(row)}: {text.replace('{}', f'{values[row] / unit:.4g}')}", hint=hint)
+        hint = (
+            Hint(purpose, "missing", DropMissing((code,)), "ColumnMapping")
+            if code is not None
+            else None
+        )
+        raise ColumnError(
+            f"{table.location(row)}: {text.replace('{}', f'{values[row] / unit:.4g}')}", hint=hint
+        )
 
 
-SAME_MAGNITUDE, DIFFERENT_UNIT = 1.5, 5.0
-"""Maximum ratio of numbers of one magnitude, minimum ratio of contradicting units (chosen: psi to kPa is 6.9)."""
+SAME_MAGNITUDE = 1.5
+DIFFERENT_UNIT = 5.0
+"""Maximum ratio of numbers of one magnitude, minimum ratio of contradicting units (chosen: psi to
+kPa is 6.9).
+"""
 SUSPICIOUS_RATIO = 50.0
 """Minimum ratio of pressures or lengths in the same unit that causes a warning (chosen).
 
-Forces are excluded: the force of a slack muscle is legitimately much smaller than that of a loaded one."""
+Forces are excluded: the force of a slack muscle is legitimately much smaller than that of a loaded
+one."""
 
 
 def check_unit_consistency(recordings: Sequence[Recording]) -> None:
     """Check that files with the same column agree on its unit.
 
-    Raises UnitError if two files contain similar numbers under different units, and warns (AirmuscleWarning) if the
-    units are merely suspicious. Each message names both files and the column.
+    Raises UnitError if two files contain similar numbers under different units, and warns
+    (AirmuscleWarning) if the units are merely suspicious. Each message names both files and the
+    column.
     """
     for name in dict.fromkeys(name for recording in recordings for name in recording.units):
         quantity = quantity_of(name)
         by_unit: dict[str, list[tuple[Recording, float]]] = {}
         for each in recordings:
             if name in each.units and len(each) and quantity:
-                offset = conversion(each.units[name], "Pa").offset if name.rpartition(".")[2] == "pressure" else 0.0
-                magnitude = float(np.quantile(np.abs(each.columns[name] - offset), 0.95))  # [SI], absolute as written
+                offset = (
+                    conversion(each.units[name], "Pa").offset
+                    if name.rpartition(".")[2] == "pressure"
+                    else 0.0
+                )
+                magnitude = float(
+                    np.quantile(np.abs(each.columns[name] - offset), 0.95)
+                )  # [SI], absolute as written
                 by_unit.setdefault(each.units[name], []).append((each, magnitude))
         size = operator.itemgetter(1)
         groups = [sorted(group, key=size) for group in by_unit.values()]
@@ -113,28 +153,47 @@ def check_unit_consistency(recordings: Sequence[Recording]) -> None:
                 _compare(name, quantity.unit, first, second)
 
 
-def _compare(name: str, target: str, one: tuple[Recording, float], two: tuple[Recording, float]) -> None:
+def _compare(
+    name: str, target: str, one: tuple[Recording, float], two: tuple[Recording, float]
+) -> None:
     """Compare the units of a column in two recordings, each with its magnitude [SI]."""
-    (first, size), (second, other_size) = one, two
-    unit, other_unit = first.units[name], second.units[name]
+    first, size = one
+    second, other_size = two
+    unit = first.units[name]
+    other_unit = second.units[name]
     factor, other_factor = (file_conversion(each, target).factor for each in (unit, other_unit))
-    written, other_written = size / factor, other_size / other_factor
-    if _ratio(factor, other_factor) >= DIFFERENT_UNIT and _ratio(written, other_written) <= SAME_MAGNITUDE:
+    written = size / factor
+    other_written = other_size / other_factor
+    if (
+        _ratio(factor, other_factor) >= DIFFERENT_UNIT
+        and _ratio(written, other_written) <= SAME_MAGNITUDE
+    ):
         raise UnitError(
-            f"{first.origin} states the {name} in {unit} and {second.origin} in {other_unit}, but the numbers have the "
-            f"same magnitude (up to {written:.4g} and {other_written:.4g}): one of the two units is wrong. Correct it "
-            "in the file.",
+            f"{first.origin} states the {name} in {unit} and {second.origin} in {other_unit}, but"
+            f" the numbers have the same magnitude (up to {written:.4g} and {other_written:.4g}):"
+            " one of the two units is wrong. Correct it in the file.",
             hint=Hint("To state the unit", "units", {name: ...}, "ColumnMapping"),
         )
-    both = f"{first.origin} (up to {written:.4g} {unit}) and {second.origin} (up to {other_written:.4g} {other_unit})"
+    both = (
+        f"{first.origin} (up to {written:.4g} {unit}) and {second.origin} (up to"
+        f" {other_written:.4g} {other_unit})"
+    )
     comparable = name.rpartition(".")[2] in ("pressure", "length")
     if unit == other_unit and comparable and _ratio(size, other_size) >= SUSPICIOUS_RATIO:
-        text = f"the {name} of {both} differs by a factor of {_ratio(size, other_size):.0f}. Check the units."
+        text = (
+            f"the {name} of {both} differs by a factor of {_ratio(size, other_size):.0f}. Check the"
+            " units."
+        )
         warnings.warn(text, AirmuscleWarning, stacklevel=2)
     changes = [conversion(each, "Pa") for each in (unit, other_unit) if target == "Pa"]
-    stated = {"none" if each.assumed_gauge else "absolute" if each.offset else "gauge" for each in changes}
+    stated = {
+        "none" if each.assumed_gauge else "absolute" if each.offset else "gauge" for each in changes
+    }
     if len(stated) > 1 and "none" in stated:
-        text = f"of {both}, only one states whether its {name} is gauge or absolute; the other is read as gauge."
+        text = (
+            f"of {both}, only one states whether its {name} is gauge or absolute; the other is read"
+            " as gauge."
+        )
         warnings.warn(text, AirmuscleWarning, stacklevel=2)
 
 
@@ -147,9 +206,12 @@ MAX_COLUMNS = 5000
 
 
 def without_repeated_columns(table: RawTable) -> RawTable:
-    """The table without the columns that repeat heading, unit and cells of a column before; a note names them."""
+    """The table without the columns that repeat heading, unit and cells of a column before; a note
+    names them.
+    """
     units = table.units or ("",) * len(table.headings)
-    kept, repeated = list[int](), list[str]()
+    kept = list[int]()
+    repeated = list[str]()
     same: dict[tuple[str, str], list[int]] = {}
 
     def equal(one: Cells, other: Cells) -> bool:
@@ -172,31 +234,38 @@ def without_repeated_columns(table: RawTable) -> RawTable:
 
 
 def check_width(table: RawTable) -> None:
-    """Raise ColumnError for a table of more columns than any test rig has, whose inspection would take minutes."""
+    """Raise ColumnError for a table of more columns than any test rig has, whose inspection would
+    take minutes.
+    """
     if len(table.headings) > MAX_COLUMNS:
         raise ColumnError(
-            f"{table.origin}: the table has {len(table.headings)} columns; at most {MAX_COLUMNS} are read. Export the "
-            "needed columns alone."
+            f"{table.origin}: the table has {len(table.headings)} columns; at most {MAX_COLUMNS}"
+            " are read. Export the needed columns alone."
         )
 
 
 def check_unique(table: RawTable, headings: Sequence[Heading]) -> None:
-    """Raise ColumnError where several columns contain one quantity, as two tables side by side do."""
+    """Raise ColumnError where several columns contain one quantity, as two tables side by side
+    do.
+    """
     numbers: dict[str, list[int]] = {}
     for i, heading in enumerate(headings):
         if heading.text:
             numbers.setdefault(heading.name, []).append(i + 1)
     several = {name: own for name, own in numbers.items() if len(own) > 1}
     if len(several) > 1:
-        places = "; ".join(f"{name}: columns {' and '.join(map(str, own))}" for name, own in several.items())
+        places = "; ".join(
+            f"{name}: columns {' and '.join(map(str, own))}" for name, own in several.items()
+        )
         raise ColumnError(
-            f"{table.origin}: {len(several)} quantities are in several columns ({places}), as in two tables side by "
-            "side. Write each table to a sheet or a file of its own; for several muscles, write 'left.pressure' and "
-            "'right.pressure'."
+            f"{table.origin}: {len(several)} quantities are in several columns ({places}), as in"
+            " two tables side by side. Write each table to a sheet or a file of its own; for"
+            " several muscles, write 'left.pressure' and 'right.pressure'."
         )
     for name, own in several.items():
         first, second = (headings[i - 1].text for i in own[:2])
         raise ColumnError(
-            f"{table.origin}: columns '{first}' and '{second}' (numbers {own[0]} and {own[1]}) both contain the "
-            f"{name}. Rename or delete one of them; for several muscles, write 'left.{name}' and 'right.{name}'."
+            f"{table.origin}: columns '{first}' and '{second}' (numbers {own[0]} and {own[1]}) both"
+            f" contain the {name}. Rename or delete one of them; for several muscles, write"
+            f" 'left.{name}' and 'right.{name}'."
         )

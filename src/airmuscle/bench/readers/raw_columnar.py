@@ -15,23 +15,36 @@ from .separate_process import import_lab_package, in_separate_process, reading
 from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths
 
 StoredTable = tuple[str, list[Channel], dict[str, float | str], Reduction]
-"""Name, channels and constants of a group or a dataset of an HDF5 file, and the reduction of its rows."""
+"""Name, channels and constants of a group or a dataset of an HDF5 file, and the reduction of its
+rows.
+"""
 
 
 @in_separate_process("pyarrow")
 def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of the file constants. A
-    Parquet file has no groups; `group` is not used. Raises FileError or ColumnError."""
+    """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of
+    the file constants. A Parquet file has no groups; `group` is not used. Raises FileError or
+    ColumnError."""
     parquet = import_lab_package("pyarrow.parquet", path)
     with reading(path, "Parquet"):
         table = parquet.read_table(str(path))
         channels = [
-            Channel(field.name, table.column(i).to_numpy(), unit=_text((field.metadata or {}).get(b"unit", b"")))
+            Channel(
+                field.name,
+                table.column(i).to_numpy(),
+                unit=_text((field.metadata or {}).get(b"unit", b"")),
+            )
             for i, field in enumerate(table.schema)
             if not field.name.startswith("__index_level_")
         ]
-        metadata = {_text(name): _text(value) for name, value in (table.schema.metadata or {}).items()}
-        constants = {name: _number(text) for name, text in metadata.items() if name not in ("pandas", "ARROW:schema")}
+        metadata = {
+            _text(name): _text(value) for name, value in (table.schema.metadata or {}).items()
+        }
+        constants = {
+            name: _number(text)
+            for name, text in metadata.items()
+            if name not in ("pandas", "ARROW:schema")
+        }
         return (merge_channels(path.name, channels, constants),)
 
 
@@ -39,37 +52,59 @@ def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable,
 def read_hdf5_tables(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
-    """Read one table from each group with vectors, or from the named group; the attribute `unit` states a unit.
+    """Read one table from each group with vectors, or from the named group; the attribute `unit`
+    states a unit.
 
-    A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute `columns`. A table
-    of more than `downsampling.max_rows` rows is read by pieces and reduced. Raises FileError or ColumnError.
+    A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute
+    `columns`. A table of more than `downsampling.max_rows` rows is read by pieces and reduced.
+    Raises FileError or ColumnError.
     """
     h5py = import_lab_package("h5py", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
         check_own_values(h5py, file, path)
         tables = _groups(h5py, file, path.name, downsampling)
-        contents = {name: (channels, constants, kept) for name, channels, constants, kept in tables if channels}
+        contents = {
+            name: (channels, constants, kept)
+            for name, channels, constants, kept in tables
+            if channels
+        }
     if not contents:
         raise FileError(
-            f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of records."
+            f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of"
+            " records."
         )
-    check_known(f"{path.name}: no group", [] if group is None else group, contents, "the groups are", FileError)
-    origins = {name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name for name in contents}
+    check_known(
+        f"{path.name}: no group",
+        [] if group is None else group,
+        contents,
+        "the groups are",
+        FileError,
+    )
+    origins = {
+        name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name
+        for name in contents
+    }
     return tuple(
         reduction.noted(merge_channels(origins[name], channels, constants))
-        for name, (channels, constants, reduction) in contents.items() if group in (None, name)
-    )  # fmt: skip
+        for name, (channels, constants, reduction) in contents.items()
+        if group in (None, name)
+    )
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:
-    """Raise FileError if the values of a dataset are in another file, which might be any file of this machine."""
+    """Raise FileError if the values of a dataset are in another file, which might be any file of
+    this machine.
+    """
 
     def is_outside(name: str, item: Any) -> bool | None:
-        return True if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual) else None
+        return (
+            True if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual) else None
+        )
 
     if file.visititems(is_outside):
         raise FileError(
-            f"{path.name}: the values of a dataset are in another file, which is not read. Store them in this file."
+            f"{path.name}: the values of a dataset are in another file, which is not read. Store"
+            " them in this file."
         )
 
 
@@ -78,17 +113,24 @@ def check_no_external_links(h5py: Any, group: Any, path: Path) -> None:
     for name in group:
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
-            raise FileError(f"{path.name}: '{name}' is a link to another file, which is not read. Store the values.")
+            raise FileError(
+                f"{path.name}: '{name}' is a link to another file, which is not read. Store the"
+                " values."
+            )
         if isinstance(link, h5py.HardLink) and isinstance(group[name], h5py.Group):
             check_no_external_links(h5py, group[name], path)
 
 
 def _groups(
-    h5py: Any, group: Any, origin: str, downsampling: Downsampling,
+    h5py: Any,
+    group: Any,
+    origin: str,
+    downsampling: Downsampling,
     outer: Mapping[str, float | str] = MappingProxyType({}),
-) -> Iterator[StoredTable]:  # fmt: skip
-    """The table of each group with vectors and of each dataset that is a table; no links are followed. The constants of
-    the `outer` groups and of the file count in each group, which may state others."""
+) -> Iterator[StoredTable]:
+    """The table of each group with vectors and of each dataset that is a table; no links are
+    followed. The constants of the `outer` groups and of the file count in each group, which may
+    state others."""
     vectors: list[Any] = []
     tables: list[Any] = []
     groups: list[Any] = []
@@ -100,15 +142,23 @@ def _groups(
             groups.append(item)
         elif item.size and item.ndim:
             (vectors if _is_vector(item) else tables).append(item)
-    constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
+    constants = {**outer, **_constants(group.attrs)}
+    numeric = [d for d in vectors if d.dtype.kind in "biuf"]
     reduction = Reduction(downsampling, max((d.size for d in numeric), default=0))
-    channels = [Channel(d.name.rpartition("/")[2], _values(d, reduction), unit=_unit(d)) for d in numeric]
+    channels = [
+        Channel(d.name.rpartition("/")[2], _values(d, reduction), unit=_unit(d)) for d in numeric
+    ]
     place = f"{origin}, group '{group.name}'"
     check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
     yield group.name, channels, constants, reduction
     for dataset in tables:
         reduction = Reduction(downsampling, dataset.shape[0])
-        yield dataset.name, _columns(dataset, reduction), {**constants, **_constants(dataset.attrs)}, reduction
+        yield (
+            dataset.name,
+            _columns(dataset, reduction),
+            {**constants, **_constants(dataset.attrs)},
+            reduction,
+        )
     for inner in groups:
         yield from _groups(h5py, inner, origin, downsampling, constants)
 
@@ -126,11 +176,15 @@ def _values(dataset: Any, reduction: Reduction, field: str | None = None) -> Any
     if not _is_vector(dataset):
         return reduction.read(lambda first, end: dataset[first:end], dataset.shape[0])
     row = dataset.ndim == 2 and dataset.shape[0] == 1
-    return reduction.read(lambda a, b: (dataset[0, a:b] if row else dataset[a:b]).reshape(-1), dataset.size)
+    return reduction.read(
+        lambda a, b: (dataset[0, a:b] if row else dataset[a:b]).reshape(-1), dataset.size
+    )
 
 
 def _columns(dataset: Any, reduction: Reduction) -> list[Channel]:
-    """Channels of a dataset of records, or of a matrix with an attribute `columns`; empty for another dataset."""
+    """Channels of a dataset of records, or of a matrix with an attribute `columns`; empty for
+    another dataset.
+    """
     units = _texts(dataset.attrs.get("units", ()))
     if dataset.dtype.names is not None and dataset.ndim == 1:
         names = list(dataset.dtype.names)
@@ -141,7 +195,10 @@ def _columns(dataset: Any, reduction: Reduction) -> list[Channel]:
             return []
         values = list(np.asarray(_values(dataset, reduction)).T)
     units = units if len(units) == len(names) else [""] * len(names)
-    return [Channel(name, value, unit=unit) for name, value, unit in zip(names, values, units, strict=True)]
+    return [
+        Channel(name, value, unit=unit)
+        for name, value, unit in zip(names, values, units, strict=True)
+    ]
 
 
 def _unit(dataset: Any) -> str:
@@ -152,8 +209,14 @@ def _unit(dataset: Any) -> str:
 def _constants(attributes: Mapping[str, Any]) -> dict[str, float | str]:
     """Attributes that are single numbers or texts."""
     single = np.number | int | float | str | bytes
-    stated = {name: value for name, value in attributes.items() if name.isidentifier() and isinstance(value, single)}
-    return {name: _text(v) if isinstance(v, str | bytes) else float(v) for name, v in stated.items()}
+    stated = {
+        name: value
+        for name, value in attributes.items()
+        if name.isidentifier() and isinstance(value, single)
+    }
+    return {
+        name: _text(v) if isinstance(v, str | bytes) else float(v) for name, v in stated.items()
+    }
 
 
 def _text(value: Any) -> str:
@@ -165,7 +228,9 @@ def _texts(values: Any) -> list[str]:
 
 
 def _number(text: str) -> float | str:
-    """A constant in the metadata: a number, or a text, which `write` puts in quotation marks if it looks like one."""
+    """A constant in the metadata: a number, or a text, which `write` puts in quotation marks if it
+    looks like one.
+    """
     with contextlib.suppress(ValueError):
         return float(text)
     with contextlib.suppress(json.JSONDecodeError):

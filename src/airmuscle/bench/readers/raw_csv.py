@@ -1,4 +1,6 @@
-"""Reader of text tables: from bytes to an uninterpreted RawTable; large tables and streams are read in chunks."""
+"""Reader of text tables: from bytes to an uninterpreted RawTable; large tables and streams are read
+in chunks.
+"""
 
 import codecs
 import itertools
@@ -16,7 +18,15 @@ from .channels import Cells, RawTable, numbers_if_all
 from .file_kind import check_beginning, check_text_file, readable
 from .header import COMMA_NUMBER, POINT_NUMBER
 from .missing_values import MAX_LISTED
-from .text_format import NumberedLines, TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
+from .text_format import (
+    NumberedLines,
+    TextFormat,
+    TextHeader,
+    has_content,
+    is_comment,
+    parse_header,
+    split_cells,
+)
 from .time_base import Decimation, Downsampling, downsample
 
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
@@ -33,14 +43,21 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
 
 def _parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
     header, body = _header_and_body(origin, re.split(r"\r\n|\n|\r", text), text_format)
-    return header.table(origin, parse_columns(origin, header, body, text_format), [i for i, _ in body])
+    return header.table(
+        origin, parse_columns(origin, header, body, text_format), [i for i, _ in body]
+    )
 
 
-def _header_and_body(origin: str, lines: list[str], text_format: TextFormat) -> tuple[TextHeader, NumberedLines]:
+def _header_and_body(
+    origin: str, lines: list[str], text_format: TextFormat
+) -> tuple[TextHeader, NumberedLines]:
     """The header, and the lines below it that are no comments."""
     numbered = [(i, line) for i, line in enumerate(lines, 1) if has_content(line)]
     header = parse_header(origin, numbered, text_format)
-    return header, [(i, line) for i, line in numbered if not is_comment(line)][header.header_lines :]
+    return (
+        header,
+        [(i, line) for i, line in numbered if not is_comment(line)][header.header_lines :],
+    )
 
 
 def read_text(path: Path) -> str:
@@ -52,38 +69,55 @@ def read_text(path: Path) -> str:
     return content.decode(form.detect_encoding(content), errors="replace")
 
 
-def parse_columns(origin: str, header: TextHeader, body: NumberedLines, text_format: TextFormat) -> tuple[Cells, ...]:
-    """The columns, from a fast parser if every cell is a number, otherwise cell by cell. Raises ColumnError."""
-    comma = text_format.decimal != "." and header.delimiter != "," and any("," in line for _, line in body)
+def parse_columns(
+    origin: str, header: TextHeader, body: NumberedLines, text_format: TextFormat
+) -> tuple[Cells, ...]:
+    """The columns, from a fast parser if every cell is a number, otherwise cell by cell. Raises
+    ColumnError.
+    """
+    comma = (
+        text_format.decimal != "."
+        and header.delimiter != ","
+        and any("," in line for _, line in body)
+    )
     lines = [line.replace(",", ".") if comma else line for _, line in body]
     separator = None if header.delimiter == " " else header.delimiter
     try:
         numbers = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, quotechar='"')
     except ValueError:
-        numbers = np.empty((0, 0))  # a text, an empty cell or a ragged row: `_parse_by_cell` reports the line
+        numbers = np.empty(
+            (0, 0)
+        )  # a text, an empty cell or a ragged row: `_parse_by_cell` reports the line
     ambiguous = (comma or text_format.decimal == ",") and any("." in line for _, line in body)
     if ambiguous or numbers.shape != (len(body), len(header.headings)):
         return _parse_by_cell(origin, header, body, text_format.decimal)
     return tuple(np.ascontiguousarray(column) for column in numbers.T)
 
 
-def _parse_by_cell(origin: str, header: TextHeader, body: NumberedLines, decimal: str | None) -> tuple[Cells, ...]:
+def _parse_by_cell(
+    origin: str, header: TextHeader, body: NumberedLines, decimal: str | None
+) -> tuple[Cells, ...]:
     rows = [split_cells(line, header.delimiter) for _, line in body]
     width = len(header.headings)
     for (line, _), row in zip(body, rows, strict=True):
         if len(row) < width or any(row[width:]):
             hint = " If the comma is a decimal comma, separate the columns by ';' or tab."
             raise ColumnError(
-                f"{origin}, line {line}: the line must have {width} cells ({listed(header.headings)}); it has "
-                f"{len(row)}."
-                f"{hint if header.delimiter == ',' else ''} Start lines that are not part of the table with '#'."
+                f"{origin}, line {line}: the line must have {width} cells"
+                f" ({listed(header.headings)}); it has"
+                f" {len(row)}.{hint if header.delimiter == ',' else ''} Start lines that are not"
+                " part of the table with '#'."
             )
     _check_decimal_sign(origin, body, rows, decimal)
-    return tuple(numbers_if_all([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
+    return tuple(
+        numbers_if_all([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width)
+    )
 
 
 def _with_decimal_point(cell: str, decimal: str | None) -> str:
-    """A number with a decimal point; if the decimal sign is given, the other sign separates thousands."""
+    """A number with a decimal point; if the decimal sign is given, the other sign separates
+    thousands.
+    """
     if decimal is None:
         return cell.replace(",", ".") if COMMA_NUMBER.fullmatch(cell) else cell
     thousands = "." if decimal == "," else ","
@@ -91,12 +125,21 @@ def _with_decimal_point(cell: str, decimal: str | None) -> str:
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
 
 
-def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str | None) -> None:
-    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`. If
-    none is stated, both signs must not occur: next to `0.5`, the comma in `1,234` may separate thousands."""
+def _check_decimal_sign(
+    origin: str, body: NumberedLines, rows: list[list[str]], decimal: str | None
+) -> None:
+    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate
+    thousands, as in `0.5`. If none is stated, both signs must not occur: next to `0.5`, the comma
+    in `1,234` may separate thousands.
+    """
 
     def matching(sign: re.Pattern[str]) -> Iterator[tuple[int, str]]:
-        return ((i, cell) for (i, _), row in zip(body, rows, strict=True) for cell in row if sign.fullmatch(cell))
+        return (
+            (i, cell)
+            for (i, _), row in zip(body, rows, strict=True)
+            for cell in row
+            if sign.fullmatch(cell)
+        )
 
     other = matching(POINT_NUMBER if decimal == "," else COMMA_NUMBER)
     found = [(i, cell) for i, cell in other if not (decimal and _THOUSANDS.fullmatch(cell))]
@@ -104,16 +147,22 @@ def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]],
         return
     line, cell = found[0]
     lines = list(dict.fromkeys(line for line, _ in found))
-    further = f"; there are {len(found)} such cells ({list_rows('line', lines, MAX_LISTED)})" if len(found) > 1 else ""
+    further = (
+        f"; there are {len(found)} such cells ({list_rows('line', lines, MAX_LISTED)})"
+        if len(found) > 1
+        else ""
+    )
     if decimal:
         raise ColumnError(
-            f"{origin}, line {line}: '{cell}' contradicts the decimal sign '{decimal}', which is stated: the other "
-            f"sign separates groups of three digits{further}. Correct the decimal sign or the numbers."
+            f"{origin}, line {line}: '{cell}' contradicts the decimal sign '{decimal}', which is"
+            f" stated: the other sign separates groups of three digits{further}. Correct the"
+            " decimal sign or the numbers."
         )
     for point, example in matching(POINT_NUMBER):
         raise ColumnError(
-            f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {point} contains a decimal point "
-            f"('{example}'){further}. Write all numbers with the same decimal sign and without thousands separators.",
+            f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {point}"
+            f" contains a decimal point ('{example}'){further}. Write all numbers with the same"
+            " decimal sign and without thousands separators.",
             hint=Hint("To specify the decimal sign", "decimal", ",", function="ColumnMapping"),
         )
 
@@ -133,10 +182,14 @@ def is_large_file(path: Path) -> bool:
 
 
 def read_large_csv(
-    path: Path, text_format: TextFormat, downsampling: Downsampling, progress: Progress | None = None
+    path: Path,
+    text_format: TextFormat,
+    downsampling: Downsampling,
+    progress: Progress | None = None,
 ) -> RawTable:
-    """The table in a large text file, with at most `downsampling.max_rows` rows; a note reports a reduction. With
-    Decimation, the lines between the kept rows are not parsed. Raises FileError or ColumnError."""
+    """The table in a large text file, with at most `downsampling.max_rows` rows; a note reports a
+    reduction. With Decimation, the lines between the kept rows are not parsed. Raises FileError or
+    ColumnError."""
     with path.open("rb") as file:
         beginning = file.read(_HEADER_BYTES)
     encoding = form.detect_encoding(beginning)
@@ -146,38 +199,58 @@ def read_large_csv(
     stride = step if isinstance(downsampling, Decimation) else 1
     columns: list[tuple[Cells, ...]] = []
     rows: list[int] = []
-    size = max(_CHUNK_ROWS // step, 1) * step // stride  # complete blocks of `step` lines, every `stride`-th one
+    size = (
+        max(_CHUNK_ROWS // step, 1) * step // stride
+    )  # complete blocks of `step` lines, every `stride`-th one
     with path.open(encoding=encoding, errors="replace") as text:
-        numbered = zip(itertools.count(first, stride), itertools.islice(text, first - 1, None, stride))
+        numbered = zip(
+            itertools.count(first, stride), itertools.islice(text, first - 1, None, stride)
+        )
         while lines := list(itertools.islice(numbered, size)):
             chunk = [(i, line) for i, line in lines if has_content(line) and not is_comment(line)]
             if not chunk:
                 continue
             cells = parse_columns(path.name, header, chunk, text_format)
-            columns.append(cells if stride == step else tuple(downsampling.reduce(c, step) for c in cells))
+            columns.append(
+                cells if stride == step else tuple(downsampling.reduce(c, step) for c in cells)
+            )
             rows += [line for line, _ in chunk][:: step // stride]
             if progress:
                 progress(path.name, min(1.0, (rows[-1] - first + 1) / total))
-    return header.table(path.name, _joined(columns), rows, (downsampling.note(total, step),) if step > 1 else ())
+    return header.table(
+        path.name, _joined(columns), rows, (downsampling.note(total, step),) if step > 1 else ()
+    )
 
 
 def read_text_stream(
-    stream: BinaryIO, origin: str, text_format: TextFormat = TextFormat(), downsampling: Downsampling = Decimation()
+    stream: BinaryIO,
+    origin: str,
+    text_format: TextFormat = TextFormat(),
+    downsampling: Downsampling = Decimation(),
 ) -> RawTable:
-    """The table in a stream, such as a pipe, which is read once to its end and has an unknown length. With Decimation,
-    one row in 2, 4, 8, ... is kept as soon as there are more. Raises FileError or ColumnError."""
+    """The table in a stream, such as a pipe, which is read once to its end and has an unknown
+    length. With Decimation, one row in 2, 4, 8, ... is kept as soon as there are more. Raises
+    FileError or ColumnError."""
     beginning = stream.read(_HEADER_BYTES)
     if not beginning.strip():
         raise FileError(f"{origin}: it contains nothing. Check the program that writes to it.")
     check_beginning(origin, beginning)
     encoding = form.detect_encoding(beginning)
     if len(beginning) < _HEADER_BYTES:
-        return downsample(_parse_text(origin, beginning.decode(encoding, errors="replace"), text_format), downsampling)
+        return downsample(
+            _parse_text(origin, beginning.decode(encoding, errors="replace"), text_format),
+            downsampling,
+        )
     first, header = _read_header(origin, beginning, encoding, text_format)
     blocks = itertools.chain([beginning], iter(lambda: stream.read(1 << 20), b""))
     lines = enumerate(_split_lines(codecs.iterdecode(blocks, encoding, errors="replace")), 1)
-    body = ((i, line) for i, line in lines if i >= first and has_content(line) and not is_comment(line))
-    parts, rows, stride, total = list[tuple[Cells, ...]](), list[int](), 1, 0
+    body = (
+        (i, line) for i, line in lines if i >= first and has_content(line) and not is_comment(line)
+    )
+    parts = list[tuple[Cells, ...]]()
+    rows = list[int]()
+    stride = 1
+    total = 0
     while chunk := list(itertools.islice(body, _CHUNK_ROWS)):
         kept = chunk[-total % stride :: stride]
         total += len(chunk)
@@ -186,7 +259,9 @@ def read_text_stream(
         parts.append(parse_columns(origin, header, kept, text_format))
         rows += [line for line, _ in kept]
         while isinstance(downsampling, Decimation) and len(rows) > downsampling.max_rows:
-            parts, rows, stride = [tuple(each[::2] for each in _joined(parts))], rows[::2], 2 * stride
+            parts = [tuple(each[::2] for each in _joined(parts))]
+            rows = rows[::2]
+            stride = 2 * stride
     notes = (downsampling.note(total, stride),) if stride > 1 else ()
     return downsample(header.table(origin, _joined(parts), rows, notes), downsampling)
 
@@ -199,16 +274,21 @@ def _split_lines(blocks: Iterable[str]) -> Iterator[str]:
     yield rest
 
 
-def _read_header(origin: str, beginning: bytes, encoding: str, text_format: TextFormat) -> tuple[int, TextHeader]:
+def _read_header(
+    origin: str, beginning: bytes, encoding: str, text_format: TextFormat
+) -> tuple[int, TextHeader]:
     """The line number of the first row of numbers, and the header above it."""
-    lines = beginning.decode(encoding, errors="replace").splitlines()[:-1]  # the last line may be incomplete
+    lines = beginning.decode(encoding, errors="replace").splitlines()[
+        :-1
+    ]  # the last line may be incomplete
     header, body = _header_and_body(origin, lines, text_format)
     return body[0][0], header
 
 
 def _count_lines(path: Path) -> int:
     """The number of lines, including a last line without line break."""
-    count, last = 0, b""
+    count = 0
+    last = b""
     with path.open("rb") as file:
         while block := file.read(1 << 20):
             count += block.count(b"\n")
@@ -222,5 +302,7 @@ def _joined(chunks: list[tuple[Cells, ...]]) -> tuple[Cells, ...]:
     for parts in zip(*chunks, strict=True):
         numbers = [part for part in parts if not isinstance(part, list)]
         texts = (part if isinstance(part, list) else map(repr, part.tolist()) for part in parts)
-        columns.append(np.concatenate(numbers) if len(numbers) == len(parts) else list(itertools.chain(*texts)))
+        columns.append(
+            np.concatenate(numbers) if len(numbers) == len(parts) else list(itertools.chain(*texts))
+        )
     return tuple(columns)

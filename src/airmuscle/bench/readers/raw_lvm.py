@@ -1,4 +1,5 @@
-"""Reader of LabVIEW measurement files (.lvm): one table for each segment of text, with the units of its header.
+"""Reader of LabVIEW measurement files (.lvm): one table for each segment of text, with the units of
+its header.
 
 National Instruments, Specification for the LabVIEW Measurement File (.lvm), version 2.0.
 """
@@ -16,7 +17,9 @@ from .channels import Cells, Channel, RawTable, merge_channels
 from .raw_csv import parse_columns, read_csv_table, read_text
 from .text_format import NumberedLines, TextFormat, TextHeader, check_cell_sizes, has_content
 
-_FIRST, _END, _X = "LabVIEW Measurement", "***End_of_Header***", "X_Value"
+_FIRST = "LabVIEW Measurement"
+_END = "***End_of_Header***"
+_X = "X_Value"
 _SPECIAL = re.compile(r"\*\*\*Start_Special\*\*\*.*?\*\*\*End_Special\*\*\*", re.DOTALL)
 """Blocks that only the program that wrote them reads."""
 Tags = Mapping[str, Sequence[str]]
@@ -24,38 +27,60 @@ Tags = Mapping[str, Sequence[str]]
 
 
 def is_lvm(path: Path) -> bool:
-    """Whether a file has the header of LabVIEW; a file of numbers alone has none, whatever its extension."""
+    """Whether a file has the header of LabVIEW; a file of numbers alone has none, whatever its
+    extension.
+    """
     with path.open("rb") as file:
         return file.read(len(_FIRST)) == _FIRST.encode()
 
 
 def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> tuple[RawTable, ...]:
-    """Read one table from each segment, or from that of the number `group`; the table of any other text file. Raises
-    FileError or ColumnError."""
+    """Read one table from each segment, or from that of the number `group`; the table of any other
+    text file. Raises FileError or ColumnError."""
     if not is_lvm(path):
         return (read_csv_table(path, text_format),)
     text = _SPECIAL.sub(lambda block: "\n" * block[0].count("\n"), read_text(path))
     lines = list(enumerate(re.split(r"\r\n|\n|\r", text), 1))
     ends = [k for k, (_, line) in enumerate(lines) if line.startswith(_END)]
     if len(ends) < 2:
-        raise FileError(f"{path.name}: no segment of data follows the header. Check that the recording was completed.")
+        raise FileError(
+            f"{path.name}: no segment of data follows the header. Check that the recording was"
+            " completed."
+        )
     delimiter = "," if re.search(r"^Separator\W+Comma", text, re.MULTILINE) else "\t"
     check_cell_sizes(path.name, lines)
-    starts = [next(k for k in range(end - 1, -1, -1) if k in ends or _is_data(lines[k][1])) + 1 for end in ends[1:]]
+    starts = [
+        next(k for k in range(end - 1, -1, -1) if k in ends or _is_data(lines[k][1])) + 1
+        for end in ends[1:]
+    ]
     places = zip(starts, ends[1:], [*starts[1:], len(lines)], strict=True)
-    segments = {str(i): (lines[a : b + 1], lines[b + 1 : c]) for i, (a, b, c) in enumerate(places, 1)}
-    check_known(f"{path.name}: no segment", [] if group is None else group, segments, "it has", FileError)
+    segments = {
+        str(i): (lines[a : b + 1], lines[b + 1 : c]) for i, (a, b, c) in enumerate(places, 1)
+    }
+    check_known(
+        f"{path.name}: no segment", [] if group is None else group, segments, "it has", FileError
+    )
     file_tags = _tags(lines[: ends[0]], delimiter)
     decimal = next(iter(file_tags.get("Decimal_Separator", [])[1:]), None) or None
-    form = dataclasses.replace(text_format, delimiter=delimiter, decimal=text_format.decimal or decimal)
+    form = dataclasses.replace(
+        text_format, delimiter=delimiter, decimal=text_format.decimal or decimal
+    )
     return tuple(
-        _table(f"{path.name}, segment {i}" if len(segments) > 1 else path.name, _tags(head, delimiter), body, form)
-        for i, (head, body) in segments.items() if group in (None, i)
-    )  # fmt: skip
+        _table(
+            f"{path.name}, segment {i}" if len(segments) > 1 else path.name,
+            _tags(head, delimiter),
+            body,
+            form,
+        )
+        for i, (head, body) in segments.items()
+        if group in (None, i)
+    )
 
 
 def _is_data(line: str) -> bool:
-    """Whether a line belongs to the rows of a segment: it begins with a number, or with an empty cell."""
+    """Whether a line belongs to the rows of a segment: it begins with a number, or with an empty
+    cell.
+    """
     return has_content(line) and not line[:1].isalpha()
 
 
@@ -69,12 +94,19 @@ def _table(origin: str, tags: Tags, lines: NumberedLines, form: TextFormat) -> R
     headings = [cell.strip() for cell in lines[0][1].split(form.delimiter)] if lines else []
     rows = [(i, line.split(form.delimiter)) for i, line in lines[1:] if has_content(line)]
     if not rows or _X not in headings:
-        raise FileError(f"{origin}: no rows of data below the headings '{_X} ...'. Leave this segment out.")
+        raise FileError(
+            f"{origin}: no rows of data below the headings '{_X} ...'. Leave this segment out."
+        )
     commented = headings.index("Comment") if "Comment" in headings else len(headings)
     width = max(i for i, name in enumerate(headings[:commented]) if name) + 1
     comment = rows[0][1][commented : commented + 1]
-    body = [(i, form.delimiter.join([*cells[:width], *[""] * (width - len(cells))])) for i, cells in rows]
-    columns = parse_columns(origin, TextHeader(tuple(headings[:width]), None, {}, form.delimiter, 0), body, form)
+    body = [
+        (i, form.delimiter.join([*cells[:width], *[""] * (width - len(cells))]))
+        for i, cells in rows
+    ]
+    columns = parse_columns(
+        origin, TextHeader(tuple(headings[:width]), None, {}, form.delimiter, 0), body, form
+    )
     channels = list(_channels(origin, tags, headings[:width], columns))
     table = merge_channels(origin, channels, {"comment": comment[0]} if any(comment) else {})
     if len(table.rows) == len(body):
@@ -82,8 +114,12 @@ def _table(origin: str, tags: Tags, lines: NumberedLines, form: TextFormat) -> R
     return table
 
 
-def _channels(origin: str, tags: Tags, headings: Sequence[str], columns: Sequence[Cells]) -> Iterator[Channel]:
-    """The channels, each with the time of the column X_Value before it, or of the increment that the header states."""
+def _channels(
+    origin: str, tags: Tags, headings: Sequence[str], columns: Sequence[Cells]
+) -> Iterator[Channel]:
+    """The channels, each with the time of the column X_Value before it, or of the increment that
+    the header states.
+    """
 
     def tag(name: str, column: int, default: str) -> str:
         return next(itertools.islice(tags.get(name, ()), column, None), "") or default
@@ -103,10 +139,13 @@ def _channels(origin: str, tags: Tags, headings: Sequence[str], columns: Sequenc
             time = cells
             continue
         values = cells
-        if isinstance(cells, list):  # a channel with fewer samples than others ends with empty cells
+        if isinstance(
+            cells, list
+        ):  # a channel with fewer samples than others ends with empty cells
             values = cells[: max((k for k, cell in enumerate(cells, 1) if cell.strip()), default=0)]
         if isinstance(time, list):
-            start, step = number("X0", i, "0"), number("Delta_X", i, "1")
+            start = number("X0", i, "0")
+            step = number("Delta_X", i, "1")
             instants = start + step * np.arange(len(values), dtype=float)
         else:
             instants = time[: len(values)]

@@ -1,9 +1,11 @@
-"""Reader of MATLAB files, v5 to v7.3: one table for the vectors of each struct, and for those outside any struct.
+"""Reader of MATLAB files, v5 to v7.3: one table for the vectors of each struct, and for those
+outside any struct.
 
-Each element of a struct array, `runs(2)`, and each struct in a cell array is a struct of its own; so are the elements
-of a struct of cell arrays, `runs.force{2}`, of which version 7.3 does not distinguish a struct array.
-Also supported: a matrix next to a list of column names (`importdata` writes `data` and `colheaders`), and the
-structure with time that Simulink saves; tables and timetables with the package mat-io.
+Each element of a struct array, `runs(2)`, and each struct in a cell array is a struct of its own;
+so are the elements of a struct of cell arrays, `runs.force{2}`, of which version 7.3 does not
+distinguish a struct array. Also supported: a matrix next to a list of column names (`importdata`
+writes `data` and `colheaders`), and the structure with time that Simulink saves; tables and
+timetables with the package mat-io.
 """
 
 import inspect
@@ -16,7 +18,14 @@ import numpy as np
 from ...core import ColumnError, FileError, Hint, alternatives
 from ...recording.columns import parse_heading
 from .channels import Channel, RawTable, merge_channels
-from .mat_contents import READABLE, MatlabObject, find_objects, is_plain_hdf5, read_contents, read_objects
+from .mat_contents import (
+    READABLE,
+    MatlabObject,
+    find_objects,
+    is_plain_hdf5,
+    read_contents,
+    read_objects,
+)
 from .raw_columnar import read_hdf5_tables
 from .separate_process import in_separate_process, reading
 from .time_base import Decimation, Downsampling, Reduction
@@ -24,26 +33,39 @@ from .time_base import Decimation, Downsampling, Reduction
 
 @in_separate_process("scipy")
 def read_mat_tables(
-    path: Path, group: str | None = None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
+    path: Path,
+    group: str | None = None,
+    columns: Sequence[str] = (),
+    downsampling: Downsampling = Decimation(),
 ) -> tuple[RawTable, ...]:
-    """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError.
+    """Read one table from each struct with vectors, or from the named struct. Raises FileError or
+    ColumnError.
 
-    If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
-    those of the length of the known quantities. A long variable is reduced while it is read.
+    If the vectors of a struct differ in length, those of the length of the mapped `columns` are
+    read, or without any those of the length of the known quantities. A long variable is reduced
+    while it is read.
     """
     with reading(path, "MATLAB"):
         if is_plain_hdf5(path):
-            plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(path, group, downsampling)
+            plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(
+                path, group, downsampling
+            )
             return plain
-        contents, objects = read_contents(path, downsampling), find_objects(path)
+        contents = read_contents(path, downsampling)
+        objects = find_objects(path)
         tables = read_objects(path, objects)
     unread = [each for each in objects if each.name not in tables]
     opaque = {each.name for each in objects}
-    variables = {name: value for name, value in contents.variables.items() if name not in opaque} | tables
+    variables = {
+        name: value for name, value in contents.variables.items() if name not in opaque
+    } | tables
     groups = dict(_find_groups("", variables))
     if group is not None and group not in groups:
         names = [name or "(no struct)" for name in groups]
-        raise FileError(f"{path.name}: no struct '{group}' with vectors{alternatives(group, names, 'the structs are')}")
+        raise FileError(
+            f"{path.name}: no struct '{group}' with"
+            f" vectors{alternatives(group, names, 'the structs are')}"
+        )
     selected = groups if group is None else {group: groups[group]}
     if not selected:
         raise FileError(
@@ -52,10 +74,19 @@ def read_mat_tables(
         )
     constants = _scalar_fields(variables)
     notes = (*(f"Not read: {each}. {_remedy([each])}" for each in unread), *contents.notes)
-    origins = {name: f"{path.name}, {name or 'variables'}" if len(groups) > 1 else path.name for name in groups}
-    made = {name: _make_table(origins[name], fields, constants, columns) for name, fields in selected.items()}
+    origins = {
+        name: f"{path.name}, {name or 'variables'}" if len(groups) > 1 else path.name
+        for name in groups
+    }
+    made = {
+        name: _make_table(origins[name], fields, constants, columns)
+        for name, fields in selected.items()
+    }
     whole = Reduction(downsampling)
-    return tuple(contents.reductions.get(name, whole).noted(table).noted(*notes) for name, table in made.items())
+    return tuple(
+        contents.reductions.get(name, whole).noted(table).noted(*notes)
+        for name, table in made.items()
+    )
 
 
 def _remedy(unread: Sequence[MatlabObject]) -> str:
@@ -64,12 +95,18 @@ def _remedy(unread: Sequence[MatlabObject]) -> str:
         return "Save the measured columns as vectors, or as a struct with vectors."
     commands = "; ".join(f"{each.name}: {each.export}" for each in unread)
     readable = any(each.class_name in READABLE for each in unread)
-    package = " Tables and timetables are also read with the package mat-io: pip install mat-io." if readable else ""
+    package = (
+        " Tables and timetables are also read with the package mat-io: pip install mat-io."
+        if readable
+        else ""
+    )
     return f"Export in MATLAB: {commands}.{package}"
 
 
 def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """The structs with vectors by their dotted names; the variables outside any struct have the name ''."""
+    """The structs with vectors by their dotted names; the variables outside any struct have the
+    name ''.
+    """
     signals = _simulink_signals(fields) if "time" in fields and "signals" in fields else None
     if signals is not None:
         yield name, signals
@@ -85,18 +122,25 @@ def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Ma
 
 
 def _elements(value: Any) -> Sequence[Mapping[str, Any]]:
-    """The structs of a struct array, of a cell array of structs, or of a struct of cell arrays; else none."""
+    """The structs of a struct array, of a cell array of structs, or of a struct of cell arrays;
+    else none.
+    """
     if isinstance(value, Mapping):
         cells = {name: each for name, each in value.items() if _is_cell(each)}
         if any(map(_is_array, value.values())) or len({len(each) for each in cells.values()}) != 1:
             return ()
-        return [{**value, **dict(zip(cells, run, strict=True))} for run in zip(*cells.values(), strict=True)]
+        return [
+            {**value, **dict(zip(cells, run, strict=True))}
+            for run in zip(*cells.values(), strict=True)
+        ]
     return value if _is_cell(value) and all(isinstance(each, Mapping) for each in value) else ()
 
 
 def _is_cell(value: Any) -> bool:
     """Whether a value is a cell array or a struct array of one dimension."""
-    return isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1)
+    return isinstance(value, list) or (
+        isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1
+    )
 
 
 def _is_array(value: Any) -> bool:
@@ -106,14 +150,29 @@ def _is_array(value: Any) -> bool:
 
 
 def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The signals of the structure with time that Simulink saves; None for another struct with these fields."""
+    """The signals of the structure with time that Simulink saves; None for another struct with
+    these fields.
+    """
     signals = fields["signals"]
-    if isinstance(signals, Mapping) and isinstance(signals.get("values"), list):  # an array of structs, by field
-        signals = [dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)]
-    parts = [signals] if isinstance(signals, Mapping) else list(signals) if isinstance(signals, Sequence) else []
+    if isinstance(signals, Mapping) and isinstance(
+        signals.get("values"), list
+    ):  # an array of structs, by field
+        signals = [
+            dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)
+        ]
+    parts = (
+        [signals]
+        if isinstance(signals, Mapping)
+        else list(signals)
+        if isinstance(signals, Sequence)
+        else []
+    )
     if not parts or not all(isinstance(part, Mapping) and "values" in part for part in parts):
         return None
-    named = {str(part.get("label") or f"signal {i}"): np.asarray(part["values"]) for i, part in enumerate(parts, 1)}
+    named = {
+        str(part.get("label") or f"signal {i}"): np.asarray(part["values"])
+        for i, part in enumerate(parts, 1)
+    }
     return {"time_s": fields["time"], **named}
 
 
@@ -127,13 +186,20 @@ def _scalar_fields(fields: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _make_table(
-    origin: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], columns: Sequence[str]
+    origin: str,
+    fields: Mapping[str, Any],
+    constants: Mapping[str, float | str],
+    columns: Sequence[str],
 ) -> RawTable:
     channels, notes = _of_one_length(origin, list(_channels(origin, fields)), columns)
     table = merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
     left_out = []
     for key, value in fields.items():
-        if isinstance(value, np.ndarray | list) and len(value) == len(table.rows) and not _is_array(value):
+        if (
+            isinstance(value, np.ndarray | list)
+            and len(value) == len(table.rows)
+            and not _is_array(value)
+        ):
             is_complex = isinstance(value, np.ndarray) and value.dtype.kind == "c"
             kind = "texts" if all(isinstance(each, str) for each in value) else "cells"
             left_out.append(f"{key} ({'complex numbers' if is_complex else kind})")
@@ -145,44 +211,66 @@ def _make_table(
 def _of_one_length(
     origin: str, channels: list[Channel], columns: Sequence[str]
 ) -> tuple[list[Channel], tuple[str, ...]]:
-    """The channels of the length of the mapped ones, or of the known quantities, and a note on the others. Raises
-    ColumnError where the length remains open."""
+    """The channels of the length of the mapped ones, or of the known quantities, and a note on the
+    others. Raises ColumnError where the length remains open."""
     lengths = sorted({len(channel.values) for channel in channels})
     if len(lengths) < 2:
         return channels, ()
-    mapped = [c for c in channels if c.name in columns or c.name.partition("[")[0].strip() in columns]
-    selected = {len(channel.values) for channel in mapped or [c for c in channels if parse_heading(c.name).known]}
+    mapped = [
+        c for c in channels if c.name in columns or c.name.partition("[")[0].strip() in columns
+    ]
+    selected = {
+        len(channel.values)
+        for channel in mapped or [c for c in channels if parse_heading(c.name).known]
+    }
     if len(selected) != 1:
         sizes = "; ".join(
-            f"{length} rows: {', '.join(c.name for c in channels if len(c.values) == length)}" for length in lengths
+            f"{length} rows: {', '.join(c.name for c in channels if len(c.values) == length)}"
+            for length in lengths
         )
         raise ColumnError(
-            f"{origin}: the vectors have different lengths ({sizes}). Name the columns of one length; the others are "
-            "then not read.",
-            hint=Hint("To map a column", "columns", {f"{channels[0].name}": "time [s]"}, function="ColumnMapping"),
+            f"{origin}: the vectors have different lengths ({sizes}). Name the columns of one"
+            " length; the others are then not read.",
+            hint=Hint(
+                "To map a column",
+                "columns",
+                {f"{channels[0].name}": "time [s]"},
+                function="ColumnMapping",
+            ),
         )
     (length,) = selected
     left_out = [f"{c.name} ({len(c.values)} rows)" for c in channels if len(c.values) != length]
-    note = f"Not read, because their length differs from the {length} rows of the table: {', '.join(left_out)}."
+    note = (
+        f"Not read, because their length differs from the {length} rows of the table:"
+        f" {', '.join(left_out)}."
+    )
     return [c for c in channels if len(c.values) == length], (note,)
 
 
 def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
     units_field = fields.get("units", fields.get("unit", {}))
     units = units_field if isinstance(units_field, Mapping) else {}
-    lists = (each.tolist() if isinstance(each, np.ndarray) and each.dtype.kind in "UO" else each
-             for each in fields.values())  # fmt: skip
-    columns = [[text.strip() for text in each] for each in lists
-               if isinstance(each, list) and all(isinstance(text, str) for text in each)]  # fmt: skip
+    lists = (
+        each.tolist() if isinstance(each, np.ndarray) and each.dtype.kind in "UO" else each
+        for each in fields.values()
+    )
+    columns = [
+        [text.strip() for text in each]
+        for each in lists
+        if isinstance(each, list) and all(isinstance(text, str) for text in each)
+    ]
     for name, value in fields.items():
         if _is_array(value) and value.ndim == 1:
             yield Channel(name, value, unit=str(units.get(name, "")))
         elif _is_array(value):
-            width = value.shape[1]  # without a list of texts next to the matrix, expressions of MATLAB: `data(:,1)`
+            width = value.shape[
+                1
+            ]  # without a list of texts next to the matrix, expressions of MATLAB: `data(:,1)`
             indexed = [f"{name}(:,{j})" for j in range(1, width + 1)]
             names = next((each for each in columns if len(each) == width), indexed)
             yield from (Channel(names[j], value[:, j]) for j in range(width))
         elif isinstance(value, np.ndarray) and value.ndim > 2:
             raise ColumnError(
-                f"{origin}: '{name}' has {value.ndim} dimensions; a table has two. Save its columns separately."
+                f"{origin}: '{name}' has {value.ndim} dimensions; a table has two. Save its columns"
+                " separately."
             )

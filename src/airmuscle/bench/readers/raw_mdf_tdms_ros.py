@@ -1,4 +1,6 @@
-"""Readers of channels with times of their own: MDF 3 and 4 (ASAM), TDMS (LabVIEW), and bags of messages (ROS)."""
+"""Readers of channels with times of their own: MDF 3 and 4 (ASAM), TDMS (LabVIEW), and bags of
+messages (ROS).
+"""
 
 import dataclasses
 import functools
@@ -21,17 +23,32 @@ _TIME_MASTER = 1
 def read_mdf_tables(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
-    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError. A channel
-    group with more than `downsampling.max_rows` rows is read by pieces and reduced."""
+    """Read one table from all channels, or from the named channel group. Raises FileError or
+    ColumnError. A channel group with more than `downsampling.max_rows` rows is read by pieces and
+    reduced."""
     with reading(path, "MDF"), import_lab_package("asammdf", path).MDF(path) as file:
-        names = [str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)]
-        check_known(f"{path.name}: no group", [] if group is None else group, names, "the groups are", FileError)
+        names = [
+            str(getattr(g.channel_group, "acq_name", "") or f"group {i}")
+            for i, g in enumerate(file.groups, 1)
+        ]
+        check_known(
+            f"{path.name}: no group",
+            [] if group is None else group,
+            names,
+            "the groups are",
+            FileError,
+        )
         reductions = {
             i: Reduction(downsampling, int(file.groups[i].channel_group.cycles_nr))
-            for i, name in enumerate(names) if group in (None, name)
-        }  # fmt: skip
+            for i, name in enumerate(names)
+            if group in (None, name)
+        }
         table = merge_channels(path.name, list(_channels(file, reductions)), {})
-        notes = [f"Channel group '{names[i]}': {each.note}" for i, each in reductions.items() if each.note]
+        notes = [
+            f"Channel group '{names[i]}': {each.note}"
+            for i, each in reductions.items()
+            if each.note
+        ]
         return (table.noted(*notes),)
 
 
@@ -39,8 +56,12 @@ def _channels(file: Any, reductions: Mapping[int, Reduction]) -> Iterator[Channe
     """The channels of groups by their indices."""
     for i, reduction in reductions.items():
         master = file.masters_db.get(i)
-        channels, time = file.groups[i].channels, None
-        timed = master is not None and getattr(channels[master], "sync_type", _TIME_MASTER) == _TIME_MASTER
+        channels = file.groups[i].channels
+        time = None
+        timed = (
+            master is not None
+            and getattr(channels[master], "sync_type", _TIME_MASTER) == _TIME_MASTER
+        )
         for j, channel in enumerate(channels):
             if j == master and timed:
                 continue
@@ -57,11 +78,15 @@ def _channels(file: Any, reductions: Mapping[int, Reduction]) -> Iterator[Channe
 
 
 def _times(file: Any, group: int, first: int, end: int) -> Array:
-    return np.asarray(file.get_master(group, record_offset=first, record_count=end - first), dtype=float)
+    return np.asarray(
+        file.get_master(group, record_offset=first, record_count=end - first), dtype=float
+    )
 
 
 def _samples(file: Any, group: int, channel: int, first: int, end: int) -> Any:
-    return file.get(group=group, index=channel, record_offset=first, record_count=end - first).samples
+    return file.get(
+        group=group, index=channel, record_offset=first, record_count=end - first
+    ).samples
 
 
 NO_DATE = np.datetime64("1904-01-01T00:00:00", "us")
@@ -69,24 +94,42 @@ NO_DATE = np.datetime64("1904-01-01T00:00:00", "us")
 
 
 def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """Read one table from each group with channels, or from the named group. Raises FileError or ColumnError."""
+    """Read one table from each group with channels, or from the named group. Raises FileError or
+    ColumnError.
+    """
     nptdms = import_lab_package("nptdms", path)
-    nptdms.log.log_manager.set_level("CRITICAL")  # what it prints of a damaged file is the contents of the file
+    nptdms.log.log_manager.set_level(
+        "CRITICAL"
+    )  # what it prints of a damaged file is the contents of the file
     with reading(path, "TDMS"), nptdms.TdmsFile.open(path) as file:
         nonempty = {g.name: g for g in file.groups() if any(len(c) for c in g.channels())}
         if not nonempty:
             raise FileError(f"{path.name}: no channel contains values.")
-        check_known(f"{path.name}: no group", [] if group is None else group, nonempty, "the groups are", FileError)
-        selected, tables = [each for name, each in nonempty.items() if group in (None, name)], list[RawTable]()
+        check_known(
+            f"{path.name}: no group",
+            [] if group is None else group,
+            nonempty,
+            "the groups are",
+            FileError,
+        )
+        selected = [each for name, each in nonempty.items() if group in (None, name)]
+        tables = list[RawTable]()
         for each in selected:
             constants = {
-                name: value for name, value in {**file.properties, **each.properties}.items()
-                if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
-            }  # fmt: skip
+                name: value
+                for name, value in {**file.properties, **each.properties}.items()
+                if isinstance(value, float | int | str)
+                and name not in ("name", "description", "title", "author")
+            }
             channels = []
             for channel, start in zip(each.channels(), _start_times(each.channels()), strict=True):
-                unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
-                time, step = None, _step(channel)
+                unit = str(
+                    channel.properties.get("unit_string")
+                    or channel.properties.get("NI_UnitDescription")
+                    or ""
+                )
+                time = None
+                step = _step(channel)
                 if step > 0.0:
                     offset = float(channel.properties.get("wf_start_offset", 0.0))
                     time = np.asarray(start + offset + step * np.arange(len(channel)))
@@ -97,22 +140,35 @@ def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ..
 
 
 def _start_times(channels: list[Any]) -> list[float]:
-    """The start of each waveform after that of the first [s]; 0 for all unless each waveform states its date."""
-    dates = {i: c.properties.get("wf_start_time") for i, c in enumerate(channels) if _step(c) > 0.0 and len(c)}
+    """The start of each waveform after that of the first [s]; 0 for all unless each waveform states
+    its date.
+    """
+    dates = {
+        i: c.properties.get("wf_start_time")
+        for i, c in enumerate(channels)
+        if _step(c) > 0.0 and len(c)
+    }
     if any(date is None or np.datetime64(date) <= NO_DATE for date in dates.values()):
         return [0.0] * len(channels)
     instants = {i: np.datetime64(date, "us") for i, date in dates.items()}
     first = min(instants.values(), default=NO_DATE)
-    return [float((instants.get(i, first) - first) / np.timedelta64(1, "s")) for i in range(len(channels))]
+    return [
+        float((instants.get(i, first) - first) / np.timedelta64(1, "s"))
+        for i in range(len(channels))
+    ]
 
 
 def _step(channel: Any) -> float:
-    """The sample time of a waveform [s]; 0 for other channels, for which LabVIEW writes none or one of zero."""
+    """The sample time of a waveform [s]; 0 for other channels, for which LabVIEW writes none or one
+    of zero.
+    """
     return float(channel.properties.get("wf_increment", 0.0))
 
 
 STANDARD = ("geometry_msgs/", "sensor_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
-"""Packages whose fields are no quantities of a muscle by their names, except those in QUANTITY_FIELDS."""
+"""Packages whose fields are no quantities of a muscle by their names, except those in
+QUANTITY_FIELDS.
+"""
 FIELD_UNITS = {
     "geometry_msgs/msg/Wrench": {"force": "N", "torque": "N m"},
     "geometry_msgs/msg/Twist": {"linear": "m/s", "angular": "rad/s"},
@@ -126,7 +182,9 @@ FIELD_UNITS = {
     "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "Pa(a)"},
     "sensor_msgs/msg/Temperature": {"temperature": "°C"},
 }
-"""The unit of a field and of the numbers inside it, by type and name; those of JointState are of revolute joints."""
+"""The unit of a field and of the numbers inside it, by type and name; those of JointState are of
+revolute joints.
+"""
 QUANTITY_FIELDS = {"fluid_pressure": "pressure", "temperature": "temperature"}
 """Fields of standard messages that are quantities, with the names of these."""
 
@@ -144,52 +202,77 @@ class _Field:
 
 
 def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """One table from a bag of ROS 1 (.bag) or ROS 2 (.db3 or .mcap, in a folder with metadata.yaml).
+    """One table from a bag of ROS 1 (.bag) or ROS 2 (.db3 or .mcap, in a folder with
+    metadata.yaml).
 
-    Columns are named `topic.field`: `joint_states.position.elbow`, with the name of the joint where a message has some.
-    The field `data` alone is named by its topic. Fields of standard messages have the units of their type, and are no
-    quantities by their names, except those of FluidPressure (absolute) and Temperature. The time is that at which a
-    message was recorded, from the first one on. `group` selects one topic. Files of one ROS 2 bag are read together.
-    Raises FileError or ColumnError.
+    Columns are named `topic.field`: `joint_states.position.elbow`, with the name of the joint where
+    a message has some. The field `data` alone is named by its topic. Fields of standard messages
+    have the units of their type, and are no quantities by their names, except those of
+    FluidPressure (absolute) and Temperature. The time is that at which a message was recorded, from
+    the first one on. `group` selects one topic. Files of one ROS 2 bag are read together. Raises
+    FileError or ColumnError.
     """
     highlevel = import_lab_package("rosbags.highlevel", path)
     folder = path if path.suffix == ".bag" else path.parent
     if path.suffix != ".bag" and not (folder / "metadata.yaml").exists():
-        raise FileError(f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag.")
-    if path.suffix != ".bag" and path != min(p for p in folder.iterdir() if p.suffix == path.suffix):
+        raise FileError(
+            f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag."
+        )
+    if path.suffix != ".bag" and path != min(
+        p for p in folder.iterdir() if p.suffix == path.suffix
+    ):
         return ()
     topics: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
     with reading(path, "ROS bag"):
         typestore = import_lab_package("rosbags.typesys", path)
         default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
         with highlevel.AnyReader([folder], default_typestore=default) as bag:
-            chosen = [c for c in bag.connections if group is None or c.topic.strip("/") == group.strip("/")]
+            chosen = [
+                c
+                for c in bag.connections
+                if group is None or c.topic.strip("/") == group.strip("/")
+            ]
             for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
                 numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
                 topic = connection.topic.strip("/").replace("/", ".")
                 if numbers:
                     topics.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
-    channels = [channel for topic, messages in topics.items() for channel in _topic_channels(topic, messages)]
+    channels = [
+        channel
+        for topic, messages in topics.items()
+        for channel in _topic_channels(topic, messages)
+    ]
     if not channels:
-        raise FileError(f"{path}: no topic contains numbers{f', or there is no topic {group}' if group else ''}.")
+        raise FileError(
+            f"{path}: no topic contains"
+            f" numbers{f', or there is no topic {group}' if group else ''}."
+        )
     return (merge_channels(folder.name, channels, {}, "message"),)
 
 
 def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, float]]:
     """The numbers of a message by their fields; headers are left out."""
-    names, kind = getattr(value, "name", None), str(getattr(value, "__msgtype__", ""))
+    names = getattr(value, "name", None)
+    kind = str(getattr(value, "__msgtype__", ""))
     labels = [str(n) for n in names] if isinstance(names, list | tuple) else []
     for field in getattr(value, "__dataclass_fields__", {}):
-        item, within = getattr(value, field), FIELD_UNITS.get(kind, {}).get(field, unit)
+        item = getattr(value, field)
+        within = FIELD_UNITS.get(kind, {}).get(field, unit)
         stated = bool(within) and field in QUANTITY_FIELDS
         inner = ".".join([*([path] if path else []), QUANTITY_FIELDS[field] if stated else field])
         if field in ("header", "layout", "__msgtype__") or field.endswith("covariance"):
             continue
         if isinstance(item, bool | int | float | np.number):
             number = item.item() if isinstance(item, np.number) else item
-            own = len(field) > 1 and not kind.startswith(STANDARD)  # x, y and z are parts of a vector in every message
+            own = len(field) > 1 and not kind.startswith(
+                STANDARD
+            )  # x, y and z are parts of a vector in every message
             yield _Field(inner, within, stated or own), number
-        elif isinstance(item, np.ndarray) and item.dtype.kind in "biuf" and 0 < item.size <= MAX_ELEMENTS:
+        elif (
+            isinstance(item, np.ndarray)
+            and item.dtype.kind in "biuf"
+            and 0 < item.size <= MAX_ELEMENTS
+        ):
             words = labels if len(labels) == item.size else [str(i) for i in range(item.size)]
             fields = (_Field(f"{inner}.{word}", within, False) for word in words)
             yield from zip(fields, item.ravel().tolist(), strict=True)
@@ -203,7 +286,9 @@ def _topic_channels(topic: str, messages: list[tuple[float, dict[_Field, float]]
     channels = []
     for field in fields:
         rows = [(time, numbers[field]) for time, numbers in messages if field in numbers]
-        time, values = map(np.array, zip(*rows, strict=True))  # integers remain integers: held between messages
+        time, values = map(
+            np.array, zip(*rows, strict=True)
+        )  # integers remain integers: held between messages
         first = np.concatenate([[True], np.diff(time) > 0])
         name = topic if field.name == "data" else f"{topic}.{field.name}"
         channels.append(Channel(name, values[first], time[first], field.unit, field.is_quantity))

@@ -1,4 +1,6 @@
-"""Reader of workbooks (.xlsx, .xlsm, .xls, .ods): one table for each worksheet that contains one."""
+"""Reader of workbooks (.xlsx, .xlsm, .xls, .ods): one table for each worksheet that contains
+one.
+"""
 
 import datetime
 from pathlib import Path
@@ -26,24 +28,44 @@ def read_workbook_tables(
 
     text_format  the place of the headings; delimiter and decimal sign do not apply
 
-    Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no cells. Raises
-    FileError or ColumnError.
+    Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no
+    cells. Raises FileError or ColumnError.
     """
     calamine = import_lab_package("python_calamine", path)
     with reading(path, "a workbook"), calamine.CalamineWorkbook.from_path(str(path)) as book:
-        names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
-        check_known(f"{path.name}: no sheet", [] if sheet is None else sheet, names, "the sheets are", FileError)
-        cells = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-                 for name in names if sheet in (None, name)}  # fmt: skip
-    found = {name: [(i, row) for i, row in enumerate(rows, 1) if header.count_cells(row)]
-             for name, rows in cells.items()}  # fmt: skip
-    sheets = {name: rows for name, rows in found.items() if any(_is_numeric(row) for _, row in rows)}
+        names = [
+            each.name
+            for each in book.sheets_metadata
+            if each.typ == calamine.SheetTypeEnum.WorkSheet
+        ]
+        check_known(
+            f"{path.name}: no sheet",
+            [] if sheet is None else sheet,
+            names,
+            "the sheets are",
+            FileError,
+        )
+        cells = {
+            name: book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+            for name in names
+            if sheet in (None, name)
+        }
+    found = {
+        name: [(i, row) for i, row in enumerate(rows, 1) if header.count_cells(row)]
+        for name, rows in cells.items()
+    }
+    sheets = {
+        name: rows for name, rows in found.items() if any(_is_numeric(row) for _, row in rows)
+    }
     if not sheets:
         raise FileError(
-            f"{path.name}: no worksheet contains a table. A table consists of a row of headings and rows of numbers."
+            f"{path.name}: no worksheet contains a table. A table consists of a row of headings and"
+            " rows of numbers."
         )
     origins = [f"{path.name}, sheet '{name}'" if len(sheets) > 1 else path.name for name in sheets]
-    return tuple(_parse_table(*each, text_format) for each in zip(origins, sheets.values(), strict=True))
+    return tuple(
+        _parse_table(*each, text_format) for each in zip(origins, sheets.values(), strict=True)
+    )
 
 
 def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
@@ -51,34 +73,50 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     texts = ((i, _texts(row)) for i, row in rows)
     stated = header.stated_heading_row(texts, text_format.named, text_format.skip_rows)
     if text_format.skip_rows is not None and stated is None:
-        raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
+        raise FileError(
+            f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows."
+        )
     start = stated or 0
-    if stated is None:  # the last row above the numbers that is as wide as they are, or the row above the unit row
+    if (
+        stated is None
+    ):  # the last row above the numbers that is as wide as they are, or the row above the unit row
         numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
         width = header.count_cells(rows[numeric][1])
         above = [i for i in range(numeric) if header.count_cells(rows[i][1]) >= width]
-        start, adjacent = above[-1] if above else numeric, len(above) > 1 and above[-2] == above[-1] - 1
+        start = above[-1] if above else numeric
+        adjacent = len(above) > 1 and above[-2] == above[-1] - 1
         if adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:])):
             start = above[-2]
-    constants = dict(filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start])))
+    constants = dict(
+        filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start]))
+    )
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
     beginning = [[_text(row[j]) for j in used] for _, row in rows[start : start + 3]]
-    headings, units, count = header.parse_headings(origin, f"row {first}", beginning, text_format.headerless)
+    headings, units, count = header.parse_headings(
+        origin, f"row {first}", beginning, text_format.headerless
+    )
     body = rows[start + count :]
     for i, row in body:
-        outside = next((cell for j, cell in enumerate(row) if cell not in (None, "") and j not in used), None)
+        outside = next(
+            (cell for j, cell in enumerate(row) if cell not in (None, "") and j not in used), None
+        )
         if outside is not None:
             raise ColumnError(
-                f"{origin}, row {i}: the cell '{_text(outside)}' has no heading (the headings are {listed(headings)}). "
-                "Add a heading to its column, or move the cell outside the rows of the table."
+                f"{origin}, row {i}: the cell '{_text(outside)}' has no heading (the headings are"
+                f" {listed(headings)}). Add a heading to its column, or move the cell outside the"
+                " rows of the table."
             )
     columns = tuple(_column([row[j] for _, row in body]) for j in used)
-    return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
+    return RawTable(
+        origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants
+    )
 
 
 def _is_numeric(row: list[Any]) -> bool:
-    """Whether more than half of the cells of a row are numbers or times, also as texts; the others may be names."""
+    """Whether more than half of the cells of a row are numbers or times, also as texts; the others
+    may be names.
+    """
     cells = [c for c in row if c not in (None, "")]
     texts = [c for c in cells if isinstance(c, str)]
     numbers = sum(header.is_number(c) or seconds_from_clock((c,)) is not None for c in texts)
@@ -98,11 +136,16 @@ def _texts(cells: list[Any]) -> list[str]:
 
 
 def _column(cells: list[Any]) -> Cells:
-    """A column of numbers, also of numbers that are stored as texts with one decimal sign; otherwise of texts."""
+    """A column of numbers, also of numbers that are stored as texts with one decimal sign;
+    otherwise of texts.
+    """
     if all(isinstance(cell, float | int) and not isinstance(cell, bool) for cell in cells):
         return np.array(cells, dtype=float)
     texts = _texts(cells)
     stored = [cell for cell in cells if isinstance(cell, str)]
     if not any(header.POINT_NUMBER.fullmatch(text.strip()) for text in stored):
-        texts = [text.replace(",", ".") if header.COMMA_NUMBER.fullmatch(text) else text for text in texts]
+        texts = [
+            text.replace(",", ".") if header.COMMA_NUMBER.fullmatch(text) else text
+            for text in texts
+        ]
     return numbers_if_all(texts)

@@ -1,4 +1,6 @@
-"""Reader of laboratory files: one file, several files, a glob pattern or a folder; the extension gives the format."""
+"""Reader of laboratory files: one file, several files, a glob pattern or a folder; the extension
+gives the format.
+"""
 
 import dataclasses
 import glob
@@ -31,48 +33,63 @@ WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 STANDARD_INPUT = Path("-")
 TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".lvm")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
-    **dict.fromkeys(WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)),
+    **dict.fromkeys(
+        WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)
+    ),
     ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
     **dict.fromkeys((".h5", ".hdf5"), lambda path, m, d: read_hdf5_tables(path, m.group, d)),
     ".mat": lambda path, m, d: read_mat_tables(path, m.group, tuple(map(str, m.columns)), d),
     ".tdms": lambda path, m, d: read_tdms_tables(path, m.group),
     **dict.fromkeys((".mf4", ".mdf"), lambda path, m, d: read_mdf_tables(path, m.group, d)),
-    **dict.fromkeys((".bag", ".db3", ".mcap"), lambda path, m, d: read_rosbag_tables(path, m.group)),
+    **dict.fromkeys(
+        (".bag", ".db3", ".mcap"), lambda path, m, d: read_rosbag_tables(path, m.group)
+    ),
 }
 EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
 """Extensions of the supported files."""
 
 
 def read(
-    source: Source, mapping: str | Path | ColumnMapping = ColumnMapping(), *, downsampling: Downsampling = Decimation(),
+    source: Source,
+    mapping: str | Path | ColumnMapping = ColumnMapping(),
+    *,
+    downsampling: Downsampling = Decimation(),
     progress: Progress | None = None,
-) -> tuple[Recording, ...]:  # fmt: skip
-    """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units; `-` is a
-    table of text on the standard input, which may be a pipe.
+) -> tuple[Recording, ...]:
+    """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in
+    SI units; `-` is a table of text on the standard input, which may be a pipe.
 
-    mapping       what the files do not state: a ColumnMapping, `ColumnMapping(resting_length="300 mm")`, or a TOML file
-    downsampling  reduction of very long files, which a note reports
-    progress      called with the name of a file and the fraction that has been read
+    mapping       what the files do not state: a ColumnMapping, `ColumnMapping(resting_length="300
+    mm")`, or a TOML file downsampling  reduction of very long files, which a note reports progress
+    called with the name of a file and the fraction that has been read
 
-    The extension gives the format: text (CSV), LVM, Excel, OpenDocument, MAT, TDMS, MDF, Parquet or HDF5. A load in kg
-    becomes a force with standard gravity. Files whose units contradict each other are rejected.
+    The extension gives the format: text (CSV), LVM, Excel, OpenDocument, MAT, TDMS, MDF, Parquet or
+    HDF5. A load in kg becomes a force with standard gravity. Files whose units contradict each
+    other are rejected.
 
-    Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value and remedy.
+    Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value
+    and remedy.
     """
     mapping = _as_mapping(mapping)
-    recordings = [each for path in find_files(source) for each in read_file(path, mapping, downsampling, progress)]
+    recordings = [
+        each
+        for path in find_files(source)
+        for each in read_file(path, mapping, downsampling, progress)
+    ]
     return tuple(complete_bench(recordings, mapping))
 
 
 def read_csv(path: str | Path, mapping: str | Path | ColumnMapping = ColumnMapping()) -> Recording:
     """Read one text file, of any extension, as one Recording in SI units; `mapping` as in `read`.
 
-    Each column heading states the unit (`pressure [kPa]`, `p / bara`, `length_mm`), or a row of units follows the
-    headings. Delimiter (comma, semicolon, tab), decimal comma, encoding and comment lines (#, %) are detected. Absolute
-    pressures become gauge pressures with the ambient pressure, by default 101.325 kPa. A comment such as
-    `# resting_length [mm] = 300` states a constant.
+    Each column heading states the unit (`pressure [kPa]`, `p / bara`, `length_mm`), or a row of
+    units follows the headings. Delimiter (comma, semicolon, tab), decimal comma, encoding and
+    comment lines (#, %) are detected. Absolute pressures become gauge pressures with the ambient
+    pressure, by default 101.325 kPa. A comment such as `# resting_length [mm] = 300` states a
+    constant.
 
-    Raises FileError, ColumnError, UnitError or ParameterError; the message names file, line, value and remedy.
+    Raises FileError, ColumnError, UnitError or ParameterError; the message names file, line, value
+    and remedy.
     """
     mapping = _as_mapping(mapping)
     table = apply_mapping(read_csv_table(path, mapping.text_format), mapping)
@@ -82,49 +99,73 @@ def read_csv(path: str | Path, mapping: str | Path | ColumnMapping = ColumnMappi
 def _as_mapping(mapping: str | Path | ColumnMapping) -> ColumnMapping:
     if not isinstance(mapping, str | Path | ColumnMapping):
         raise ParameterError(
-            f"mapping is {abridged(mapping)}; it must be a ColumnMapping or the path of a mapping file (TOML), such as "
-            'mapping=ColumnMapping(resting_length="300 mm").'
+            f"mapping is {abridged(mapping)}; it must be a ColumnMapping or the path of a mapping"
+            ' file (TOML), such as mapping=ColumnMapping(resting_length="300 mm").'
         )
     return mapping if isinstance(mapping, ColumnMapping) else read_mapping(mapping)
 
 
 def read_file(
-    path: Path, mapping: ColumnMapping, downsampling: Downsampling = Decimation(), progress: Progress | None = None
+    path: Path,
+    mapping: ColumnMapping,
+    downsampling: Downsampling = Decimation(),
+    progress: Progress | None = None,
 ) -> list[Recording]:
-    """The recordings in one file, as `read`; what concerns all files of a test rig is done by `complete_bench`."""
+    """The recordings in one file, as `read`; what concerns all files of a test rig is done by
+    `complete_bench`.
+    """
     return [
         interpret(part, mapping, mapping.constants_of(path))
-        for table in read_tables(path, mapping, downsampling, progress)  # figures cannot contain every name of a file
-        for part in split_specimens(apply_mapping(dataclasses.replace(table, origin=printable(table.origin)), mapping))
+        for table in read_tables(
+            path, mapping, downsampling, progress
+        )  # figures cannot contain every name of a file
+        for part in split_specimens(
+            apply_mapping(dataclasses.replace(table, origin=printable(table.origin)), mapping)
+        )
     ]
 
 
 def complete_bench(recordings: Sequence[Recording], mapping: ColumnMapping) -> list[Recording]:
-    """The recordings of one bench, without outliers if the mapping says so, checked as by `check_bench`."""
+    """The recordings of one bench, without outliers if the mapping says so, checked as by
+    `check_bench`.
+    """
     complete = list(without_outliers(recordings) if mapping.drop_outliers else recordings)
     check_bench(complete)
     return complete
 
 
 def check_bench(recordings: list[Recording]) -> None:
-    """Check the recordings of one bench together: units (UnitError), and suspicious values (AirmuscleWarning)."""
+    """Check the recordings of one bench together: units (UnitError), and suspicious values
+    (AirmuscleWarning).
+    """
     check_unit_consistency(recordings)
     warn_of_suspicious_values(recordings)
 
 
 def find_files(source: Source) -> list[Path]:
-    """The files of a path, a glob pattern, a folder or several of these, each sorted by name. Raises FileError."""
+    """The files of a path, a glob pattern, a folder or several of these, each sorted by name.
+    Raises FileError.
+    """
     if not isinstance(source, str | Path):
         if not isinstance(source, Iterable):
             raise FileError(
-                f"read: {abridged(source)} is not a path. Pass a file, a folder, a glob pattern, or a list of them."
+                f"read: {abridged(source)} is not a path. Pass a file, a folder, a glob pattern, or"
+                " a list of them."
             )
         return [path for each in source for path in find_files(each)]
-    path, files = Path(source), [Path(source)]
+    path = Path(source)
+    files = [Path(source)]
     missing = ""
     if path.is_dir():
-        files = sorted(p for p in path.iterdir() if p.suffix.lower() in EXTENSIONS and not p.name.startswith("."))
-        missing = f"the folder contains no supported file; supported extensions are {', '.join(EXTENSIONS)}."
+        files = sorted(
+            p
+            for p in path.iterdir()
+            if p.suffix.lower() in EXTENSIONS and not p.name.startswith(".")
+        )
+        missing = (
+            "the folder contains no supported file; supported extensions are"
+            f" {', '.join(EXTENSIONS)}."
+        )
     elif glob.has_magic(str(path)) and not path.exists():
         files = sorted(map(Path, glob.glob(str(path), recursive=True)))
         missing = "no file matches the pattern. Check the pattern and the folder."
@@ -138,11 +179,19 @@ def read_tables(
 ) -> Tables:
     """The uninterpreted tables of one file. Raises FileError or ColumnError."""
     if path == STANDARD_INPUT:
-        return (read_text_stream(sys.stdin.buffer, "standard input", mapping.text_format, downsampling),)
+        return (
+            read_text_stream(sys.stdin.buffer, "standard input", mapping.text_format, downsampling),
+        )
     suffix = path.suffix.lower()
     if suffix in _BINARY_READERS:
-        return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping, downsampling))
+        return tuple(
+            downsample(table, downsampling)
+            for table in _BINARY_READERS[suffix](path, mapping, downsampling)
+        )
     check_text_file(path)
     if is_large_file(path) and not is_lvm(path):
         return (read_large_csv(path, mapping.text_format, downsampling, progress),)
-    return tuple(downsample(each, downsampling) for each in read_lvm_tables(path, mapping.group, mapping.text_format))
+    return tuple(
+        downsample(each, downsampling)
+        for each in read_lvm_tables(path, mapping.group, mapping.text_format)
+    )

@@ -1,4 +1,6 @@
-"""Optional packages that read laboratory formats (extra `lab`), and a separate process for readers in native code."""
+"""Optional packages that read laboratory formats (extra `lab`), and a separate process for readers
+in native code.
+"""
 
 import contextlib
 import functools
@@ -35,13 +37,16 @@ def import_lab_package(name: str, path: Path) -> Any:
 def _missing_package(name: str, path: Path) -> FileError:
     extra = "ros" if name.startswith("rosbags") else "lab"
     return FileError(
-        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip install airmuscle[{extra}]"
+        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip"
+        f" install airmuscle[{extra}]"
     )
 
 
 @contextlib.contextmanager
 def reading(path: Path, format_name: str) -> Iterator[None]:
-    """Raise FileError, which names the file, in place of any exception of a package in this context."""
+    """Raise FileError, which names the file, in place of any exception of a package in this
+    context.
+    """
     check_regular_file(path)
     try:
         yield
@@ -50,8 +55,8 @@ def reading(path: Path, format_name: str) -> Iterator[None]:
     except Exception as reason:  # each package raises its own exceptions for a damaged file
         detail = " ".join(str(reason).split())[:120] or type(reason).__name__
         raise FileError(
-            f"{path.name}: cannot be read as {format_name} ({detail}); it is damaged or of another format. "
-            "Check that the file is complete and that its extension matches its format."
+            f"{path.name}: cannot be read as {format_name} ({detail}); it is damaged or of another"
+            " format. Check that the file is complete and that its extension matches its format."
         ) from None
 
 
@@ -60,9 +65,13 @@ try:
 except ImportError:  # Windows, where the time is limited alone
     resource = None  # type: ignore[assignment]
 
-TIME_LIMIT, CPU_LIMIT = 60.0, 15.0
-"""Limits of time and processor time [s] of a file, and of every further 100 MB (chosen: 20 MB take less than 1 s)."""
-MEMORY_LIMIT, MEMORY_FACTOR = 6e9, 20.0
+TIME_LIMIT = 60.0
+CPU_LIMIT = 15.0
+"""Limits of time and processor time [s] of a file, and of every further 100 MB (chosen: 20 MB take
+less than 1 s).
+"""
+MEMORY_LIMIT = 6e9
+MEMORY_FACTOR = 20.0
 """Limit of the memory [bytes], with this multiple of the size of the file (chosen)."""
 _worker = Worker(quiet=True)
 stop = _worker.stop
@@ -70,9 +79,13 @@ stop = _worker.stop
 _lock = threading.Lock()
 
 
-def in_separate_process(package: str) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
-    """A decorator of a reader in native code, which the separate process evaluates, from a regular file. It raises
-    FileError if the package that the reader needs is not installed, or if the file is not regular."""
+def in_separate_process(
+    package: str,
+) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
+    """A decorator of a reader in native code, which the separate process evaluates, from a regular
+    file. It raises FileError if the package that the reader needs is not installed, or if the file
+    is not regular.
+    """
 
     def decorated(read: Callable[Given, Result]) -> Callable[Given, Result]:
         @functools.wraps(read)
@@ -92,27 +105,33 @@ def in_separate_process(package: str) -> Callable[[Callable[Given, Result]], Cal
 
 
 def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:
-    """Return `function(path, *arguments)` of a module, evaluated in the separate process. An exception of the function
-    is raised here. Raises FileError if the process ends or exceeds the time limit."""
+    """Return `function(path, *arguments)` of a module, evaluated in the separate process. An
+    exception of the function is raised here. Raises FileError if the process ends or exceeds the
+    time limit."""
     path = Path(path).absolute()
     limit, seconds = (each * (1.0 + path.stat().st_size / 1e8) for each in (TIME_LIMIT, CPU_LIMIT))
     try:
         with _lock:
             return _worker.call(call_function, (seconds, module, function, path, *arguments), limit)
     except WorkerError as error:
-        cause = f"its reading takes more than {limit:.0f} s" if error.late else "its reader ended without a result"
+        cause = (
+            f"its reading takes more than {limit:.0f} s"
+            if error.late
+            else "its reader ended without a result"
+        )
     except AirmuscleError:
         raise
     except Exception as error:  # in what a package returned of a damaged file
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:120]
     raise FileError(
-        f"{path.name}: the file is damaged or too large ({cause}). Copy it again from its source, or export it as text."
+        f"{path.name}: the file is damaged or too large ({cause}). Copy it again from its source,"
+        " or export it as text."
     )
 
 
 def call_function(seconds: float, module: str, function: str, path: Path, *arguments: Any) -> Any:
-    """The result of a function of a module, which is imported only in the separate process, within its limits.
-    `seconds` of the processor limit the time."""
+    """The result of a function of a module, which is imported only in the separate process, within
+    its limits. `seconds` of the processor limit the time."""
     if resource is not None:
         size = path.stat().st_size
         _limit(resource.RLIMIT_CPU, time.process_time() + seconds)
@@ -123,4 +142,7 @@ def call_function(seconds: float, module: str, function: str, path: Path, *argum
 
 def _limit(kind: int, value: float) -> None:
     hard = resource.getrlimit(kind)[1]
-    resource.setrlimit(kind, (int(value) + 1 if hard == resource.RLIM_INFINITY else min(int(value) + 1, hard), hard))
+    resource.setrlimit(
+        kind,
+        (int(value) + 1 if hard == resource.RLIM_INFINITY else min(int(value) + 1, hard), hard),
+    )

@@ -15,16 +15,19 @@ from .channels import Cells, RawTable
 NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
 
-_SIGNS = {"delimiter": (("\t", ";", ",", "|", " "), "a comma, semicolon, tab, blank or '|'"),
-          "decimal": ((".", ","), "'.' or ','")}  # fmt: skip
+_SIGNS = {
+    "delimiter": (("\t", ";", ",", "|", " "), "a comma, semicolon, tab, blank or '|'"),
+    "decimal": ((".", ","), "'.' or ','"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
 class TextFormat:
     """Format of a text table: `delimiter` and `decimal`; None means automatic detection.
 
-    With `headerless`, the columns of a table without headings are named by their numbers, "1", "2" and so on. The
-    headings are in the line that contains most of `named`, or in the first one below `skip_rows` lines if it is given.
+    With `headerless`, the columns of a table without headings are named by their numbers, "1", "2"
+    and so on. The headings are in the line that contains most of `named`, or in the first one below
+    `skip_rows` lines if it is given.
     """
 
     delimiter: str | None = None
@@ -38,18 +41,27 @@ class TextFormat:
             given = getattr(self, name)
             if given is not None and given not in signs:
                 raise ParameterError(
-                    f"{name} is {abridged(given)}; it must be {text}. Omit it for automatic detection."
+                    f"{name} is {abridged(given)}; it must be {text}. Omit it for automatic"
+                    " detection."
                 )
         if self.delimiter == self.decimal == ",":
-            raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")
+            raise ParameterError(
+                "delimiter and decimal are both ','; they must differ. Export the table with ';'."
+            )
 
     def detect_delimiter(self, line: str) -> str:
-        """The given delimiter, otherwise the one detected in a line of the table; blanks only between numbers."""
+        """The given delimiter, otherwise the one detected in a line of the table; blanks only
+        between numbers.
+        """
         sign = next((d for d in "\t;" if d in line), "|" if "|" in line and "," not in line else "")
         if self.delimiter or sign:
             return self.delimiter or sign
         cells = line.split()
-        return " " if len(cells) > 1 and all(header.is_number(c) and not c.endswith(",") for c in cells) else ","
+        return (
+            " "
+            if len(cells) > 1 and all(header.is_number(c) and not c.endswith(",") for c in cells)
+            else ","
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,24 +73,36 @@ class TextHeader:
     constants: Mapping[str, float | str]
     delimiter: str
     header_lines: int
-    """Number of lines, without comments, above the numbers: headings, unit row, and lines above the headings."""
+    """Number of lines, without comments, above the numbers: headings, unit row, and lines above the
+    headings.
+    """
 
     def table(
-        self, origin: str, columns: tuple[Cells, ...], rows: Sequence[int], notes: tuple[str, ...] = ()
+        self,
+        origin: str,
+        columns: tuple[Cells, ...],
+        rows: Sequence[int],
+        notes: tuple[str, ...] = (),
     ) -> RawTable:
         """The table of these columns, whose rows are the lines of these numbers."""
         lines = np.array(rows, dtype=np.int64)
-        return RawTable(origin, self.headings, self.units, columns, lines, constants=self.constants, notes=notes)
+        return RawTable(
+            origin, self.headings, self.units, columns, lines, constants=self.constants, notes=notes
+        )
 
 
 def detect_encoding(content: bytes) -> str:
-    """The encoding of a file from its beginning: that of a byte order mark, UTF-8 if valid, otherwise Latin-1."""
+    """The encoding of a file from its beginning: that of a byte order mark, UTF-8 if valid,
+    otherwise Latin-1.
+    """
     if content[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
         return "utf-32"
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     try:
-        codecs.getincrementaldecoder("utf-8")().decode(content)  # a truncated last character is not an error
+        codecs.getincrementaldecoder("utf-8")().decode(
+            content
+        )  # a truncated last character is not an error
     except UnicodeDecodeError:
         return "latin-1"
     return "utf-8-sig"
@@ -95,10 +119,15 @@ def has_content(line: str) -> bool:
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """The cells of a line; a blank before a unit in brackets, `time [s] force [N]`, does not separate cells."""
+    """The cells of a line; a blank before a unit in brackets, `time [s] force [N]`, does not
+    separate cells.
+    """
     if delimiter == " " and '"' not in line:
         return re.split(r"(?<=[\])])\s+|\s+(?![\[(])", line.strip())
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+    return [
+        cell.strip()
+        for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
+    ]
 
 
 def check_cell_sizes(origin: str, lines: NumberedLines) -> None:
@@ -106,19 +135,27 @@ def check_cell_sizes(origin: str, lines: NumberedLines) -> None:
     limit = csv.field_size_limit()
     for i, line in lines:
         if len(line) > limit and max(map(len, re.split("[\t;,| ]", line))) > limit:
-            raise FileError(f"{origin}, line {i}: a cell has more than {limit} characters. It is no table of numbers.")
+            raise FileError(
+                f"{origin}, line {i}: a cell has more than {limit} characters. It is no table of"
+                " numbers."
+            )
 
 
 def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> TextHeader:
-    """Parse the header of a table from its first non-empty lines. Raises FileError or ColumnError."""
+    """Parse the header of a table from its first non-empty lines. Raises FileError or
+    ColumnError.
+    """
     check_cell_sizes(origin, lines)
     comments = [(i, line) for i, line in lines if is_comment(line)]
     body = [(i, line) for i, line in lines if not is_comment(line)]
     if not body:
         raise FileError(
-            f"{origin}: the file contains no table. A table consists of a row of headings and rows of numbers."
+            f"{origin}: the file contains no table. A table consists of a row of headings and rows"
+            " of numbers."
         )
-    for _, line in body if text_format.delimiter is None else ():  # blanks, if they separate the first numbers
+    for _, line in (
+        body if text_format.delimiter is None else ()
+    ):  # blanks, if they separate the first numbers
         delimiter = text_format.detect_delimiter(line)
         if delimiter == " ":
             text_format = dataclasses.replace(text_format, delimiter=delimiter)
@@ -126,22 +163,29 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
             break
     above = _lines_above_headings(body, text_format)
     if text_format.skip_rows is not None and body[-1][0] <= text_format.skip_rows:
-        raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows.")
-    preamble, body = body[:above], body[above:]
+        raise FileError(
+            f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows."
+        )
+    preamble = body[:above]
+    body = body[above:]
     delimiter = text_format.detect_delimiter(body[0][1])
     first = body[0][0]
     commented = [line.lstrip("#% \t") for i, line in comments if i < first]
     rows = [split_cells(line, delimiter) for _, line in body[:3]]
     last = split_cells(commented[-1], delimiter) if commented else ()
-    headings, units, count = header.parse_headings(origin, f"line {first}", rows, text_format.headerless, last)
+    headings, units, count = header.parse_headings(
+        origin, f"line {first}", rows, text_format.headerless, last
+    )
     constants = [header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
     constants += [header.parse_constant_comment(line) for _, line in comments]
-    return TextHeader(tuple(headings), units, dict(filter(None, constants)), delimiter, above + count)
+    return TextHeader(
+        tuple(headings), units, dict(filter(None, constants)), delimiter, above + count
+    )
 
 
 def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
-    """The number of lines above the headings, which are where the user states them, else the line of as many cells
-    above the first numbers or unit row."""
+    """The number of lines above the headings, which are where the user states them, else the line
+    of as many cells above the first numbers or unit row."""
     cells_of = ((i, split_cells(line, text_format.detect_delimiter(line))) for i, line in body)
     stated = header.stated_heading_row(cells_of, text_format.named, text_format.skip_rows)
     if stated is not None:
@@ -152,7 +196,9 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
         cells = split_cells(line, delimiter)
         if _is_numeric(cells):
             before = rows[-1][1] if rows else []
-            if not rows or (_is_numeric(before) and header.is_number(cells[0]) and header.is_number(before[0])):
+            if not rows or (
+                _is_numeric(before) and header.is_number(cells[0]) and header.is_number(before[0])
+            ):
                 return 0  # no heading is found above the first rows of numbers
             above = _heading_above(rows, delimiter, header.count_cells(cells))
             if above is not None:
@@ -162,17 +208,23 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
 
 
 def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int) -> int | None:
-    """The index of the headings of a first row of numbers with `width` filled cells; None if they are not above it."""
+    """The index of the headings of a first row of numbers with `width` filled cells; None if they
+    are not above it.
+    """
     last = [row for row in rows[-2:] if row[0] == delimiter]
     if not last or rows[-1][0] != delimiter or _is_numeric(last[-1][1]):
         return None
     if len(last) == 2 and header.parse_unit_row(last[0][1], last[1][1]):
-        return len(rows) - 2 if max(header.count_cells(cells) for _, cells in last) >= width else None
+        return (
+            len(rows) - 2 if max(header.count_cells(cells) for _, cells in last) >= width else None
+        )
     return len(rows) - 1 if header.count_cells(last[-1][1]) >= width else None
 
 
 def _is_numeric(cells: list[str]) -> bool:
-    """Whether a row has two cells or more, and more than half of them are numbers, clock times or dates."""
+    """Whether a row has two cells or more, and more than half of them are numbers, clock times or
+    dates.
+    """
     filled = [cell for cell in cells if cell]
     numbers = sum(header.is_number(cell) or not any(map(str.isalpha, cell)) for cell in filled)
     return len(filled) > 1 and 2 * numbers > len(filled)

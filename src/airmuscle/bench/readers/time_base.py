@@ -1,6 +1,8 @@
-"""Time base of a recording: recorded time stamps, also clock times as text, uniform sampling, or no time; downsampling.
+"""Time base of a recording: recorded time stamps, also clock times as text, uniform sampling, or no
+time; downsampling.
 
-Loggers round time stamps: at 530 rows per second, stamps of 1 ms repeat. The rows themselves are then uniform in time.
+Loggers round time stamps: at 530 rows per second, stamps of 1 ms repeat. The rows themselves are
+then uniform in time.
 """
 
 import abc
@@ -23,8 +25,8 @@ _TIME_OF_DAY = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d(?:\.\d+)?)")
 
 
 def seconds_from_clock(cells: Sequence[str]) -> Array | None:
-    """Time since the first cell [s], shape (N,); None if any cell is not a clock time. For times without a date, a
-    decrease by more than half a day is taken as the passing of midnight."""
+    """Time since the first cell [s], shape (N,); None if any cell is not a clock time. For times
+    without a date, a decrease by more than half a day is taken as the passing of midnight."""
     texts = [cell.strip().replace(",", ".") for cell in cells]
     times = [_parse_time(text) for text in texts]
     if not times or any(time is None for time in times):
@@ -36,8 +38,10 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
 
 
 def _parse_time(cell: str) -> float | None:
-    """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not a clock time.
-    Microseconds are exact as floating-point numbers. A time that states its offset from UTC is converted to UTC."""
+    """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not
+    a clock time. Microseconds are exact as floating-point numbers. A time that states its offset
+    from UTC is converted to UTC.
+    """
     clock = _TIME_OF_DAY.fullmatch(cell)
     if clock:
         return 3600e6 * float(clock[1]) + 60e6 * float(clock[2]) + 1e6 * float(clock[3])
@@ -52,7 +56,9 @@ def _parse_time(cell: str) -> float | None:
 
 
 MAX_DEVIATION = 5.0
-"""Maximum deviation of a recorded time stamp from uniform sampling, in sample times, beside its rounding (chosen)."""
+"""Maximum deviation of a recorded time stamp from uniform sampling, in sample times, beside its
+rounding (chosen).
+"""
 
 
 class TimeBase(abc.ABC):
@@ -63,7 +69,9 @@ class TimeBase(abc.ABC):
 
     @abc.abstractmethod
     def apply(self, table: RawTable, time: Array) -> tuple[Array | None, str]:
-        """The time [s], shape (N,), or None, and a note, from the recorded time (N,). Raises ColumnError."""
+        """The time [s], shape (N,), or None, and a note, from the recorded time (N,). Raises
+        ColumnError.
+        """
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,19 +91,23 @@ class RecordedTime(TimeBase):
 class UniformTime(TimeBase):
     """Uniform sampling between the first and the last time stamp, by the number of rows.
 
-    For stamps that the logger rounded. Stamps that decrease, or that deviate from uniform sampling by more than their
-    rounding and five sample times, are refused: the file contains several runs, or gaps.
+    For stamps that the logger rounded. Stamps that decrease, or that deviate from uniform sampling
+    by more than their rounding and five sample times, are refused: the file contains several runs,
+    or gaps.
     """
 
     def apply(self, table: RawTable, time: Array) -> tuple[Array | None, str]:
         steps = np.diff(time)
         if time.size < 2 or not time[-1] > time[0]:
-            raise ColumnError(f"{table.origin}: uniform sampling requires two rows or more, and time that increases.")
+            raise ColumnError(
+                f"{table.origin}: uniform sampling requires two rows or more, and time that"
+                " increases."
+            )
         if (steps < 0).any():
             row = int(np.argmax(steps < 0)) + 1
             raise ColumnError(
-                f"{table.location(row)}: time decreases, so the rows are not sampled uniformly. Write two runs "
-                "to two files.",
+                f"{table.location(row)}: time decreases, so the rows are not sampled uniformly."
+                " Write two runs to two files.",
                 hint=WITHOUT_TIME,
             )
         uniform = np.linspace(time[0], time[-1], time.size)
@@ -103,13 +115,18 @@ class UniformTime(TimeBase):
         allowed = float(steps[steps > 0].min()) + MAX_DEVIATION * sample_time
         deviation = np.abs(time - uniform)
         if deviation.max() > allowed:
-            place = f"{table.location(int(np.argmax(deviation)))}: time deviates from uniform sampling"
+            place = (
+                f"{table.location(int(np.argmax(deviation)))}: time deviates from uniform sampling"
+            )
             limit = f"allowed range: 0 to {allowed:.4g} s. The file has gaps."
             message = f"{place} by {deviation.max():.4g} s; {limit}"
             raise ColumnError(HintedText(message, AS_RECORDED, WITHOUT_TIME))
-        return uniform, (
-            f"Time is uniform by the number of rows, {1 / sample_time:.4g} rows per second; the recorded stamps "
-            f"deviate by at most {deviation.max():.2g} s."
+        return (
+            uniform,
+            (
+                f"Time is uniform by the number of rows, {1 / sample_time:.4g} rows per second; the"
+                f" recorded stamps deviate by at most {deviation.max():.2g} s."
+            ),
         )
 
 
@@ -122,11 +139,16 @@ class NoTime(TimeBase):
 
 
 UNIFORM = Hint("For stamps that the logger rounded", "time", UniformTime(), "ColumnMapping")
-AS_RECORDED = Hint("To keep the stamps as they are", "time", RecordedTime(ordered=False), "ColumnMapping")
+AS_RECORDED = Hint(
+    "To keep the stamps as they are", "time", RecordedTime(ordered=False), "ColumnMapping"
+)
 WITHOUT_TIME = Hint("To read without time", "time", NoTime(), "ColumnMapping")
 TIME_BASES: dict[str, TimeBase] = {
-    "recorded": RecordedTime(), "uniform": UniformTime(), "unordered": RecordedTime(ordered=False), "none": NoTime(),
-}  # fmt: skip
+    "recorded": RecordedTime(),
+    "uniform": UniformTime(),
+    "unordered": RecordedTime(ordered=False),
+    "none": NoTime(),
+}
 """Time bases by their names in mapping files and on the command line."""
 
 
@@ -154,11 +176,15 @@ class Downsampling(abc.ABC):
     def note(self, rows: int, step: int) -> str:
         """The note for the user on the reduction of `rows` rows."""
         kept = math.ceil(rows / step)
-        return RowNote(f"The file has {rows} rows; {self.rule.format(step)}, {kept} in total (max_rows).")
+        return RowNote(
+            f"The file has {rows} rows; {self.rule.format(step)}, {kept} in total (max_rows)."
+        )
 
 
 class Decimation(Downsampling):
-    """Every n-th row as measured: resolution and saturation of the sensors are preserved, noise is not averaged."""
+    """Every n-th row as measured: resolution and saturation of the sensors are preserved, noise is
+    not averaged.
+    """
 
     rule = "one in {} is kept as measured"
 
@@ -167,7 +193,8 @@ class Decimation(Downsampling):
 
 
 class BlockMeans(Downsampling):
-    """Means over blocks of n rows: noise is averaged, outliers are smeared, saturation and resolution are lost.
+    """Means over blocks of n rows: noise is averaged, outliers are smeared, saturation and
+    resolution are lost.
 
     A text, such as a clock time, is that of the middle row of its block.
     """
@@ -198,7 +225,9 @@ PIECE_ROWS = 500_000
 
 @dataclasses.dataclass(frozen=True)
 class Reduction:
-    """The reduction of a table while it is read: `rows` rows of the file, of which `step` are reduced to one."""
+    """The reduction of a table while it is read: `rows` rows of the file, of which `step` are
+    reduced to one.
+    """
 
     downsampling: Downsampling
     rows: int = 0
@@ -214,30 +243,39 @@ class Reduction:
         return self.downsampling.note(self.rows, self.step) if self.step > 1 else ""
 
     def read(self, get: Callable[[int, int], Any], rows: int) -> Any:
-        """The reduced rows of a column, or of the first axis of a matrix. `get(first, end)` returns the rows from
-        `first` up to `end`; at most `PIECE_ROWS` are requested at once."""
+        """The reduced rows of a column, or of the first axis of a matrix. `get(first, end)` returns
+        the rows from `first` up to `end`; at most `PIECE_ROWS` are requested at once."""
         if self.step == 1:
             return get(0, rows)
         size = max(PIECE_ROWS // self.step, 1) * self.step
         parts = []
         for first in range(0, rows, size):
             piece = np.asarray(get(first, min(first + size, rows)))
-            columns = [self.downsampling.reduce(column, self.step) for column in np.atleast_2d(piece.T)]
+            columns = [
+                self.downsampling.reduce(column, self.step) for column in np.atleast_2d(piece.T)
+            ]
             parts.append(np.array(columns[0]) if piece.ndim == 1 else np.column_stack(columns))
         return np.concatenate(parts)
 
     def noted(self, table: RawTable) -> RawTable:
-        """The table of reduced columns with its row numbers in the file and a note on the reduction."""
+        """The table of reduced columns with its row numbers in the file and a note on the
+        reduction.
+        """
         if self.step == 1:
             return table
-        return dataclasses.replace(table, rows=1 + self.step * np.arange(len(table.rows))).noted(self.note)
+        return dataclasses.replace(table, rows=1 + self.step * np.arange(len(table.rows))).noted(
+            self.note
+        )
 
 
 def check_reduced_lengths(origin: str, full: Iterable[int], reduced: Iterable[int]) -> None:
-    """Raise ColumnError where columns of different lengths have the same length after the reduction."""
+    """Raise ColumnError where columns of different lengths have the same length after the
+    reduction.
+    """
     sizes = sorted(set(full))
     if len(sizes) != len(set(reduced)):
         raise ColumnError(
-            f"{origin}: the columns have different lengths ({', '.join(map(str, sizes))} rows), which the reduction "
-            "of the rows would hide. Store the columns of one length in a group of their own."
+            f"{origin}: the columns have different lengths ({', '.join(map(str, sizes))} rows),"
+            " which the reduction of the rows would hide. Store the columns of one length in a"
+            " group of their own."
         )

@@ -1,4 +1,6 @@
-"""Segmentation of recordings: runs, branches, plateaus, transients, outliers and sensor properties."""
+"""Segmentation of recordings: runs, branches, plateaus, transients, outliers and sensor
+properties.
+"""
 
 from ...core.stubs import attach_stub
 

@@ -1,10 +1,11 @@
 """Branches: motion of the driven quantity in one direction, such as inflation and deflation.
 
-The driven quantity of an isobaric run is the contraction, length or position; that of all other runs is the pressure. A
-branch ends where this quantity has moved back from an extreme by more than a fraction `reversal` of its range; smaller
-ripples do not end it. A branch ends with its run, too, because the muscle was moved or loaded anew before the next run.
-A dwell at an extreme belongs to the branch before it, because friction depends on the previous motion: the reversal is
-placed at the last row before the quantity leaves the level of the dwell. A branch column in the file is not used;
+The driven quantity of an isobaric run is the contraction, length or position; that of all other
+runs is the pressure. A branch ends where this quantity has moved back from an extreme by more than
+a fraction `reversal` of its range; smaller ripples do not end it. A branch ends with its run, too,
+because the muscle was moved or loaded anew before the next run. A dwell at an extreme belongs to
+the branch before it, because friction depends on the previous motion: the reversal is placed at the
+last row before the quantity leaves the level of the dwell. A branch column in the file is not used;
 `branch_column_agreement` compares it with the result.
 """
 
@@ -20,8 +21,11 @@ from .interval import Interval, remembered, running_median
 from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
 from .sensor import Sensor, count_rows, estimate_noise
 
-REVERSAL_FRACTION, EXIT_FRACTION = 0.05, 0.25
-"""Fraction of the range that the pressure moves back in a reversal, and fraction of that by which it leaves a dwell."""
+REVERSAL_FRACTION = 0.05
+EXIT_FRACTION = 0.25
+"""Fraction of the range that the pressure moves back in a reversal, and fraction of that by which
+it leaves a dwell.
+"""
 SPIKE_DURATION = 0.15
 """Overshoots of a valve pulse shorter than this [s] are not reversals (chosen)."""
 
@@ -41,7 +45,9 @@ class Branch:
 
     @property
     def name(self) -> str:
-        """`inflating` or `deflating` where the pressure is driven, otherwise `contracting` or `extending`."""
+        """`inflating` or `deflating` where the pressure is driven, otherwise `contracting` or
+        `extending`.
+        """
         return branch_name(self.column, self.direction)
 
 
@@ -53,23 +59,34 @@ def branch_name(column: str, direction: int) -> str:
 
 @remembered
 def find_branches(
-    recording: Recording, sensor: Sensor | None = None, *, reversal: float = REVERSAL_FRACTION,
+    recording: Recording,
+    sensor: Sensor | None = None,
+    *,
+    reversal: float = REVERSAL_FRACTION,
     runs: tuple[Run, ...] | None = None,
-) -> tuple[Branch, ...]:  # fmt: skip
-    """The branches of a recording in order; empty if there is no pressure or if the driven quantity is constant.
+) -> tuple[Branch, ...]:
+    """The branches of a recording in order; empty if there is no pressure or if the driven quantity
+    is constant.
 
-    A reversal exceeds the fraction `reversal` of the range of the driven quantity and ten standard deviations of its
-    sensor; `sensor` is that of the pressure, `runs` are those of `find_runs`. Without time, rows are taken in order.
+    A reversal exceeds the fraction `reversal` of the range of the driven quantity and ten standard
+    deviations of its sensor; `sensor` is that of the pressure, `runs` are those of `find_runs`.
+    Without time, rows are taken in order.
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()
-    runs, time = find_runs(recording) if runs is None else runs, recording.columns.get("time")
+    runs = find_runs(recording) if runs is None else runs
+    time = recording.columns.get("time")
     moved = moved_column(recording)
     isobaric = [run.interval for run in runs if run.kind == ISOBARIC and moved in run.swept_columns]
-    column, parts = "pressure", _split_at_runs(recording, runs)
+    column = "pressure"
+    parts = _split_at_runs(recording, runs)
     if moved and 2 * sum(map(len, isobaric)) > len(recording):
-        column, parts = moved, isobaric
-    smooth = [_remove_spikes(recording[column][p.rows], None if time is None else time[p.rows]) for p in parts]
+        column = moved
+        parts = isobaric
+    smooth = [
+        _remove_spikes(recording[column][p.rows], None if time is None else time[p.rows])
+        for p in parts
+    ]
     if column == "pressure":
         if sensor is None and any(run.kind == AT_REST for run in runs):
             sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
@@ -77,19 +94,26 @@ def find_branches(
         thresholds = [max(reversal * float(np.ptp(np.concatenate(smooth))), deviation)] * len(parts)
     else:
         noise = [0.0 if time is None else estimate_noise(values) for values in smooth]
-        thresholds = [max(reversal * float(np.ptp(v)), 10.0 * std) for v, std in zip(smooth, noise, strict=True)]
+        thresholds = [
+            max(reversal * float(np.ptp(v)), 10.0 * std)
+            for v, std in zip(smooth, noise, strict=True)
+        ]
     branches = []
     for part, values, threshold in zip(parts, smooth, thresholds, strict=True):
         pressure = values if column == "pressure" else recording["pressure"][part.rows]
         for each, direction in _monotonic_intervals(values, threshold):
             ends = float(pressure[each.start]), float(pressure[each.stop - 1])
             interval = Interval(part.start + each.start, part.start + each.stop)
-            branches.append(Branch(interval, -direction if column == "length" else direction, *ends, column))
+            branches.append(
+                Branch(interval, -direction if column == "length" else direction, *ends, column)
+            )
     return tuple(branches)
 
 
 def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval]:
-    """Runs at other lengths or loads and the rows between them; the whole recording if most rows are in no such run."""
+    """Runs at other lengths or loads and the rows between them; the whole recording if most rows
+    are in no such run.
+    """
     separate = [run.interval for run in runs if run.kind in (ISOMETRIC, ISOTONIC)]
     if 2 * sum(len(interval) for interval in separate) <= len(recording):
         separate = []
@@ -97,9 +121,11 @@ def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval
     return [Interval(a, b) for a, b in itertools.pairwise(sorted({0, *inner, len(recording)}))]
 
 
-def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:
-    """The direction of motion (N,) of any signal (N,): 1 rising, -1 falling, 0 everywhere if the signal is constant.
-    Reversals are detected as for the branches of the pressure."""
+def motion_direction(
+    values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION
+) -> Array:
+    """The direction of motion (N,) of any signal (N,): 1 rising, -1 falling, 0 everywhere if the
+    signal is constant. Reversals are detected as for the branches of the pressure."""
     smooth = _remove_spikes(values, time)
     signs = np.zeros(len(values))
     threshold = reversal * float(np.ptp(smooth)) if len(smooth) else 0.0
@@ -109,11 +135,17 @@ def motion_direction(values: Array, time: Array | None = None, *, reversal: floa
 
 
 def _remove_spikes(values: Array, time: Array | None) -> Array:
-    return values if time is None else running_median(values, 2 * count_rows(SPIKE_DURATION / 2.0, time, 1) + 1)
+    return (
+        values
+        if time is None
+        else running_median(values, 2 * count_rows(SPIKE_DURATION / 2.0, time, 1) + 1)
+    )
 
 
 def _monotonic_intervals(smooth: Array, threshold: float) -> list[tuple[Interval, int]]:
-    """The intervals between reversals, each with its direction; empty if the range does not exceed `threshold`."""
+    """The intervals between reversals, each with its direction; empty if the range does not exceed
+    `threshold`.
+    """
     if not len(smooth) or not float(np.ptp(smooth)) > threshold:
         return []
     reversals = list(_find_reversals(smooth, threshold))
@@ -123,27 +155,36 @@ def _monotonic_intervals(smooth: Array, threshold: float) -> list[tuple[Interval
 
 
 def _find_reversals(pressure: Array, threshold: float) -> Iterator[tuple[int, int]]:
-    """First row and direction of each branch; the first direction is known once the pressure has moved."""
-    direction, extreme = 0, 0
+    """First row and direction of each branch; the first direction is known once the pressure has
+    moved.
+    """
+    direction = 0
+    extreme = 0
     low = high = 0
     values = pressure.tolist()
     for i, value in enumerate(values):
         if direction == 0:
-            low, high = (i if value < values[low] else low), (i if value > values[high] else high)
+            low = i if value < values[low] else low
+            high = i if value > values[high] else high
             if values[high] - values[low] >= threshold:
                 direction, extreme = (1, high) if high > low else (-1, low)
                 yield 0, direction
         elif direction * (value - values[extreme]) >= 0.0:
             extreme = i
         elif direction * (values[extreme] - value) >= threshold:
-            level, band = values[extreme], EXIT_FRACTION * threshold  # of a dwell at the extreme
+            # of a dwell at the extreme
+            level = values[extreme]
+            band = EXIT_FRACTION * threshold
             dwell = (j for j in range(extreme, i) if direction * (level - values[j]) < band)
             yield max(dwell, default=extreme) + 1, -direction
-            direction, extreme = -direction, i
+            direction = -direction
+            extreme = i
 
 
 def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Array:
-    """The direction (N,) of each row: 1 inflating or contracting, -1 deflating or extending, 0 outside."""
+    """The direction (N,) of each row: 1 inflating or contracting, -1 deflating or extending, 0
+    outside.
+    """
     signs = np.zeros(len(recording))
     for branch in branches:
         signs[branch.interval.rows] = branch.direction
@@ -151,8 +192,12 @@ def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Arr
 
 
 def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) -> float | None:
-    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it. None
-    also for branches of a motion at constant pressure."""
+    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating);
+    None without it. None also for branches of a motion at constant pressure."""
     if "branch" not in recording or any(branch.column != "pressure" for branch in branches):
         return None
-    return float(np.mean(np.where(recording["branch"] == 1, 1.0, -1.0) == branch_directions(recording, branches)))
+    return float(
+        np.mean(
+            np.where(recording["branch"] == 1, 1.0, -1.0) == branch_directions(recording, branches)
+        )
+    )

@@ -1,4 +1,6 @@
-"""Result of the inspection of recordings, with its chapter: columns, runs, branches, plateaus and findings."""
+"""Result of the inspection of recordings, with its chapter: columns, runs, branches, plateaus and
+findings.
+"""
 
 import dataclasses
 import re
@@ -7,7 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from ...core import BLUE, GREEN, ORANGE, PURPLE, RED, Array, HintedText, legend_below, new_figure, quantity_text
+from ...core import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    RED,
+    Array,
+    HintedText,
+    legend_below,
+    new_figure,
+    quantity_text,
+)
 from ...recording import Recording
 from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
@@ -20,7 +33,9 @@ from .plateaus import Plateau
 from .runs import Run
 from .sensor import Sampling, Sensor
 
-MAX_FILES, MAX_RUNS, MAX_LISTED = 12, 8, 4
+MAX_FILES = 12
+MAX_RUNS = 8
+MAX_LISTED = 4
 """Rows of the brief view: files, runs of a file, and branches or outliers (chosen)."""
 _PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
 _COLOURS = {1: BLUE, -1: RED}
@@ -36,7 +51,9 @@ class Finding:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Inspection(Reported):
-    """Result of the inspection of a recording: sampling, sensors, segments, suspected outliers and findings."""
+    """Result of the inspection of a recording: sampling, sensors, segments, suspected outliers and
+    findings.
+    """
 
     recording: Recording
     sampling: Sampling | None
@@ -48,19 +65,27 @@ class Inspection(Reported):
     quasi_static: float
     """Fraction of the rows that is quasi-static."""
     branch_agreement: float | None
-    """Fraction of the rows in which the branch column of the file agrees; None without such a column."""
+    """Fraction of the rows in which the branch column of the file agrees; None without such a
+    column.
+    """
     findings: tuple[Finding, ...]
     static_points: StaticPoints | None = None
     """The levels of a force map without time; None for any other recording."""
 
     def plot(self) -> Any:
-        """Pressure, force and length over time with branches, plateaus, outliers and limits; a Matplotlib figure."""
+        """Pressure, force and length over time with branches, plateaus, outliers and limits; a
+        Matplotlib figure.
+        """
         recording = self.recording
         names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
         if "contraction" in names and "length" in names:
             names.remove("length")
-        abscissa: Array = recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
-        figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
+        abscissa: Array = (
+            recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
+        )
+        figure, axes = new_figure(
+            len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False
+        )
         for axis, name in zip(axes[:, 0], names, strict=True):
             factor, unit = display_scale(name)
             self._draw(axis, name, abscissa, factor)
@@ -72,19 +97,27 @@ class Inspection(Reported):
         return figure
 
     def _draw(self, axis: Any, name: str, abscissa: Array, factor: float) -> None:
-        """One column: readings coloured by branch, plateaus as bars, outliers as crosses, limits of the sensor."""
-        values, dots = self.recording[name] * factor, {"linestyle": "none", "marker": ".", "markersize": 2.5}
+        """One column: readings coloured by branch, plateaus as bars, outliers as crosses, limits of
+        the sensor.
+        """
+        values = self.recording[name] * factor
+        dots = {"linestyle": "none", "marker": ".", "markersize": 2.5}
         if not self.branches:
             axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
         for branch in self.branches:
-            rows, labels = branch.interval.rows, axis.get_legend_handles_labels()[1]
+            rows = branch.interval.rows
+            labels = axis.get_legend_handles_labels()[1]
             label = None if branch.name in labels else branch.name
-            axis.plot(abscissa[rows], values[rows], color=_COLOURS[branch.direction], label=label, **dots)
+            axis.plot(
+                abscissa[rows], values[rows], color=_COLOURS[branch.direction], label=label, **dots
+            )
         for i, plateau in enumerate(self.plateaus):
             ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
             level = [plateau.values.get(name, np.nan) * factor] * 2
             axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
-        if self.outliers:  # also in axes without outliers, because the legend is that of the first axis
+        if (
+            self.outliers
+        ):  # also in axes without outliers, because the legend is that of the first axis
             found = [outlier.row for outlier in self.outliers if outlier.column == name]
             style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
             axis.plot(abscissa[found], values[found], label="suspected outlier", **style)
@@ -92,34 +125,67 @@ class Inspection(Reported):
         for limit in (sensor.lower_limit * factor, sensor.upper_limit * factor) if sensor else ():
             if np.isfinite(limit):
                 axis.axhline(limit, color=ORANGE, linestyle="--", linewidth=1.0)
-                axis.annotate("sensor limit", (0.995, limit), xycoords=("axes fraction", "data"), ha="right",
-                              va="bottom", fontsize=7, color=ORANGE)  # fmt: skip
+                axis.annotate(
+                    "sensor limit",
+                    (0.995, limit),
+                    xycoords=("axes fraction", "data"),
+                    ha="right",
+                    va="bottom",
+                    fontsize=7,
+                    color=ORANGE,
+                )
 
     def chapter(self) -> Chapter:
         """The description of the recording."""
-        recording, sampling = self.recording, self.sampling
-        tables = [_column_table(self), _run_table(self.runs), _branch_table(self),
-                  _plateau_table(self), _outlier_table(self)]  # fmt: skip
+        recording = self.recording
+        sampling = self.sampling
+        tables = [
+            _column_table(self),
+            _run_table(self.runs),
+            _branch_table(self),
+            _plateau_table(self),
+            _outlier_table(self),
+        ]
         summary = "The time stands still." if sampling else "The rows have no time."
         if sampling and sampling.sample_time:
             gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
-            regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
-            summary = f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}."
+            regularity = (
+                "time stamps repeat"
+                if sampling.rounded
+                else f"jitter {100 * sampling.jitter:.1f} %"
+            )
+            summary = (
+                f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s,"
+                f" {regularity}{gaps}."
+            )
         return Chapter(
-            "inspection", f"{recording.origin}: {len(recording)} rows", summary, values=tuple(_values(self)),
+            "inspection",
+            f"{recording.origin}: {len(recording)} rows",
+            summary,
+            values=tuple(_values(self)),
             tables=tuple(table for table in tables if table is not None),
-            plots=(Plot("recording", f"{recording.origin}: branches, plateaus, outliers and limits.", self.plot),),
+            plots=(
+                Plot(
+                    "recording",
+                    f"{recording.origin}: branches, plateaus, outliers and limits.",
+                    self.plot,
+                ),
+            ),
             problems=tuple(each.text for each in self.findings if each.serious),
             notes=(*recording.notes, *(each.text for each in self.findings if not each.serious)),
-        )  # fmt: skip
+        )
 
 
 def inspection_chapters(inspections: Sequence[Inspection]) -> list[Chapter]:
-    """Return the chapter of each recording; of several, the overview stands first, and the brief view has it alone."""
+    """Return the chapter of each recording; of several, the overview stands first, and the brief
+    view has it alone.
+    """
     if len(inspections) == 1:
         return [inspections[0].chapter()]
-    parts = [dataclasses.replace(each.chapter().among(suffix=f"-{i}"), brief=False)
-             for i, each in enumerate(inspections, 1)]  # fmt: skip
+    parts = [
+        dataclasses.replace(each.chapter().among(suffix=f"-{i}"), brief=False)
+        for i, each in enumerate(inspections, 1)
+    ]
     return [_overview(inspections), *parts]
 
 
@@ -133,14 +199,20 @@ def _values(inspection: Inspection) -> Iterator[NamedValue]:
         yield NamedValue("rows per second", sampling.rate, "1/s", brief=False)
         yield NamedValue("duration", sampling.duration, "s", brief=False)
         yield NamedValue("jitter", sampling.jitter, "1", "%", 3, brief=False)
-        yield NamedValue("rows before a gap", tuple(gap.row + 1 for gap in sampling.gaps) or None, brief=False)
-        yield NamedValue("rows with the time of the row before", len(sampling.repeated_rows), brief=False)
+        yield NamedValue(
+            "rows before a gap", tuple(gap.row + 1 for gap in sampling.gaps) or None, brief=False
+        )
+        yield NamedValue(
+            "rows with the time of the row before", len(sampling.repeated_rows), brief=False
+        )
         yield NamedValue("rows with an earlier time", len(sampling.backward_rows), brief=False)
         rows = sum(len(plateau.interval) for plateau in inspection.plateaus)
         yield NamedValue("plateaus", len(inspection.plateaus), remark=f"with {rows} rows")
         yield NamedValue("quasi-static rows", inspection.quasi_static, "1", "%", 2)
     if inspection.branch_agreement is not None:
-        yield NamedValue("agreement with the branch column", inspection.branch_agreement, "1", "%", 3)
+        yield NamedValue(
+            "agreement with the branch column", inspection.branch_agreement, "1", "%", 3
+        )
     remark = "not removed" if inspection.outliers else ""
     yield NamedValue("suspected outliers", len(inspection.outliers), remark=remark)
 
@@ -149,33 +221,55 @@ def _units(name: str, value: Any) -> tuple[str, str]:
     """The SI unit and the displayed unit of a constant; empty for one that is no known quantity."""
     name = CONSTANT_QUANTITIES.get(name, name)
     quantity = quantity_of(name)
-    return (quantity.unit, display_scale(name)[1]) if quantity and isinstance(value, float) else ("", "")
+    return (
+        (quantity.unit, display_scale(name)[1])
+        if quantity and isinstance(value, float)
+        else ("", "")
+    )
 
 
 def _rows(parts: Sequence[Any]) -> dict[str, list[int]]:
     """The columns of a table with the first and the last row of each part, counted from 1."""
-    first, last = [each.interval.start + 1 for each in parts], [each.interval.stop for each in parts]
+    first = [each.interval.start + 1 for each in parts]
+    last = [each.interval.stop for each in parts]
     return {"first row": first, "last row": last}
 
 
 def _column_table(inspection: Inspection) -> Table:
-    recording, names = inspection.recording, list(inspection.recording)
-    values, sensors = [recording[name] for name in names], [inspection.sensors.get(name) for name in names]
-    limits = {end: [limit if s and np.isfinite(limit := getattr(s, f"{end}_limit")) else None for s in sensors]
-              for end in ("lower", "upper")}  # fmt: skip
+    recording = inspection.recording
+    names = list(inspection.recording)
+    values = [recording[name] for name in names]
+    sensors = [inspection.sensors.get(name) for name in names]
+    limits = {
+        end: [
+            limit if s and np.isfinite(limit := getattr(s, f"{end}_limit")) else None
+            for s in sensors
+        ]
+        for end in ("lower", "upper")
+    }
     columns: dict[str, Any] = {
         "column": names,
-        "unit in file": [unit if (unit := recording.units.get(name, "")) != "1" else "" for name in names],
+        "unit in file": [
+            unit if (unit := recording.units.get(name, "")) != "1" else "" for name in names
+        ],
         "min": TableColumn([float(each.min()) if each.size else None for each in values], BY_ROW),
         "max": TableColumn([float(each.max()) if each.size else None for each in values], BY_ROW),
         "unit": unit_column(names),
-        "resolution": TableColumn([(s and s.resolution) or None for s in sensors], BY_ROW, digits=3),
+        "resolution": TableColumn(
+            [(s and s.resolution) or None for s in sensors], BY_ROW, digits=3
+        ),
         "noise": TableColumn([(s and s.noise) or None for s in sensors], BY_ROW, digits=2),
-        "deviation": TableColumn([(s and s.std) or None for s in sensors], BY_ROW, digits=2, brief=False),
-        **{f"{end} limit": TableColumn(values, BY_ROW, brief=any(v is not None for v in values))
-           for end, values in limits.items()},
-    }  # fmt: skip
-    return Table("columns", "Columns", columns, "Limits: where the sensor saturates.", brief=len(names))
+        "deviation": TableColumn(
+            [(s and s.std) or None for s in sensors], BY_ROW, digits=2, brief=False
+        ),
+        **{
+            f"{end} limit": TableColumn(values, BY_ROW, brief=any(v is not None for v in values))
+            for end, values in limits.items()
+        },
+    }
+    return Table(
+        "columns", "Columns", columns, "Limits: where the sensor saturates.", brief=len(names)
+    )
 
 
 def _run_table(runs: Sequence[Run]) -> Table:
@@ -197,7 +291,9 @@ def _branch_table(inspection: Inspection) -> Table | None:
         "branch": [each.name for each in branches],
         "column": TableColumn([each.column for each in branches], brief=False),
         **_rows(branches),
-        "pressure": TableColumn([(each.start_pressure, each.end_pressure) for each in branches], "Pa", "kPa"),
+        "pressure": TableColumn(
+            [(each.start_pressure, each.end_pressure) for each in branches], "Pa", "kPa"
+        ),
     }
     title = "Branches" if inspection.sampling else "Branches, if the rows are in order of time"
     return Table("branches", title, columns, brief=MAX_LISTED) if branches else None
@@ -209,7 +305,8 @@ def _plateau_table(inspection: Inspection) -> Table | None:
         return None
     columns: dict[str, Any] = {**_rows(plateaus)}
     for name in plateaus[0].values:
-        unit, shown = unit_column([name]).values[0], display_scale(name)[1].removesuffix("-")
+        unit = unit_column([name]).values[0]
+        shown = display_scale(name)[1].removesuffix("-")
         columns[name] = TableColumn([each.values.get(name) for each in plateaus], unit, shown)
         errors = [each.standard_errors.get(name) for each in plateaus]
         columns[f"standard error of {name}"] = TableColumn(errors, unit, shown, digits=2)
@@ -230,7 +327,9 @@ def _outlier_table(inspection: Inspection) -> Table | None:
 
 
 def _overview(inspections: Sequence[Inspection]) -> Chapter:
-    """Return the chapter of several files: one row each, and each note once with the files that it concerns."""
+    """Return the chapter of several files: one row each, and each note once with the files that it
+    concerns.
+    """
     constants: dict[str, dict[str, None]] = {}
     for each in inspections:
         for name, value in each.recording.constants.items():
@@ -257,10 +356,17 @@ def _overview(inspections: Sequence[Inspection]) -> Chapter:
         summary=f"Columns: {'; '.join(list(dict.fromkeys(names))[:MAX_LISTED])}.",
         values=tuple(values),
         tables=(Table("files", "Recordings", columns, brief=MAX_FILES),),
-        problems=_common([[f.text for f in each.findings if f.serious] for each in inspections], inspections),
-        notes=_common([[*each.recording.notes, *(f.text for f in each.findings if not f.serious)]
-                       for each in inspections], inspections),
-    )  # fmt: skip
+        problems=_common(
+            [[f.text for f in each.findings if f.serious] for each in inspections], inspections
+        ),
+        notes=_common(
+            [
+                [*each.recording.notes, *(f.text for f in each.findings if not f.serious)]
+                for each in inspections
+            ],
+            inspections,
+        ),
+    )
 
 
 def _describe_runs(runs: Sequence[Run]) -> str | None:
@@ -273,19 +379,30 @@ def _describe_runs(runs: Sequence[Run]) -> str | None:
     if first.constant_column is None or first.constant_value is None:
         return f"{first.kind.name}{more}"
     factor, unit = display_scale(first.constant_column)
-    return f"{first.kind.name} at {first.constant_column} {first.constant_value * factor:.4g} {unit}{more}"
+    return (
+        f"{first.kind.name} at {first.constant_column} {first.constant_value * factor:.4g}"
+        f" {unit}{more}"
+    )
 
 
 def _common(texts: Sequence[Sequence[str]], inspections: Sequence[Inspection]) -> tuple[str, ...]:
-    """Each text once, with the files that it concerns; texts that differ in numbers alone are one."""
+    """Each text once, with the files that it concerns; texts that differ in numbers alone are
+    one.
+    """
     found: dict[str, list[tuple[str, str]]] = {}
     for each, own in zip(inspections, texts, strict=True):
         for text in dict.fromkeys(own):
-            found.setdefault(re.sub(r"\d[\d.]*", "#", text), []).append((text, each.recording.origin))
+            found.setdefault(re.sub(r"\d[\d.]*", "#", text), []).append(
+                (text, each.recording.origin)
+            )
     lines = []
     for (text, origin), *others in found.values():
         same = len({other for other, _ in others} | {text}) == 1
         rest = f" and {len(others)} more" if others else ""
         which = f"{origin}{rest}" if same else f"{origin}; others with other numbers: {len(others)}"
-        lines.append(text if same and len(others) + 1 == len(inspections) else HintedText(text, f" ({which})"))
+        lines.append(
+            text
+            if same and len(others) + 1 == len(inspections)
+            else HintedText(text, f" ({which})")
+        )
     return tuple(lines)

@@ -1,4 +1,5 @@
-"""Levels of a quantity: intervals of consecutive rows within a band, and static points, whose order has no meaning.
+"""Levels of a quantity: intervals of consecutive rows within a band, and static points, whose order
+has no meaning.
 
 The results of an analysis are remembered with their recordings.
 """
@@ -21,7 +22,8 @@ _Known = dict[tuple[int | str, ...], tuple[tuple[weakref.ref[Recording], ...], A
 
 
 def remembered(analyse: Analysis) -> Analysis:
-    """The function of a recording, or of several, whose result is remembered as long as the first of them.
+    """The function of a recording, or of several, whose result is remembered as long as the first
+    of them.
 
     Calls with further arguments that are no texts are not remembered.
     """
@@ -37,7 +39,9 @@ def remembered(analyse: Analysis) -> Analysis:
             return analyse(*arguments)
         known, key = results.setdefault(several[0], {}), (*map(id, several), *texts)
         stored = known.get(key)
-        if stored is None or any(ref() is not each for ref, each in zip(stored[0], several, strict=True)):
+        if stored is None or any(
+            ref() is not each for ref, each in zip(stored[0], several, strict=True)
+        ):
             stored = known[key] = tuple(map(weakref.ref, several)), analyse(recordings, *texts)
         return stored[1]
 
@@ -67,7 +71,9 @@ class Interval:
 
 
 def spread(values: Array) -> float:
-    """The width of the band that contains 98 % of the values, so that a single outlier does not count."""
+    """The width of the band that contains 98 % of the values, so that a single outlier does not
+    count.
+    """
     low, high = np.quantile(values, [0.01, 0.99])
     return float(high - low)
 
@@ -78,11 +84,16 @@ def true_intervals(mask: Mask) -> list[Interval]:
     return [Interval(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def level_intervals(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
-    """Consecutive intervals, each as long as possible, whose values fit into a band of width `band`."""
+def level_intervals(
+    values: Array, band: float, *, within: Interval | None = None
+) -> Iterator[Interval]:
+    """Consecutive intervals, each as long as possible, whose values fit into a band of width
+    `band`.
+    """
     start, end = (within.start, within.stop) if within else (0, len(values))
     while start < end:
-        size, is_outside = 64, np.zeros(0, dtype=bool)
+        size = 64
+        is_outside = np.zeros(0, dtype=bool)
         while not is_outside.any() and is_outside.size < end - start:  # in windows of doubling size
             window = values[start : min(start + size, end)]
             is_outside = np.maximum.accumulate(window) - np.minimum.accumulate(window) > band
@@ -93,7 +104,9 @@ def level_intervals(values: Array, band: float, *, within: Interval | None = Non
 
 
 def running_median(values: Array, width: int) -> Array:
-    """The centred moving median over `width` rows (an odd number); windows are shorter at both ends."""
+    """The centred moving median over `width` rows (an odd number); windows are shorter at both
+    ends.
+    """
     if width < 3 or len(values) < 3:
         return values
     padded = np.pad(np.asarray(values, dtype=float), width // 2, constant_values=np.nan)
@@ -109,16 +122,23 @@ def running_median(values: Array, width: int) -> Array:
 
 
 LEVEL_WIDTHS = (0.02, 0.01, 0.005, 0.002)
-"""Maximum widths of a level, as fractions of the range of the quantity, the first that separates levels (chosen)."""
-MIN_LEVELS, MIN_ROWS = 3, 3
-"""Minimum number of levels of pressure, and of the length, and minimum mean number of rows of a level (chosen)."""
+"""Maximum widths of a level, as fractions of the range of the quantity, the first that separates
+levels (chosen).
+"""
+MIN_LEVELS = 3
+MIN_ROWS = 3
+"""Minimum number of levels of pressure, and of the length, and minimum mean number of rows of a
+level (chosen).
+"""
 MIN_COVERAGE = 0.5
 """Minimum share of the combinations of two levels that have a row (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class StaticPoints:
-    """The number of the pressure level and of the length level of each row, from 0, shape (N,) each."""
+    """The number of the pressure level and of the length level of each row, from 0, shape (N,)
+    each.
+    """
 
     pressure_level: npt.NDArray[np.int64]
     length_level: npt.NDArray[np.int64]
@@ -128,30 +148,46 @@ class StaticPoints:
     @property
     def description(self) -> str:
         """The points and their levels as a phrase."""
-        pressures, lengths = int(self.pressure_level.max()) + 1, int(self.length_level.max()) + 1
-        return f"{self.pressure_level.size} static points at {pressures} pressures and {lengths} {self.moved}s"
+        pressures = int(self.pressure_level.max()) + 1
+        lengths = int(self.length_level.max()) + 1
+        return (
+            f"{self.pressure_level.size} static points at {pressures} pressures and {lengths}"
+            f" {self.moved}s"
+        )
 
 
 @remembered
 def find_static_points(recording: Recording) -> StaticPoints | None:
-    """The levels of a recording without time whose rows are static points; None for any other recording.
+    """The levels of a recording without time whose rows are static points; None for any other
+    recording.
 
-    Each row has one of several pressures and one of several lengths, and most combinations of them occur. The order of
-    such rows has no meaning, so that they show neither noise nor saturation nor branches.
+    Each row has one of several pressures and one of several lengths, and most combinations of them
+    occur. The order of such rows has no meaning, so that they show neither noise nor saturation nor
+    branches.
     """
     moved = next((name for name in MOVED if name in recording.columns), None)
-    if "time" in recording or moved is None or "pressure" not in recording.columns or not len(recording):
+    if (
+        "time" in recording
+        or moved is None
+        or "pressure" not in recording.columns
+        or not len(recording)
+    ):
         return None
-    pressure, length = _levels(recording["pressure"]), _levels(recording[moved])
+    pressure = _levels(recording["pressure"])
+    length = _levels(recording[moved])
     if pressure is None or length is None:
         return None
     occurring = np.unique(np.column_stack([pressure, length]), axis=0).shape[0]
     combinations = (int(pressure.max()) + 1) * (int(length.max()) + 1)
-    return StaticPoints(pressure, length, moved) if occurring >= MIN_COVERAGE * combinations else None
+    return (
+        StaticPoints(pressure, length, moved) if occurring >= MIN_COVERAGE * combinations else None
+    )
 
 
 def _levels(values: Array) -> npt.NDArray[np.int64] | None:
-    """The number of the level of each value (N,); None unless the values are at several separate levels."""
+    """The number of the level of each value (N,); None unless the values are at several separate
+    levels.
+    """
     span = float(np.ptp(values)) if np.isfinite(values).all() else 0.0
     if not span > 0:
         return None

@@ -1,10 +1,12 @@
 """Runs: intervals of a recording in which one quantity is constant while others are swept.
 
-A run with constant pressure is isobaric, with constant length or contraction isometric, with constant force isotonic. A
-quantity is constant if it stays within `RELATIVE_BAND` of its maximum (within `CONTRACTION_BAND` for a contraction), or
-within the noise of its sensor. A run is isotonic only if its motion was measured. A file may contain many consecutive
-runs, as tables of static points do: these are at the levels of the quantity that explains the most rows. A pressure
-that only oscillates within `RIPPLE_BAND` while the muscle is moved, the ripple of its regulator, counts as constant.
+A run with constant pressure is isobaric, with constant length or contraction isometric, with
+constant force isotonic. A quantity is constant if it stays within `RELATIVE_BAND` of its maximum
+(within `CONTRACTION_BAND` for a contraction), or within the noise of its sensor. A run is isotonic
+only if its motion was measured. A file may contain many consecutive runs, as tables of static
+points do: these are at the levels of the quantity that explains the most rows. A pressure that only
+oscillates within `RIPPLE_BAND` while the muscle is moved, the ripple of its regulator, counts as
+constant.
 """
 
 import dataclasses
@@ -16,25 +18,41 @@ import numpy as np
 
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
-from .interval import Interval, StaticPoints, find_static_points, level_intervals, remembered, spread
+from .interval import (
+    Interval,
+    StaticPoints,
+    find_static_points,
+    level_intervals,
+    remembered,
+    spread,
+)
 from .sensor import Sensor, estimate_sensors
 
 RELATIVE_BAND = 0.02
 """Band of a constant quantity, as a fraction of its maximum (chosen)."""
-RIPPLE_BAND, MIN_RIPPLE_REVERSALS = 0.06, 3
-"""Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum, and number of crossings
-of the mean that makes a fluctuation a ripple, not a step between two levels (chosen)."""
+RIPPLE_BAND = 0.06
+MIN_RIPPLE_REVERSALS = 3
+"""Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum, and
+number of crossings of the mean that makes a fluctuation a ripple, not a step between two levels
+(chosen)."""
 MOVED_BANDS = 4.0
 """A muscle is moved if its length changes by more than this number of constant bands (chosen)."""
 CONTRACTION_BAND = 0.005
-"""Band of a constant contraction, and of a constant length as a fraction of its maximum (chosen)."""
-SWEEP_FRACTION, MIN_ROWS = 0.1, 3
-"""Minimum change of a swept quantity, as a fraction of its range in the recording; minimum rows of a run (chosen)."""
+"""Band of a constant contraction, and of a constant length as a fraction of its maximum
+(chosen).
+"""
+SWEEP_FRACTION = 0.1
+MIN_ROWS = 3
+"""Minimum change of a swept quantity, as a fraction of its range in the recording; minimum rows of
+a run (chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class RunKind:
-    """Kind of a run, and the columns that may be constant in it; the first available column is used."""
+    """Kind of a run, and the columns that may be constant in it; the first available column is
+    used.
+    """
 
     name: str
     constant_columns: tuple[str, ...]
@@ -46,12 +64,16 @@ ISOTONIC = RunKind("isotonic", ("force",))
 AT_REST = RunKind("at rest", ())
 FREE = RunKind("free", ())
 KINDS = (ISOBARIC, ISOMETRIC, ISOTONIC)
-"""The kinds of run with one constant quantity; in AT_REST all measured quantities are constant, in FREE none."""
+"""The kinds of run with one constant quantity; in AT_REST all measured quantities are constant, in
+FREE none.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Run:
-    """Rows of one kind of run: `constant_column` stays at `constant_value` [SI] while `swept_columns` change."""
+    """Rows of one kind of run: `constant_column` stays at `constant_value` [SI] while
+    `swept_columns` change.
+    """
 
     interval: Interval
     kind: RunKind
@@ -62,14 +84,19 @@ class Run:
 
 @remembered
 def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
-    """The runs of a recording; one run of kind FREE if no quantity is constant, none for an empty recording."""
+    """The runs of a recording; one run of kind FREE if no quantity is constant, none for an empty
+    recording.
+    """
     if not len(recording):
         return ()
     points = find_static_points(recording)
     if points is not None:
         return _runs_of_points(recording, points)
-    present = {kind: [name for name in kind.constant_columns if name in recording] for kind in KINDS}
-    columns, bands = {kind: names[0] for kind, names in present.items() if names}, dict[str, float]()
+    present = {
+        kind: [name for name in kind.constant_columns if name in recording] for kind in KINDS
+    }
+    columns = {kind: names[0] for kind, names in present.items() if names}
+    bands = dict[str, float]()
     sensors = sensors or estimate_sensors(recording)
     for name in columns.values():
         maximum = 1.0 if name == "contraction" else float(np.max(np.abs(recording[name])))
@@ -78,14 +105,21 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     whole = _classify(recording, Interval(0, len(recording)), columns, bands)
     if whole.kind != FREE:
         return (whole,)
-    # without a measured motion, a constant force does not tell the kind: a slack muscle at a held length has it as well
+    # without a measured motion, a constant force does not tell the kind: a slack muscle at a held
+    # length has it as well
     told = [kind for kind in columns if kind != ISOTONIC or ISOMETRIC in columns]
-    candidates = [runs for kind in told if (runs := _runs_at_levels(recording, kind, columns[kind], bands))]
-    return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
+    candidates = [
+        runs for kind in told if (runs := _runs_at_levels(recording, kind, columns[kind], bands))
+    ]
+    return max(
+        candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,)
+    )
 
 
 def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ...]:
-    """The runs of static points at one pressure or length each, whose rows follow each other; else one of kind FREE."""
+    """The runs of static points at one pressure or length each, whose rows follow each other; else
+    one of kind FREE.
+    """
     for kind, name, levels, swept in (
         (ISOBARIC, "pressure", points.pressure_level, points.moved),
         (ISOMETRIC, points.moved, points.length_level, "pressure"),
@@ -93,12 +127,18 @@ def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ..
         edges = [0, *(np.flatnonzero(np.diff(levels)) + 1).tolist(), levels.size]
         if len(edges) == int(levels.max()) + 2:
             intervals = [Interval(a, b) for a, b in itertools.pairwise(edges)]
-            return tuple(_constant_run(recording, each, kind, name, (swept, "force")) for each in intervals)
+            return tuple(
+                _constant_run(recording, each, kind, name, (swept, "force")) for each in intervals
+            )
     return (Run(Interval(0, levels.size), FREE, None, None, ("pressure", points.moved)),)
 
 
-def _classify(recording: Recording, interval: Interval, names: dict[RunKind, str], bands: dict[str, float]) -> Run:
-    """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
+def _classify(
+    recording: Recording, interval: Interval, names: dict[RunKind, str], bands: dict[str, float]
+) -> Run:
+    """The run in an interval. Of several constant quantities, pressure takes precedence, then
+    length, then force.
+    """
 
     def is_constant(kind: RunKind, name: str) -> bool:
         level = spread(recording[name][interval.rows]) <= bands[name]
@@ -114,64 +154,109 @@ def _classify(recording: Recording, interval: Interval, names: dict[RunKind, str
     return _constant_run(recording, interval, constant[0], names[constant[0]], swept)
 
 
-def _constant_run(recording: Recording, interval: Interval, kind: RunKind, name: str, swept: tuple[str, ...]) -> Run:
+def _constant_run(
+    recording: Recording, interval: Interval, kind: RunKind, name: str, swept: tuple[str, ...]
+) -> Run:
     return Run(interval, kind, name, float(np.median(recording[name][interval.rows])), swept)
 
 
-def _runs_at_levels(recording: Recording, kind: RunKind, name: str, bands: dict[str, float]) -> tuple[Run, ...]:
-    """The runs in which the quantity of one kind stays at a level while another quantity is swept."""
+def _runs_at_levels(
+    recording: Recording, kind: RunKind, name: str, bands: dict[str, float]
+) -> tuple[Run, ...]:
+    """The runs in which the quantity of one kind stays at a level while another quantity is
+    swept.
+    """
     runs = []
     intervals = list(level_intervals(recording[name], bands[name]))
     for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
-        ranges = {other: SWEEP_FRACTION * float(np.ptp(recording[other])) for other in bands if other != name}
-        swept = tuple(n for n, part in ranges.items() if spread(recording[n][interval.rows]) > max(bands[n], part))
+        ranges = {
+            other: SWEEP_FRACTION * float(np.ptp(recording[other]))
+            for other in bands
+            if other != name
+        }
+        swept = tuple(
+            n
+            for n, part in ranges.items()
+            if spread(recording[n][interval.rows]) > max(bands[n], part)
+        )
         if len(interval) >= MIN_ROWS and swept:
             runs.append(_constant_run(recording, interval, kind, name, swept))
     return tuple(runs)
 
 
 def moved_column(recording: Recording) -> str | None:
-    """The measured column of the motion: contraction, length, shortening or position; None without any."""
+    """The measured column of the motion: contraction, length, shortening or position; None without
+    any.
+    """
     return next((name for name in MOVED if name in recording), None)
 
 
 def _has_ripple(recording: Recording, interval: Interval, bands: dict[str, float]) -> bool:
-    """Whether the pressure of an interval only oscillates within the band of a ripple while the muscle is moved."""
-    moved, pressure = moved_column(recording), recording["pressure"][interval.rows]
-    if moved is None or spread(pressure) > RIPPLE_BAND * float(np.max(np.abs(recording["pressure"]))):
+    """Whether the pressure of an interval only oscillates within the band of a ripple while the
+    muscle is moved.
+    """
+    moved = moved_column(recording)
+    pressure = recording["pressure"][interval.rows]
+    if moved is None or spread(pressure) > RIPPLE_BAND * float(
+        np.max(np.abs(recording["pressure"]))
+    ):
         return False
     if not spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]:
         return False
     low, high = np.quantile(pressure, [0.01, 0.99])
     distance = pressure - 0.5 * (low + high)
-    side = np.sign(distance[np.abs(distance) > 0.1 * (high - low)])  # crossings of the middle have a dead band
+    side = np.sign(
+        distance[np.abs(distance) > 0.1 * (high - low)]
+    )  # crossings of the middle have a dead band
     return bool(np.count_nonzero(np.diff(side)) >= MIN_RIPPLE_REVERSALS)
 
 
-def _join_ripple(recording: Recording, intervals: list[Interval], bands: dict[str, float]) -> Iterator[Interval]:
-    """The intervals at pressure levels, those between which the pressure only ripples joined to one."""
-    pressure, i = recording["pressure"], 0
+def _join_ripple(
+    recording: Recording, intervals: list[Interval], bands: dict[str, float]
+) -> Iterator[Interval]:
+    """The intervals at pressure levels, those between which the pressure only ripples joined to
+    one.
+    """
+    pressure = recording["pressure"]
+    i = 0
     band = RIPPLE_BAND * float(np.max(np.abs(pressure)))
-    ranges = [(float(pressure[each.rows].min()), float(pressure[each.rows].max())) for each in intervals]
+    ranges = [
+        (float(pressure[each.rows].min()), float(pressure[each.rows].max())) for each in intervals
+    ]
     steps = np.sign(np.diff(pressure, prepend=pressure[:1]))
-    reversals = np.cumsum(np.concatenate(([0], np.diff(steps) != 0)))  # at least as many as there are crossings
+    reversals = np.cumsum(
+        np.concatenate(([0], np.diff(steps) != 0))
+    )  # at least as many as there are crossings
     ends = _ends_within(ranges, band)
     while i < len(intervals):
-        last, joined = i, Interval(intervals[i].start, intervals[ends[i]].stop)
+        last = i
+        joined = Interval(intervals[i].start, intervals[ends[i]].stop)
         turns = reversals[joined.stop - 1] - reversals[joined.start]
-        if ends[i] > i and turns >= MIN_RIPPLE_REVERSALS - 1 and _has_ripple(recording, joined, bands):
+        if (
+            ends[i] > i
+            and turns >= MIN_RIPPLE_REVERSALS - 1
+            and _has_ripple(recording, joined, bands)
+        ):
             last = ends[i]
         yield Interval(intervals[i].start, intervals[last].stop)
         i = last + 1
 
 
 def _ends_within(ranges: Sequence[tuple[float, float]], band: float) -> list[int]:
-    """For each range (low, high) the last of those after it that lie with it within a band, in linear time."""
-    lowest, highest, ends, stop = deque[int](), deque[int](), list[int](), 0
+    """For each range (low, high) the last of those after it that lie with it within a band, in
+    linear time.
+    """
+    lowest = deque[int]()
+    highest = deque[int]()
+    ends = list[int]()
+    stop = 0
     for i in range(len(ranges)):
         while stop < len(ranges):
             low, high = ranges[stop]
-            if stop > i and max(high, ranges[highest[0]][1]) - min(low, ranges[lowest[0]][0]) > band:
+            if (
+                stop > i
+                and max(high, ranges[highest[0]][1]) - min(low, ranges[lowest[0]][0]) > band
+            ):
                 break
             while lowest and ranges[lowest[-1]][0] >= low:
                 lowest.pop()

@@ -1,4 +1,6 @@
-"""Sensors and sampling of a recording: resolution, noise and limits; sample time, jitter, gaps, repeated times."""
+"""Sensors and sampling of a recording: resolution, noise and limits; sample time, jitter, gaps,
+repeated times.
+"""
 
 import dataclasses
 import math
@@ -25,10 +27,12 @@ class Gap:
 
 @dataclasses.dataclass(frozen=True)
 class Sampling:
-    """Number of rows, duration [s], sample time [s], jitter as a fraction of the median step, and irregularities.
+    """Number of rows, duration [s], sample time [s], jitter as a fraction of the median step, and
+    irregularities.
 
-    The sample time is the median step; where time stamps repeat without decreasing, as rounded ones do, the mean step.
-    Rows are counted from 0; the time of `repeated_rows` equals that of the row before, `backward_rows` have an earlier.
+    The sample time is the median step; where time stamps repeat without decreasing, as rounded ones
+    do, the mean step. Rows are counted from 0; the time of `repeated_rows` equals that of the row
+    before, `backward_rows` have an earlier.
     """
 
     rows: int
@@ -60,13 +64,20 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
     step = float(np.median(forward)) if forward.size else 0.0
     jitter = 1.4826 * float(np.median(np.abs(forward - step))) / step if step else 0.0
     gaps = tuple(Gap(int(i), float(steps[i])) for i in np.flatnonzero(steps > GAP_FACTOR * step))
-    repeated, backward = (tuple((np.flatnonzero(wrong) + 1).tolist()) for wrong in (steps == 0, steps < 0))
-    sample_time, duration = _sample_time(steps), float(time.max() - time.min())
-    return Sampling(len(recording), duration, sample_time, jitter, gaps if step else (), repeated, backward)
+    repeated, backward = (
+        tuple((np.flatnonzero(wrong) + 1).tolist()) for wrong in (steps == 0, steps < 0)
+    )
+    sample_time = _sample_time(steps)
+    duration = float(time.max() - time.min())
+    return Sampling(
+        len(recording), duration, sample_time, jitter, gaps if step else (), repeated, backward
+    )
 
 
 def _sample_time(steps: Array) -> float:
-    """The median step that is not zero, of rounded time stamps the mean step outside gaps; 0 if time stands still."""
+    """The median step that is not zero, of rounded time stamps the mean step outside gaps; 0 if
+    time stands still.
+    """
     if not (steps > 0).any():
         return 0.0
     median = float(np.median(steps[steps > 0]))
@@ -75,7 +86,9 @@ def _sample_time(steps: Array) -> float:
 
 
 def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
-    """The number of rows in a time span, at most all; `min_rows` without time or if the rows are far apart."""
+    """The number of rows in a time span, at most all; `min_rows` without time or if the rows are
+    far apart.
+    """
     if time is None or len(time) < 2:
         return min_rows
     sample_time = _sample_time(np.diff(time))
@@ -83,9 +96,13 @@ def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
 
 
 MIN_DISTINCT_VALUES = 15
-"""Minimum number of distinct readings for a resolution; fewer may be the set points of the test (chosen)."""
+"""Minimum number of distinct readings for a resolution; fewer may be the set points of the test
+(chosen).
+"""
 MAX_RMS_OFFSET = 0.12
-"""Maximum RMS distance of the differences from multiples of the step, in steps (chosen; random differences: 0.29)."""
+"""Maximum RMS distance of the differences from multiples of the step, in steps (chosen; random
+differences: 0.29).
+"""
 SAME_READING = 0.05
 """Readings closer than this fraction of a step are the same reading (chosen)."""
 MIN_NOISE = 0.2
@@ -99,9 +116,11 @@ _IGNORED = ("time", "branch", "fill", "discharge", "latched")
 
 @dataclasses.dataclass(frozen=True)
 class Sensor:
-    """The sensor of a column: resolution (0 if not detectable), noise and saturation limits, in SI units.
+    """The sensor of a column: resolution (0 if not detectable), noise and saturation limits, in SI
+    units.
 
-    `lower_limit` and `upper_limit` are the readings at which the sensor saturates, infinite if it does not.
+    `lower_limit` and `upper_limit` are the readings at which the sensor saturates, infinite if it
+    does not.
     """
 
     name: str
@@ -112,48 +131,70 @@ class Sensor:
 
     @property
     def std(self) -> float:
-        """Standard deviation of one reading from noise and quantisation; its inverse is the weight in a fit."""
+        """Standard deviation of one reading from noise and quantisation; its inverse is the weight
+        in a fit.
+        """
         return math.hypot(self.noise, self.resolution / math.sqrt(12.0))
 
     def censoring(self, values: Array) -> Array:
-        """The censoring (N,) of readings (N,): 0 measured, 1 at the lower limit (true value below), -1 at the upper."""
+        """The censoring (N,) of readings (N,): 0 measured, 1 at the lower limit (true value below),
+        -1 at the upper.
+        """
         tolerance = 0.25 * self.resolution
-        at_lower, at_upper = values <= self.lower_limit + tolerance, values >= self.upper_limit - tolerance
+        at_lower = values <= self.lower_limit + tolerance
+        at_upper = values >= self.upper_limit - tolerance
         return at_lower * 1.0 - at_upper * 1.0
 
 
 @remembered
 def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str, Sensor]:
-    """The sensors of the columns of a recording, or of several recordings from one test rig, by column name.
+    """The sensors of the columns of a recording, or of several recordings from one test rig, by
+    column name.
 
-    Several recordings show the limits more reliably, because a single run may hardly reach them. Resolution and noise
-    are medians over the recordings that have rows. Static points (`find_static_points`) show the resolution only.
+    Several recordings show the limits more reliably, because a single run may hardly reach them.
+    Resolution and noise are medians over the recordings that have rows. Static points
+    (`find_static_points`) show the resolution only.
     """
     given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     several = [recording for recording in given if len(recording)]
-    names = dict.fromkeys(n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED)
+    names = dict.fromkeys(
+        n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED
+    )
     parts = several, [recording for recording in several if find_static_points(recording) is None]
     return {
-        name: _estimate_sensor(name, *([r.columns[name] for r in part if name in r.columns] for part in parts))
+        name: _estimate_sensor(
+            name, *([r.columns[name] for r in part if name in r.columns] for part in parts)
+        )
         for name in filter(quantity_of, names)
     }
 
 
 def _estimate_sensor(name: str, all_runs: list[Array], runs: list[Array]) -> Sensor:
-    """The sensor of a column: its resolution from all runs, the rest from those whose order has a meaning."""
+    """The sensor of a column: its resolution from all runs, the rest from those whose order has a
+    meaning.
+    """
     steps = [step for values in all_runs if (step := estimate_resolution(values))]
     together = steps or len(all_runs) == 1
-    resolution = float(np.median(steps or 0.0)) if together else estimate_resolution(np.concatenate(all_runs))
+    resolution = (
+        float(np.median(steps or 0.0))
+        if together
+        else estimate_resolution(np.concatenate(all_runs))
+    )
     if not runs:
         return Sensor(name, resolution, 0.0)
-    low, high = -_upper_limit([-values for values in runs], resolution), _upper_limit(runs, resolution)
+    low = -_upper_limit([-values for values in runs], resolution)
+    high = _upper_limit(runs, resolution)
     sensor = Sensor(name, resolution, 0.0, low, high)
-    noise = float(np.median([estimate_noise(values[sensor.censoring(values) == 0.0]) for values in runs]))
+    noise = float(
+        np.median([estimate_noise(values[sensor.censoring(values) == 0.0]) for values in runs])
+    )
     return dataclasses.replace(sensor, noise=noise)
 
 
 def estimate_noise(values: Array) -> float:
-    """The robust standard deviation of white noise on a slowly varying signal; 0 for fewer than five rows."""
+    """The robust standard deviation of white noise on a slowly varying signal; 0 for fewer than
+    five rows.
+    """
     if len(values) < 5:
         return 0.0
     second = values[:-2] - 2.0 * values[1:-1] + values[2:]
@@ -162,15 +203,20 @@ def estimate_noise(values: Array) -> float:
 
 
 def estimate_resolution(values: Array) -> float:
-    """The largest step of which the differences of adjacent readings are multiples; 0 if there is none."""
+    """The largest step of which the differences of adjacent readings are multiples; 0 if there is
+    none.
+    """
     distinct = np.unique(values)
     if len(distinct) < MIN_DISTINCT_VALUES:
         return 0.0
     gaps = np.diff(distinct)
-    for candidate in sorted({float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True):
+    for candidate in sorted(
+        {float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True
+    ):
         # One reading may be written in two ways, 71.70 and 71.71; both count as one.
         steps = np.diff(distinct[np.concatenate(([True], gaps > SAME_READING * candidate))])
-        step, differences = candidate, steps[steps < 8.5 * candidate]
+        step = candidate
+        differences = steps[steps < 8.5 * candidate]
         for _ in range(3):  # the least-squares step of differences of a few steps
             counts = np.round(differences / step)
             total = float(counts @ counts)
@@ -183,26 +229,39 @@ def estimate_resolution(values: Array) -> float:
 
 
 def _are_multiples(steps: Array, step: float) -> bool:
-    """Whether nearly all small differences are integer multiples of a step, and enough of them are single steps."""
+    """Whether nearly all small differences are integer multiples of a step, and enough of them are
+    single steps.
+    """
     small = steps[steps < 8.5 * step] / step
-    count, multiples = len(small), np.round(small)
+    count = len(small)
+    multiples = np.round(small)
     offset = small - multiples
     if count < 10 or math.sqrt(float(offset @ offset) / count) >= MAX_RMS_OFFSET:
         return False
-    return bool(np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count)
+    return bool(
+        np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count
+    )
 
 
 def _upper_limit(runs: list[Array], resolution: float) -> float:
-    """The upper limit at which readings stay for many more rows than elsewhere; infinite without saturation."""
+    """The upper limit at which readings stay for many more rows than elsewhere; infinite without
+    saturation.
+    """
     combined = np.concatenate(runs)
-    top, tolerance = float(combined.max()), 0.25 * resolution
+    top = float(combined.max())
+    tolerance = 0.25 * resolution
     at_top = [values >= top - tolerance for values in runs]
     below = combined[combined < top - tolerance]
     rows_at_top = max(_longest_interval(mask) for mask in at_top)
     if not len(below) or rows_at_top < MIN_SATURATED_ROWS:
         return math.inf
-    between = [values[(values < top - tolerance) & (values > combined.min() + tolerance)] for values in runs]
-    rows_elsewhere = 1 + max(_longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between)
+    between = [
+        values[(values < top - tolerance) & (values > combined.min() + tolerance)]
+        for values in runs
+    ]
+    rows_elsewhere = 1 + max(
+        _longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between
+    )
     noise = max(estimate_noise(values) for values in between)
     is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
     return top if is_noisy and rows_at_top > 2 * rows_elsewhere else math.inf

@@ -1,4 +1,6 @@
-"""Moving horizon estimation: the states of a window of samples with the least squared noise, within bounds."""
+"""Moving horizon estimation: the states of a window of samples with the least squared noise, within
+bounds.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -6,7 +8,16 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
+from ...core import (
+    Array,
+    ParameterError,
+    Reference,
+    ShortRepr,
+    SolveError,
+    Status,
+    check_field_types,
+    published,
+)
 from ...core.annotation import within
 from ...core.errors import check_known
 from ...engine.compile.cache.kernel import Kernel
@@ -14,15 +25,19 @@ from ...recording.recording import Recording
 from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
 from . import ExtendedKalmanFilter, StateEstimate
 
-MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
-"""Samples of a window at most; Gauss-Newton steps, and the step in standard deviations that ends them (chosen)."""
+MAX_HORIZON = 200
+STEPS = 20
+SETTLED = 1e-9
+"""Samples of a window at most; Gauss-Newton steps, and the step in standard deviations that ends
+them (chosen).
+"""
 _shortest = Kernel("shortest_vector", "predictive")
 
 
 class EstimationWindow(NamedTuple):
-    """The samples of the window, each its inputs (m,), held before it, and measured columns (p,), NaN where missing; a
-    filter's prediction before the first one, its estimate after the last one, and the noise (z,) of the last solution,
-    from which the next search starts."""
+    """The samples of the window, each its inputs (m,), held before it, and measured columns (p,),
+    NaN where missing; a filter's prediction before the first one, its estimate after the last one,
+    and the noise (z,) of the last solution, from which the next search starts."""
 
     arrival: StateEstimate
     samples: tuple[tuple[Array, Array], ...]
@@ -32,22 +47,25 @@ class EstimationWindow(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class MovingHorizonEstimator(ShortRepr):
-    """Moving horizon estimation (MHE): the states of the last N samples with the least squared noise, within bounds.
+    """Moving horizon estimation (MHE): the states of the last N samples with the least squared
+    noise, within bounds.
 
-        min  |x_0 - x^-|_(P^-1)^2 + sum_k |w_k|_(Q^-1)^2 + sum_k |y_k - o(x_k)|_(R^-1)^2   over x_0, w_0 ... w_(N-1)
+        min  |x_0 - x^-|_(P^-1)^2 + sum_k |w_k|_(Q^-1)^2 + sum_k |y_k - o(x_k)|_(R^-1)^2   over x_0,
+        w_0 ... w_(N-1)
              x_(k+1) = g(x_k, u_k) + w_k,    x_min <= x_k <= x_max
 
-    g step, o outputs of the plant, Q and R noise of the extended Kalman filter `filter`; x^- and P its prediction
-    before the window (arrival cost). Without bounds and for a linear plant it is the Kalman filter; for a nonlinear one
-    the window is linearised anew at its best trajectory. The quadratic program of each Gauss-Newton step is solved by
-    the compiled method of LinearModelPredictive, with limits linearised at the last trajectory.
+    g step, o outputs of the plant, Q and R noise of the extended Kalman filter `filter`; x^- and P
+    its prediction before the window (arrival cost). Without bounds and for a linear plant it is the
+    Kalman filter; for a nonlinear one the window is linearised anew at its best trajectory. The
+    quadratic program of each Gauss-Newton step is solved by the compiled method of
+    LinearModelPredictive, with limits linearised at the last trajectory.
 
     filter     ExtendedKalmanFilter with model, sample time and noise
     horizon    number N of samples of the window
     bounds     minimum and maximum of estimated states by name, such as {"air_mass": (0, 1)}
 
-    Raises ParameterError for an unknown name, a horizon outside 1 to 200, or a minimum that is not below the maximum.
-    Reference: Rao, Rawlings and Mayne (2003).
+    Raises ParameterError for an unknown name, a horizon outside 1 to 200, or a minimum that is not
+    below the maximum. Reference: Rao, Rawlings and Mayne (2003).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("rao-2003"),)
@@ -62,29 +80,40 @@ class MovingHorizonEstimator(ShortRepr):
         for name, (low, high) in self.bounds.items():
             if not low < high:
                 raise ParameterError(
-                    f"MovingHorizonEstimator: the bounds of '{name}' are {low:g} and {high:g}; the minimum must be "
-                    "below the maximum."
+                    f"MovingHorizonEstimator: the bounds of '{name}' are {low:g} and {high:g}; the"
+                    " minimum must be below the maximum."
                 )
 
-    def start(self, first: StateEstimate, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
+    def start(
+        self, first: StateEstimate, values: Sequence[float], inputs: Sequence[float]
+    ) -> EstimationWindow:
         """The window of the first sample, whose estimate before its measurement is `first`."""
         sample = np.array(inputs, dtype=float), np.array(values, dtype=float)
         filtered, _ = self.filter.correct(first, values, inputs)
         return self._solved(EstimationWindow(first, (sample,), filtered, np.zeros(len(first.mean))))
 
-    def update(self, window: EstimationWindow, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
-        """The window one sample later, with measured columns (p,), NaN where one is missing, and inputs held before."""
+    def update(
+        self, window: EstimationWindow, values: Sequence[float], inputs: Sequence[float]
+    ) -> EstimationWindow:
+        """The window one sample later, with measured columns (p,), NaN where one is missing, and
+        inputs held before.
+        """
         sample = np.asarray(inputs, dtype=float), np.asarray(values, dtype=float)
         predicted = self.filter.predict(window.filtered, sample[0].tolist())
         filtered, _ = self.filter.correct(predicted, values, inputs)
-        samples, arrival, noise = (*window.samples, sample), window.arrival, window.noise
+        samples = (*window.samples, sample)
+        arrival = window.arrival
+        noise = window.noise
         if len(samples) > self.horizon:
             (held, measured), (later, _) = samples[:2]
             corrected, _ = self.filter.correct(arrival, measured.tolist(), held.tolist())
-            arrival, samples = self.filter.predict(corrected, later.tolist()), samples[1:]
+            arrival = self.filter.predict(corrected, later.tolist())
+            samples = samples[1:]
             noise = np.zeros(0)
         size = len(arrival.mean) + (len(samples) - 1) * self._noisy.shape[1]
-        return self._solved(EstimationWindow(arrival, samples, filtered, np.append(noise, np.zeros(size))[:size]))
+        return self._solved(
+            EstimationWindow(arrival, samples, filtered, np.append(noise, np.zeros(size))[:size])
+        )
 
     def mean(self, window: EstimationWindow) -> Array:
         """The estimated states (n,) at the last sample of a window."""
@@ -94,7 +123,8 @@ class MovingHorizonEstimator(ShortRepr):
         """The columns (N,) of the filter's `estimate`, from a recording with such rows."""
         rows = self.filter.rows(recording)
         window = self.start(first, rows.measured[0], rows.held[0])
-        means, none = [self.mean(window)], np.full(len(self.filter.measured), np.nan)
+        means = [self.mean(window)]
+        none = np.full(len(self.filter.measured), np.nan)
         for count, values, held in zip(rows.counts, rows.measured[1:], rows.held[1:], strict=True):
             for each in (*[none] * (count - 1), values):
                 window = self.update(window, each, held)
@@ -107,16 +137,21 @@ class MovingHorizonEstimator(ShortRepr):
         deviations = np.sqrt(np.diag(self.filter.noise))
         return np.diag(deviations)[:, deviations > 0]
 
-    def _trajectory(self, window: EstimationWindow, noise: Array) -> tuple[list[Array], list[Array]]:
+    def _trajectory(
+        self, window: EstimationWindow, noise: Array
+    ) -> tuple[list[Array], list[Array]]:
         """The states (n,) of the samples for a noise (z,), and their derivatives by it (n, z).
 
-        The noise is scaled: the deviation of the first state, then those of the steps, in standard deviations.
+        The noise is scaled: the deviation of the first state, then those of the steps, in standard
+        deviations.
         """
-        root, step = square_root(window.arrival.covariance), self._noisy
+        root = square_root(window.arrival.covariance)
+        step = self._noisy
         n, q = step.shape
         slope = np.zeros((n, len(noise)))
         slope[:, :n] = root
-        states, slopes = [window.arrival.mean + root @ noise[:n]], [slope]
+        states = [window.arrival.mean + root @ noise[:n]]
+        slopes = [slope]
         for k, (inputs, _) in enumerate(window.samples[1:]):
             part = slice(n + k * q, n + (k + 1) * q)
             state, matrix = self.filter.transition(states[-1], inputs.tolist())
@@ -127,8 +162,11 @@ class MovingHorizonEstimator(ShortRepr):
         return states, slopes
 
     def _solved(self, window: EstimationWindow) -> EstimationWindow:
-        """The window with the noise of the best trajectory. Raises SolveError where none is within the bounds."""
-        names, noise = self.filter.states, window.noise
+        """The window with the noise of the best trajectory. Raises SolveError where none is within
+        the bounds.
+        """
+        names = self.filter.states
+        noise = window.noise
         places = [names.index(name) for name in self.bounds]
         low, high = (np.array([pair[i] for pair in self.bounds.values()]) for i in (0, 1))
         for _ in range(STEPS):
@@ -137,22 +175,33 @@ class MovingHorizonEstimator(ShortRepr):
             rows = np.vstack([slope[places] for slope in slopes])
             here = np.concatenate([state[places] for state in states]) - rows @ noise
             count = len(states)
-            better = least_squares(jacobian, misfit + jacobian @ noise, rows, np.tile(low, count) - here,
-                                   np.tile(high, count) - here)  # fmt: skip
+            better = least_squares(
+                jacobian,
+                misfit + jacobian @ noise,
+                rows,
+                np.tile(low, count) - here,
+                np.tile(high, count) - here,
+            )
             if better is None:
                 raise SolveError(
-                    "MovingHorizonEstimator: no trajectory of the window is within the bounds. Widen them, or give "
-                    "states more process noise."
+                    "MovingHorizonEstimator: no trajectory of the window is within the bounds."
+                    " Widen them, or give states more process noise."
                 )
-            moved, noise = float(np.abs(better - noise).max()), better
+            moved = float(np.abs(better - noise).max())
+            noise = better
             if moved < SETTLED or (not places and moved < 1e-6):
                 break
         return window._replace(noise=noise)
 
-    def _residuals(self, window: EstimationWindow, states: list[Array], slopes: list[Array]) -> tuple[Array, Array]:
-        """Measured minus predicted columns (r,) in standard deviations, and predictions by the noise (r, z)."""
+    def _residuals(
+        self, window: EstimationWindow, states: list[Array], slopes: list[Array]
+    ) -> tuple[Array, Array]:
+        """Measured minus predicted columns (r,) in standard deviations, and predictions by the
+        noise (r, z).
+        """
         deviations = np.sqrt(self.filter.variances)
-        misfits, rows = [], []
+        misfits = []
+        rows = []
         for (inputs, values), state, slope in zip(window.samples, states, slopes, strict=True):
             predicted, by_state = self.filter.observation(state, inputs.tolist())
             here = ~np.isnan(values)
@@ -168,8 +217,12 @@ def square_root(covariance: Array) -> Array:
     return np.asarray(scale[:, None] * (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T)
 
 
-def least_squares(jacobian: Array, wanted: Array, rows: Array, low: Array, high: Array) -> Array | None:
-    """The z (n,) that minimises |z|^2 + |wanted - jacobian z|^2 with low <= rows z <= high; None without one."""
+def least_squares(
+    jacobian: Array, wanted: Array, rows: Array, low: Array, high: Array
+) -> Array | None:
+    """The z (n,) that minimises |z|^2 + |wanted - jacobian z|^2 with low <= rows z <= high; None
+    without one.
+    """
     size = jacobian.shape[1]
     factor = np.linalg.cholesky(np.eye(size) + jacobian.T @ jacobian)
     free = np.linalg.solve(factor, jacobian.T @ wanted)
@@ -178,13 +231,25 @@ def least_squares(jacobian: Array, wanted: Array, rows: Array, low: Array, high:
     used = length > 1e-12 * length.max(initial=0.0)
     if np.any(np.maximum(low, -high)[~used] > 0.0):
         return None
-    matrix, scale = matrix[used] / length[used, None], 1.0 / length[used]
-    lower, upper = (np.clip(each[used] * scale - matrix @ free, -UNLIMITED, UNLIMITED) for each in (low, high))
+    matrix = matrix[used] / length[used, None]
+    scale = 1.0 / length[used]
+    lower, upper = (
+        np.clip(each[used] * scale - matrix @ free, -UNLIMITED, UNLIMITED) for each in (low, high)
+    )
     w = np.zeros(size)
     if len(matrix):
         spare: list[Any] = [np.zeros(size) for _ in range(3)]
-        status = _shortest(np.ascontiguousarray(matrix), lower, upper, np.array(TOLERANCES), np.zeros(len(matrix)),
-                           np.zeros(size, dtype=np.int64), np.zeros((size, size)), *spare, w)  # fmt: skip
+        status = _shortest(
+            np.ascontiguousarray(matrix),
+            lower,
+            upper,
+            np.array(TOLERANCES),
+            np.zeros(len(matrix)),
+            np.zeros(size, dtype=np.int64),
+            np.zeros((size, size)),
+            *spare,
+            w,
+        )
         if status != Status.DONE:
             return None
     return np.asarray(np.linalg.solve(factor.T, w + free))

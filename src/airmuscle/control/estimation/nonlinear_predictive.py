@@ -1,4 +1,6 @@
-"""Model predictive control with the equations of the plant: of continuous inputs, and of the modes of on/off valves."""
+"""Model predictive control with the equations of the plant: of continuous inputs, and of the modes
+of on/off valves.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -10,7 +12,12 @@ from ...core import Array, Reference, ShortRepr, Status, check_field_types, publ
 from ...core.declaration import forwarded
 from ...core.errors import ParameterError, SolveError, check_known
 from ...engine.compile import Kernel, augmented_rates, compile_system
-from ...engine.loop.controller import Controller, Measurement, MultivariableController, failure_notes
+from ...engine.loop.controller import (
+    Controller,
+    Measurement,
+    MultivariableController,
+    failure_notes,
+)
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .lqg_and_adrc import check_numbers, check_sample_time
 from .predictive_program import MAX_HORIZON, PredictiveProgram, check_limits
@@ -23,7 +30,9 @@ _choose = Kernel("choose_mode", "best_mode_sequence")
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class EstimatingController(ShortRepr, Controller):
-    """A controller that estimates the state of its plant, with programs that one thread uses at a time."""
+    """A controller that estimates the state of its plant, with programs that one thread uses at a
+    time.
+    """
 
     estimator: StateEstimator
     first: StateEstimate = dataclasses.field(repr=False)
@@ -35,8 +44,12 @@ class EstimatingController(ShortRepr, Controller):
         """The fields without programs, which belong to one process."""
         return {**self.__dict__, "_idle": []}
 
-    def estimate(self, before: StateEstimate, measurement: Measurement, inputs: Any, dt: float) -> StateEstimate:
-        """The estimate with a measurement. Raises ParameterError where the loop has another sample time."""
+    def estimate(
+        self, before: StateEstimate, measurement: Measurement, inputs: Any, dt: float
+    ) -> StateEstimate:
+        """The estimate with a measurement. Raises ParameterError where the loop has another sample
+        time.
+        """
         check_sample_time(type(self).__name__, dt, self.estimator.sample_time)
         values = [float(measurement.columns[name]) for name in self.measured_columns]
         return self.estimator.correct(before, values, inputs)[0]
@@ -48,8 +61,10 @@ class EstimatingController(ShortRepr, Controller):
 
 
 class NonlinearMemory(NamedTuple):
-    """Memory of the controller: the predicted estimate, the inputs (m,) of the last sample, planned inputs (N, m) of
-    the last solution, how many samples ago that was, all variables of it, and the number of failures so far."""
+    """Memory of the controller: the predicted estimate, the inputs (m,) of the last sample, planned
+    inputs (N, m) of the last solution, how many samples ago that was, all variables of it, and the
+    number of failures so far.
+    """
 
     estimate: StateEstimate
     applied: Array
@@ -61,35 +76,37 @@ class NonlinearMemory(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class NonlinearModelPredictive(EstimatingController, MultivariableController):
-    """Nonlinear model predictive control: the first input of the best plan under the equations of the plant.
+    """Nonlinear model predictive control: the first input of the best plan under the equations of
+    the plant.
 
         f(x_s, u_s, d) = 0,   min |z(x_s) - r|^2 w + |u_s - u_0|_R^2                       target
-        min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho |s|^2           over u_0 ... u_(N-1), s >= 0
+        min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho |s|^2           over u_0
+        ... u_(N-1), s >= 0
              x_(k+1) = Phi(x_k, u_k, d),   u_min <= u_k <= u_max,   y_min - s <= y(x_k) <= y_max + s
 
-    f rates of the plant with the estimated disturbances d, Phi classical Runge-Kutta steps over a sample with held
-    inputs; Q and R by Bryson's rule, weight 1/d^2 of a permitted deviation; P of the discrete Riccati equation for the
-    plant linearised at the first estimate, so that near it the law is that of `LinearModelPredictive`. State and
-    disturbances are estimated by a Kalman filter with its own model of the plant. Set points are held over the
-    horizon; w is large, so that a set point beyond reach gives the nearest steady state.
+    f rates of the plant with the estimated disturbances d, Phi classical Runge-Kutta steps over a
+    sample with held inputs; Q and R by Bryson's rule, weight 1/d^2 of a permitted deviation; P of
+    the discrete Riccati equation for the plant linearised at the first estimate, so that near it
+    the law is that of `LinearModelPredictive`. State and disturbances are estimated by a Kalman
+    filter with its own model of the plant. Set points are held over the horizon; w is large, so
+    that a set point beyond reach gives the nearest steady state.
 
-    The nonlinear programs are solved by Ipopt in CasADi by multiple shooting, started from the last plan moved by one
-    sample. If there is no solution, the next input of the last plan is applied, after its end the present input;
-    `notes` states how often.
+    The nonlinear programs are solved by Ipopt in CasADi by multiple shooting, started from the last
+    plan moved by one sample. If there is no solution, the next input of the last plan is applied,
+    after its end the present input; `notes` states how often.
 
-    estimator    ExtendedKalmanFilter or UnscentedKalmanFilter without parameters, with the sample time of the loop
-    first        estimate before the first sample, as `estimator.start` gives
-    operating_inputs   values of all inputs of the plant at the first estimate; those not commanded are held there
-    controlled   columns with a set point
-    commanded    inputs that the controller commands
-    permitted    maximum permitted deviation of states and commanded inputs; every commanded input needs one
-    limits       minimum and maximum of columns, such as {"pressure": (0, 5e5)}
-    slack_weight weight of the squared violation relative to the size of its range; infinity makes the limits hard
-    horizon      number N of samples
-    substeps     Runge-Kutta steps of a sample
+    estimator    ExtendedKalmanFilter or UnscentedKalmanFilter without parameters, with the sample
+    time of the loop first        estimate before the first sample, as `estimator.start` gives
+    operating_inputs   values of all inputs of the plant at the first estimate; those not commanded
+    are held there controlled   columns with a set point commanded    inputs that the controller
+    commands permitted    maximum permitted deviation of states and commanded inputs; every
+    commanded input needs one limits       minimum and maximum of columns, such as {"pressure": (0,
+    5e5)} slack_weight weight of the squared violation relative to the size of its range; infinity
+    makes the limits hard horizon      number N of samples substeps     Runge-Kutta steps of a
+    sample
 
-    Raises ParameterError for unknown names, numbers that are not positive, or limits without a range.
-    Reference: Rawlings, Mayne and Diehl (2017), chapters 1, 2 and 8.
+    Raises ParameterError for unknown names, numbers that are not positive, or limits without a
+    range. Reference: Rawlings, Mayne and Diehl (2017), chapters 1, 2 and 8.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017,)
@@ -105,17 +122,29 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        owner, known = "NonlinearModelPredictive", compile_system(self.estimator.plant).description
+        owner = "NonlinearModelPredictive"
+        known = compile_system(self.estimator.plant).description
         columns = self.estimator.plant_columns
         for argument, names, allowed in (
-            ("controlled", self.controlled, columns), ("commanded", self.commanded, known.input_names),
-            ("limits", self.limits, columns), ("operating_inputs", self.operating_inputs, known.input_names),
-        ):  # fmt: skip
+            ("controlled", self.controlled, columns),
+            ("commanded", self.commanded, known.input_names),
+            ("limits", self.limits, columns),
+            ("operating_inputs", self.operating_inputs, known.input_names),
+        ):
             check_known(f"{owner}: {argument} names", names, allowed)
-        check_numbers(owner, "permitted", self.permitted, (*known.state_names, *self.commanded), self.commanded)
+        check_numbers(
+            owner,
+            "permitted",
+            self.permitted,
+            (*known.state_names, *self.commanded),
+            self.commanded,
+        )
         if self.estimator.parameters:
             estimated = ", ".join(self.estimator.parameters)
-            raise ParameterError(f"{owner}: the estimator has the parameters {estimated}; give one without parameters.")
+            raise ParameterError(
+                f"{owner}: the estimator has the parameters {estimated}; give one without"
+                " parameters."
+            )
         check_limits(owner, self.limits, self.slack_weight)
 
     measured = forwarded("estimator.measured")
@@ -135,10 +164,14 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
         low, high = np.array([measurement.ranges[name] for name in self.commanded], dtype=float).T
         plan, variables = self.plan(estimate.mean, wanted, low, high, memory.variables)
         if plan is None:
-            age, failures, plan = memory.age + 1, memory.failures + 1, memory.plan
+            age = memory.age + 1
+            failures = memory.failures + 1
+            plan = memory.plan
             chosen = plan[age] if age < len(plan) else memory.applied
         else:
-            age, failures, chosen = 0, memory.failures, plan[0]
+            age = 0
+            failures = memory.failures
+            chosen = plan[0]
         applied = np.clip(chosen, low, high)
         later = self.estimator.predict(estimate, self._all_inputs(applied))
         commands = dict(zip(self.commanded, applied.tolist(), strict=True))
@@ -147,13 +180,18 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
     def plan(
         self, state: Array, wanted: Array, low: Array, high: Array, variables: Array | None = None
     ) -> tuple[Array | None, Array | None]:
-        """The planned inputs (N, m) [SI], or None where there is no solution, and the variables of the solution.
+        """The planned inputs (N, m) [SI], or None where there is no solution, and the variables of
+        the solution.
 
         state      estimated states and disturbances (n + d,) [SI]
         wanted     set points (q,), `low` and `high` limits of the commanded inputs (m,) [SI]
         variables  those of the last solution, from which the search starts
         """
-        program = self._idle.pop() if self._idle else PredictiveProgram(self, self._all_inputs(self.init().applied))
+        program = (
+            self._idle.pop()
+            if self._idle
+            else PredictiveProgram(self, self._all_inputs(self.init().applied))
+        )
         solution = program.solve(state, wanted, low, high, variables)
         self._idle.append(program)
         return solution
@@ -173,26 +211,29 @@ class FiniteSetMemory(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class FiniteControlSet(EstimatingController):
-    """Finite control set model predictive control: the mode of the valves from the best of all short sequences.
+    """Finite control set model predictive control: the mode of the valves from the best of all
+    short sequences.
 
         min over m_1 ... m_N   sum_k  sum_i ((y_i(k) - r_i)/d_i)^2  +  c s(m_(k-1), m_k)
 
-    m modes, each a value of every commanded input; y predicted columns, r their set points, d `permitted` deviations, s
-    number of inputs that change, c `switching_cost`. The plant is predicted from the state of an estimator, a filter
-    with its own model of the plant, by the compiled exponential Euler step of a sample. The estimator's columns are
-    measured, and its parameters and disturbances are included in the prediction. All sequences are enumerated; one
-    whose cost exceeds the best so far is left. The first mode of the best sequence is applied, and of equal sequences
-    the first in the order of `modes`. Set points are held over the horizon, delays of valves are not predicted.
+    m modes, each a value of every commanded input; y predicted columns, r their set points, d
+    `permitted` deviations, s number of inputs that change, c `switching_cost`. The plant is
+    predicted from the state of an estimator, a filter with its own model of the plant, by the
+    compiled exponential Euler step of a sample. The estimator's columns are measured, and its
+    parameters and disturbances are included in the prediction. All sequences are enumerated; one
+    whose cost exceeds the best so far is left. The first mode of the best sequence is applied, and
+    of equal sequences the first in the order of `modes`. Set points are held over the horizon,
+    delays of valves are not predicted.
 
     estimator       ExtendedKalmanFilter or UnscentedKalmanFilter, with the sample time of the loop
     first           estimate before the first sample, as `estimator.start` gives
-    modes           inputs by name, such as ({"fill": 0, "discharge": 0}, {"fill": 1, "discharge": 0}, ...)
-    permitted       permitted deviation of every controlled column, which is the set point's name
-    switching_cost  cost of the change of one input relative to one sample with the permitted deviation (chosen)
-    horizon         number N of samples
+    modes           inputs by name, such as ({"fill": 0, "discharge": 0}, {"fill": 1, "discharge":
+    0}, ...) permitted       permitted deviation of every controlled column, which is the set
+    point's name switching_cost  cost of the change of one input relative to one sample with the
+    permitted deviation (chosen) horizon         number N of samples
 
-    Raises ParameterError for unknown names, modes without a common set of inputs, or too many sequences.
-    Reference: Qi, Bone and Zhang (2019).
+    Raises ParameterError for unknown names, modes without a common set of inputs, or too many
+    sequences. Reference: Qi, Bone and Zhang (2019).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("qi-2019"),)
@@ -204,22 +245,30 @@ class FiniteControlSet(EstimatingController):
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        owner, known = "FiniteControlSet", compile_system(self.estimator.plant).description
+        owner = "FiniteControlSet"
+        known = compile_system(self.estimator.plant).description
         check_numbers(owner, "permitted", self.permitted, self.estimator.plant_columns, ())
         if not self.permitted or not self.modes:
-            raise ParameterError(f"{owner}: give one mode or more, and the permitted deviation of one column or more.")
+            raise ParameterError(
+                f"{owner}: give one mode or more, and the permitted deviation of one column or"
+                " more."
+            )
         for mode in self.modes:
             check_known(f"{owner}: modes names", mode, known.input_names)
             if set(mode) != set(self.modes[0]) or not np.isfinite(list(mode.values())).all():
                 raise ParameterError(
-                    f"{owner}: the mode {dict(mode)} must have a finite number for each of {', '.join(self.modes[0])}."
+                    f"{owner}: the mode {dict(mode)} must have a finite number for each of"
+                    f" {', '.join(self.modes[0])}."
                 )
         if not 0.0 <= self.switching_cost < float("inf"):
-            raise ParameterError(f"{owner}: switching_cost is {self.switching_cost!r}; allowed range: 0 and above.")
+            raise ParameterError(
+                f"{owner}: switching_cost is {self.switching_cost!r}; allowed range: 0 and above."
+            )
         if not (self.horizon >= 1 and len(self.modes) ** self.horizon <= MAX_SEQUENCES):
             raise ParameterError(
-                f"{owner}: {len(self.modes)} modes over a horizon of {self.horizon} samples; the horizon must be 1 or "
-                f"more and the number of sequences at most {MAX_SEQUENCES}. Shorten the horizon."
+                f"{owner}: {len(self.modes)} modes over a horizon of {self.horizon} samples; the"
+                f" horizon must be 1 or more and the number of sequences at most {MAX_SEQUENCES}."
+                " Shorten the horizon."
             )
 
     @property
@@ -236,43 +285,80 @@ class FiniteControlSet(EstimatingController):
     def step(
         self, memory: FiniteSetMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], FiniteSetMemory]:
-        estimate = self.estimate(memory.estimate, measurement, self.ordered(self.modes[memory.mode]), dt)
+        estimate = self.estimate(
+            memory.estimate, measurement, self.ordered(self.modes[memory.mode]), dt
+        )
         wanted = [float(measurement.setpoints[name]) for name in self.setpoints]
         mode = self.best_sequence(estimate.mean, wanted, memory.mode)[0]
         applied = self.modes[mode]
-        return dict(applied), FiniteSetMemory(self.estimator.predict(estimate, self.ordered(applied)), mode)
+        return dict(applied), FiniteSetMemory(
+            self.estimator.predict(estimate, self.ordered(applied)), mode
+        )
 
     def best_sequence(self, state: Array, wanted: Sequence[float], mode: int) -> tuple[int, ...]:
-        """The modes (N,) with the least cost from an estimated state, for set points and the mode before.
+        """The modes (N,) with the least cost from an estimated state, for set points and the mode
+        before.
 
-        Raises SolveError where no prediction is finite, ParameterError for a mode beyond the last one.
+        Raises SolveError where no prediction is finite, ParameterError for a mode beyond the last
+        one.
         """
         if not 0 <= mode < len(self.modes):
-            raise ParameterError(f"FiniteControlSet: mode is {mode}; allowed range: 0 to {len(self.modes) - 1}.")
+            raise ParameterError(
+                f"FiniteControlSet: mode is {mode}; allowed range: 0 to {len(self.modes) - 1}."
+            )
         search = self._idle.pop() if self._idle else self._bound()
         _, run, states, aims, modes, best = search
-        states[0], aims[:], modes[0] = state, wanted, mode
+        states[0] = state
+        aims[:] = wanted
+        modes[0] = mode
         status = Status(run())
         sequence = tuple(int(k) for k in best[1:])
         self._idle.append(search)
         if status is not Status.DONE:
-            raise SolveError(f"FiniteControlSet: all predictions fail, because {status.message}. Check the estimate.")
+            raise SolveError(
+                f"FiniteControlSet: all predictions fail, because {status.message}. Check the"
+                " estimate."
+            )
         return sequence
 
     def _bound(self) -> tuple[Any, ...]:
-        """The functions, which must live as long as the search, the search, and the arrays that it reads and writes."""
-        filter_, ready = self.estimator, compile_system(self.estimator.plant)
-        total, p, length = len(filter_.states), len(self.permitted), self.horizon + 1
+        """The functions, which must live as long as the search, the search, and the arrays that it
+        reads and writes.
+        """
+        filter_ = self.estimator
+        ready = compile_system(self.estimator.plant)
+        total = len(filter_.states)
+        p = len(self.permitted)
+        length = self.horizon + 1
         seen = [filter_.plant_columns.index(name) for name in self.permitted]
         functions = augmented_rates(ready, seen, *filter_.places)
-        table, n = np.array([self.ordered(mode) for mode in self.modes]), ready.sizes.states
+        table = np.array([self.ordered(mode) for mode in self.modes])
+        n = ready.sizes.states
         changes = self.switching_cost * np.count_nonzero(table[:, None] != table, axis=2)
         weights = np.array([1.0 / deviation**2 for deviation in self.permitted.values()])
-        states, wanted, best = np.zeros((length, total)), np.zeros(p), np.zeros(length)
+        states = np.zeros((length, total))
+        wanted = np.zeros(p)
+        best = np.zeros(length)
         sequence = np.zeros(length, dtype=np.int64)
         run = _choose.bind(
-            functions.rates, functions.measured, functions.constants, filter_.magnitudes, float(filter_.sample_time),
-            table, changes, wanted, weights, states, np.zeros(length), sequence, best, np.zeros(2, dtype=np.int64),
-            np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)), np.zeros(p), np.zeros((p, total)),
-        )  # fmt: skip
+            functions.rates,
+            functions.measured,
+            functions.constants,
+            filter_.magnitudes,
+            float(filter_.sample_time),
+            table,
+            changes,
+            wanted,
+            weights,
+            states,
+            np.zeros(length),
+            sequence,
+            best,
+            np.zeros(2, dtype=np.int64),
+            np.zeros(n),
+            np.zeros((n, total)),
+            np.zeros((5, n, total + 1)),
+            np.zeros(p),
+            np.zeros((p, total)),
+        )
         return functions, run, states, wanted, sequence, best

@@ -1,4 +1,6 @@
-"""Nonlinear programs of predictive control: target and plan of a plant as CasADi expressions, solved by Ipopt."""
+"""Nonlinear programs of predictive control: target and plan of a plant as CasADi expressions,
+solved by Ipopt.
+"""
 
 import functools
 from collections.abc import Mapping, Sequence
@@ -11,116 +13,177 @@ from ...physics.analysis import held, linearise
 from .lqg_and_adrc import regulator
 
 MAX_HORIZON = 200
-"""Maximum number of samples of a horizon, whose matrices have the square of it, and of steps of a sample (chosen)."""
+"""Maximum number of samples of a horizon, whose matrices have the square of it, and of steps of a
+sample (chosen).
+"""
 MAX_ITERATIONS = 100
 """Iterations after which a search has no solution (chosen)."""
 TARGET_WEIGHT = 1e8
-"""Weight of the set points against that of the inputs in the target, both relative to permitted deviations (chosen)."""
+"""Weight of the set points against that of the inputs in the target, both relative to permitted
+deviations (chosen).
+"""
 TOLERANCE = 1e-9
 """Tolerance of the optimality conditions, which are scaled (chosen)."""
 
 
-def check_limits(owner: str, limits: Mapping[str, tuple[float, float]], slack_weight: float) -> None:
-    """Raise ParameterError for limits of columns, or a weight of their violation, that make no program."""
+def check_limits(
+    owner: str, limits: Mapping[str, tuple[float, float]], slack_weight: float
+) -> None:
+    """Raise ParameterError for limits of columns, or a weight of their violation, that make no
+    program.
+    """
     for name, (low, high) in limits.items():
         if not -np.inf < low < high < np.inf:
             raise ParameterError(
-                f"{owner}: the limits of '{name}' are {low:g} and {high:g}; the minimum must be below the maximum, and "
-                "both finite."
+                f"{owner}: the limits of '{name}' are {low:g} and {high:g}; the minimum must be"
+                " below the maximum, and both finite."
             )
     if not slack_weight > 0.0:
         raise ParameterError(f"{owner}: slack_weight is {slack_weight!r}; it must be positive.")
 
 
 class PredictiveProgram:
-    """Target and plan of a NonlinearModelPredictive, in states and inputs divided by `scale` (n,) and `sizes` (m,).
+    """Target and plan of a NonlinearModelPredictive, in states and inputs divided by `scale` (n,)
+    and `sizes` (m,).
 
     inputs      values of all inputs of the plant; the commanded ones are replaced
-    weights, terminal    (n, n) of the states of each sample and of the last one; those of the inputs are 1
+    weights, terminal    (n, n) of the states of each sample and of the last one; those of the
+    inputs are 1
     """
 
     def __init__(self, controller: Any, inputs: Sequence[float]) -> None:
-        self.controller, estimator = controller, controller.estimator
+        self.controller = controller
+        estimator = controller.estimator
         self.inputs = dict(zip(estimator.plant.inputs, inputs, strict=True))
-        states, permitted = [s.name for s in estimator.plant.states], controller.permitted
+        states = [s.name for s in estimator.plant.states]
+        permitted = controller.permitted
         magnitudes = dict(zip(states, estimator.magnitudes.tolist(), strict=False))
-        self.scale = scale = np.array([permitted.get(name, size) for name, size in magnitudes.items()])
+        self.scale = scale = np.array(
+            [permitted.get(name, size) for name, size in magnitudes.items()]
+        )
         self.sizes = sizes = np.array([permitted[name] for name in controller.commanded])
         point = dict(zip(states, controller.first.mean.tolist(), strict=False))
-        linear = linearise(estimator.plant, point, self.inputs).select(inputs=list(controller.commanded))
-        a, b = held(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
+        linear = linearise(estimator.plant, point, self.inputs).select(
+            inputs=list(controller.commanded)
+        )
+        a, b = held(
+            linear.A * scale / scale[:, None],
+            linear.B * sizes / scale[:, None],
+            estimator.sample_time,
+        )
         self.weights = np.diag([1.0 if name in permitted else 0.0 for name in states])
         self.slacks = len(controller.limits) if np.isfinite(controller.slack_weight) else 0
         """Number of slack variables: one for each limited column; none where limits are hard."""
-        _, self.terminal = regulator("NonlinearModelPredictive", a, b, self.weights, np.eye(sizes.size))
+        _, self.terminal = regulator(
+            "NonlinearModelPredictive", a, b, self.weights, np.eye(sizes.size)
+        )
 
     @functools.cached_property
     def _solvers(self) -> tuple[Any, Any]:
-        """The solvers of target and plan, which hold the numbers of a search: one thread at a time uses them."""
+        """The solvers of target and plan, which hold the numbers of a search: one thread at a time
+        uses them.
+        """
         import casadi
 
         options: Any = {
-            "expand": True, "print_time": False,
+            "expand": True,
+            "print_time": False,
             "ipopt": {"print_level": 0, "sb": "yes", "max_iter": MAX_ITERATIONS, "tol": TOLERANCE},
-        }  # fmt: skip
+        }
         programs = {"target": self._target(), "plan": self._plan()}
-        target, plan = (casadi.nlpsol(name, "ipopt", program, options) for name, program in programs.items())
+        target, plan = (
+            casadi.nlpsol(name, "ipopt", program, options) for name, program in programs.items()
+        )
         return target, plan
 
     def _symbols(self) -> Any:
         """Scaled states and inputs, and disturbances [SI] of the states that are disturbed."""
         import casadi
 
-        sizes = {"x": len(self.scale), "u": len(self.sizes), "d": len(self.controller.estimator.disturbances)}
+        sizes = {
+            "x": len(self.scale),
+            "u": len(self.sizes),
+            "d": len(self.controller.estimator.disturbances),
+        }
         return [casadi.SX.sym(name, size) for name, size in sizes.items()]
 
     @functools.cached_property
     def _plant(self) -> tuple[Any, Any, Any]:
-        """Functions of the plant: scaled rates (x, u, d), controlled columns (x, u), and limited columns (x, u) as
-        parts of their ranges, 0 at the minimum and 1 at the maximum."""
+        """Functions of the plant: scaled rates (x, u, d), controlled columns (x, u), and limited
+        columns (x, u) as parts of their ranges, 0 at the minimum and 1 at the maximum."""
         import casadi
 
-        law, (x, u, d) = self.controller, self._symbols()
-        plant, sizes = law.estimator.plant, zip(law.commanded, self.sizes.tolist(), strict=True)
+        law = self.controller
+        x, u, d = self._symbols()
+        plant = law.estimator.plant
+        sizes = zip(law.commanded, self.sizes.tolist(), strict=True)
         state = {s.name: x[i] * float(self.scale[i]) for i, s in enumerate(plant.states)}
         inputs = {**self.inputs, **{name: u[i] * size for i, (name, size) in enumerate(sizes)}}
-        rates, columns = plant.rates(state, inputs), {**plant.outputs(state, inputs), **state}
+        rates = plant.rates(state, inputs)
+        columns = {**plant.outputs(state, inputs), **state}
         rows = [rates[name] for name in state]
         for i, place in enumerate(law.estimator.places[1]):
             rows[place] = rows[place] + d[i]
-        scaled = casadi.vertcat(*[row / float(size) for row, size in zip(rows, self.scale, strict=True)])
+        scaled = casadi.vertcat(
+            *[row / float(size) for row, size in zip(rows, self.scale, strict=True)]
+        )
         limited = [(columns[name] - low) / (high - low) for name, (low, high) in law.limits.items()]
         return (
             casadi.Function("rates", [x, u, d], [scaled]),
-            casadi.Function("columns", [x, u], [casadi.vertcat(*[columns[name] for name in law.controlled])]),
+            casadi.Function(
+                "columns", [x, u], [casadi.vertcat(*[columns[name] for name in law.controlled])]
+            ),
             casadi.Function("limited", [x, u], [casadi.vertcat(*limited)]),
         )
 
     def _target(self) -> dict[str, Any]:
-        """Variables (x_s, u_s), parameters (d, r); set points relative to the sizes of the controlled columns."""
+        """Variables (x_s, u_s), parameters (d, r); set points relative to the sizes of the
+        controlled columns.
+        """
         import casadi
 
-        law, (rates, columns, _), (x, u, d) = self.controller, self._plant, self._symbols()
+        law = self.controller
+        rates, columns, _ = self._plant
+        x, u, d = self._symbols()
         r = casadi.SX.sym("r", len(law.controlled))
-        known = {s.name: size for s, size in zip(law.estimator.plant.states, self.scale, strict=True)}
-        error = (columns(x, u) - r) / np.array([known.get(name, 1.0) for name in law.controlled], dtype=float)
+        known = {
+            s.name: size for s, size in zip(law.estimator.plant.states, self.scale, strict=True)
+        }
+        error = (columns(x, u) - r) / np.array(
+            [known.get(name, 1.0) for name in law.controlled], dtype=float
+        )
         at = np.array([self.inputs[name] for name in law.commanded]) / self.sizes
         cost = TARGET_WEIGHT * casadi.sumsqr(error) + casadi.sumsqr(u - at)
-        return {"x": casadi.vertcat(x, u), "p": casadi.vertcat(d, r), "f": cost / TARGET_WEIGHT, "g": rates(x, u, d)}
+        return {
+            "x": casadi.vertcat(x, u),
+            "p": casadi.vertcat(d, r),
+            "f": cost / TARGET_WEIGHT,
+            "g": rates(x, u, d),
+        }
 
     def _plan(self) -> dict[str, Any]:
-        """Variables (x_1, u_0, x_2, u_1, ..., s), parameters (x_0, d, x_s, u_s); constraints: steps, then limits."""
+        """Variables (x_1, u_0, x_2, u_1, ..., s), parameters (x_0, d, x_s, u_s); constraints:
+        steps, then limits.
+        """
         import casadi
 
-        law, n, m, slacks = self.controller, len(self.scale), len(self.sizes), self.slacks
+        law = self.controller
+        n = len(self.scale)
+        m = len(self.sizes)
+        slacks = self.slacks
         parts = np.cumsum([0, n, len(law.estimator.disturbances), n, m]).tolist()
-        z, p = casadi.MX.sym("z", law.horizon * (n + m) + slacks), casadi.MX.sym("p", parts[-1])
+        z = casadi.MX.sym("z", law.horizon * (n + m) + slacks)
+        p = casadi.MX.sym("p", parts[-1])
         x, d, x_s, u_s = casadi.vertsplit(p, parts)
         s = z[law.horizon * (n + m) :]
         cost = (float(law.slack_weight) if slacks else 0.0) * casadi.sumsqr(s)
-        defects, rows, step, limited = [], [], self.step_function(), self._plant[2]
+        defects = []
+        rows = []
+        step = self.step_function()
+        limited = self._plant[2]
         for k in range(law.horizon):
-            u, later = z[k * (n + m) + n : (k + 1) * (n + m)], z[k * (n + m) : k * (n + m) + n]
+            u = z[k * (n + m) + n : (k + 1) * (n + m)]
+            later = z[k * (n + m) : k * (n + m) + n]
             cost += casadi.bilin(self.weights, x - x_s) + casadi.sumsqr(u - u_s)
             defects.append(later - step(x, u, d))
             y = limited(later, u)
@@ -130,11 +193,15 @@ class PredictiveProgram:
         return {"x": z, "p": p, "f": cost, "g": casadi.vertcat(*defects, *rows)}
 
     def step_function(self) -> Any:
-        """The scaled states after a sample, by classical Runge-Kutta steps with held inputs: a function (x, u, d)."""
+        """The scaled states after a sample, by classical Runge-Kutta steps with held inputs: a
+        function (x, u, d).
+        """
         import casadi
 
-        (x, u, d), rates = self._symbols(), self._plant[0]
-        state, h = x, self.controller.estimator.sample_time / self.controller.substeps
+        x, u, d = self._symbols()
+        rates = self._plant[0]
+        state = x
+        h = self.controller.estimator.sample_time / self.controller.substeps
         for _ in range(self.controller.substeps):
             first = rates(state, u, d)
             second = rates(state + 0.5 * h * first, u, d)
@@ -146,20 +213,29 @@ class PredictiveProgram:
     def solve(
         self, state: Array, wanted: Array, low: Array, high: Array, variables: Array | None
     ) -> tuple[Array | None, Array | None]:
-        """The planned inputs (N, m), or None, and the variables of target and plan, which begin the next search."""
+        """The planned inputs (N, m), or None, and the variables of target and plan, which begin the
+        next search.
+        """
         target, planner = self._solvers
-        law, n, m = self.controller, len(self.scale), len(self.sizes)
-        x, d = state[:n] / self.scale, state[n:]
+        law = self.controller
+        n = len(self.scale)
+        m = len(self.sizes)
+        x = state[:n] / self.scale
+        d = state[n:]
         lower = np.concatenate([np.full(n, -np.inf), low / self.sizes])
         upper = np.concatenate([np.full(n, np.inf), high / self.sizes])
         operating = np.array([self.inputs[name] for name in law.commanded]) / self.sizes
         guess = np.concatenate([x, operating]) if variables is None else variables[: n + m]
-        solution = target(x0=guess, p=np.concatenate([d, wanted]), lbg=0.0, ubg=0.0, lbx=lower, ubx=upper)
+        solution = target(
+            x0=guess, p=np.concatenate([d, wanted]), lbg=0.0, ubg=0.0, lbx=lower, ubx=upper
+        )
         aim = np.array(solution["x"]).ravel()
         if not (target.stats()["success"] and np.isfinite(aim).all()):
             return None, None
-        count, width = law.horizon, len(law.limits)
-        slack, steps = np.zeros(self.slacks), np.zeros(count * n)
+        count = law.horizon
+        width = len(law.limits)
+        slack = np.zeros(self.slacks)
+        steps = np.zeros(count * n)
         if variables is None:
             begin = np.concatenate([np.tile(np.append(x, aim[n:]), count), slack])
         else:  # the last plan, moved by one sample
@@ -176,4 +252,6 @@ class PredictiveProgram:
         z = np.array(solution["x"]).ravel()
         if not (planner.stats()["success"] and np.isfinite(z).all()):
             return None, None
-        return z[: count * (n + m)].reshape(count, n + m)[:, n:] * self.sizes, np.concatenate([aim, z])
+        return z[: count * (n + m)].reshape(count, n + m)[:, n:] * self.sizes, np.concatenate(
+            [aim, z]
+        )

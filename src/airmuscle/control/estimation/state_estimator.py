@@ -1,4 +1,6 @@
-"""State estimators of a plant: estimates, innovations, and the interface of the nonlinear Kalman filters."""
+"""State estimators of a plant: estimates, innovations, and the interface of the nonlinear Kalman
+filters.
+"""
 
 import abc
 import dataclasses
@@ -9,9 +11,25 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
+from ...core import (
+    Array,
+    ParameterError,
+    ShortRepr,
+    SolveError,
+    Status,
+    System,
+    check_field_types,
+    check_known,
+    tree,
+)
 from ...core.system import check_system, state_vector
-from ...engine.compile import AugmentedRates, CompiledSystem, augmented_rates, compile_system, states_and_outputs
+from ...engine.compile import (
+    AugmentedRates,
+    CompiledSystem,
+    augmented_rates,
+    compile_system,
+    states_and_outputs,
+)
 from ...engine.loop import COMMAND
 from ...recording.recording import Recording
 from .lqg_and_adrc import DISTURBANCE, check_count, check_numbers
@@ -42,7 +60,9 @@ class Innovation(NamedTuple):
 
 
 class MeasuredRows(NamedTuple):
-    """Times (N,) [s], measured columns (N, p), inputs held before each row (N, m), samples between rows (N - 1,)."""
+    """Times (N,) [s], measured columns (N, p), inputs held before each row (N, m), samples between
+    rows (N - 1,).
+    """
 
     time: Array
     measured: Array
@@ -51,7 +71,9 @@ class MeasuredRows(NamedTuple):
 
 
 class Pass(NamedTuple):
-    """A sample of a filter: its row, None where it was lost, the estimate before and after its correction, inputs."""
+    """A sample of a filter: its row, None where it was lost, the estimate before and after its
+    correction, inputs.
+    """
 
     row: int | None
     predicted: StateEstimate
@@ -61,19 +83,24 @@ class Pass(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class StateEstimator(ShortRepr, abc.ABC):
-    """Interface of the filters that estimate a plant's states from columns that are measured every `sample_time` [s].
+    """Interface of the filters that estimate a plant's states from columns that are measured every
+    `sample_time` [s].
 
     measured           columns of the plant, such as ("left.pressure", "right.pressure")
-    process_noise      standard deviation of estimated states after 1 s of white noise; others have none
-    measurement_noise  standard deviation of every measured column
-    parameters         parameters of the plant that are estimated as further states, such as "mechanism.mass"
-    disturbances       states to whose rate an unknown constant is added and estimated, such as "speed"; the estimated
+    process_noise      standard deviation of estimated states after 1 s of white noise; others have
+    none measurement_noise  standard deviation of every measured column parameters
+    parameters of the plant that are estimated as further states, such as "mechanism.mass"
+    disturbances       states to whose rate an unknown constant is added and estimated, such as
+    "speed"; the estimated
                        state is "speed.disturbance", in the unit of the rate
-    gate               probability with which a true measurement is used; beyond that quantile of the chi-squared
-                       distribution of its normalised square an innovation is an outlier, which corrects nothing
+    gate               probability with which a true measurement is used; beyond that quantile of
+    the chi-squared
+                       distribution of its normalised square an innovation is an outlier, which
+                       corrects nothing
 
-    Parameters and disturbances follow a random walk by their process noise. Calls from several threads are permitted.
-    Raises ParameterError for an unknown name or a number that is not positive.
+    Parameters and disturbances follow a random walk by their process noise. Calls from several
+    threads are permitted. Raises ParameterError for an unknown name or a number that is not
+    positive.
     """
 
     plant: System
@@ -94,26 +121,38 @@ class StateEstimator(ShortRepr, abc.ABC):
         check_system(owner, self.plant)
         compiled = compile_system(self.plant)
         object.__setattr__(self, "_compiled", compiled)
-        states, leaves = compiled.description.state_names, [leaf.path for leaf in tree.leaves(self.plant)]
+        states = compiled.description.state_names
+        leaves = [leaf.path for leaf in tree.leaves(self.plant)]
         columns = self.plant_columns
         for argument, names, known in (
-            ("measured", self.measured, columns), ("parameters", self.parameters, leaves),
+            ("measured", self.measured, columns),
+            ("parameters", self.parameters, leaves),
             ("disturbances", self.disturbances, states),
-        ):  # fmt: skip
+        ):
             check_known(f"{owner}: {argument} names", names, known)
         check_numbers(owner, "process_noise", self.process_noise, self.states, ())
-        check_numbers(owner, "measurement_noise", self.measurement_noise, self.measured, self.measured)
+        check_numbers(
+            owner, "measurement_noise", self.measurement_noise, self.measured, self.measured
+        )
         if not 0 < self.sample_time < float("inf"):
-            raise ParameterError(f"{owner}: 'sample_time' is {self.sample_time!r}; it must be positive and finite.")
+            raise ParameterError(
+                f"{owner}: 'sample_time' is {self.sample_time!r}; it must be positive and finite."
+            )
         if not 0.0 < self.gate <= 1.0:
-            raise ParameterError(f"{owner}: gate is {self.gate!r}; allowed range: above 0, 1 (no gate) at most.")
+            raise ParameterError(
+                f"{owner}: gate is {self.gate!r}; allowed range: above 0, 1 (no gate) at most."
+            )
         seen = [columns.index(name) for name in self.measured]
         object.__setattr__(self, "_functions", augmented_rates(compiled, seen, *self.places))
         object.__setattr__(self, "_idle", [])
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields that were given; machine code and arrays belong to one process."""
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.init}
+        return {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(self)
+            if field.init
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__init__(**state)  # type: ignore[misc]
@@ -123,23 +162,35 @@ class StateEstimator(ShortRepr, abc.ABC):
         """The compiled prediction and correction, bound to arrays."""
 
     def _bind(self) -> SimpleNamespace:
-        """The compiled prediction and correction of the filter with the arrays that they read and write."""
-        n, p = len(self.states), len(self.measured)
+        """The compiled prediction and correction of the filter with the arrays that they read and
+        write.
+        """
+        n = len(self.states)
+        p = len(self.measured)
         bound = SimpleNamespace(
-            mean=np.zeros(n), covariance=np.zeros((n, n)), inputs=np.zeros(self._compiled.sizes.inputs),
-            values=np.zeros(p), variances=self.variances, difference=np.zeros(p), slopes=np.zeros((p, n)),
-            difference_covariance=np.zeros((p, p)), transition=np.zeros((n, n)),
-        )  # fmt: skip
+            mean=np.zeros(n),
+            covariance=np.zeros((n, n)),
+            inputs=np.zeros(self._compiled.sizes.inputs),
+            values=np.zeros(p),
+            variances=self.variances,
+            difference=np.zeros(p),
+            slopes=np.zeros((p, n)),
+            difference_covariance=np.zeros((p, p)),
+            transition=np.zeros((n, n)),
+        )
         bound.predict, bound.correct = self._kernels(bound)
         return bound
 
     @property
     def states(self) -> tuple[str, ...]:
-        """The names of the estimated states: those of the plant, then parameters and disturbances."""
+        """The names of the estimated states: those of the plant, then parameters and
+        disturbances.
+        """
         return (
-            *self._compiled.description.state_names, *self.parameters,
+            *self._compiled.description.state_names,
+            *self.parameters,
             *(f"{name}{DISTURBANCE}" for name in self.disturbances),
-        )  # fmt: skip
+        )
 
     @property
     def plant_columns(self) -> tuple[str, ...]:
@@ -151,12 +202,16 @@ class StateEstimator(ShortRepr, abc.ABC):
         """Indices of the estimated parameters among the leaves, and of the disturbed states."""
         leaves = [leaf.path for leaf in tree.leaves(self.plant)]
         states = self._compiled.description.state_names
-        return [leaves.index(name) for name in self.parameters], [states.index(name) for name in self.disturbances]
+        return [leaves.index(name) for name in self.parameters], [
+            states.index(name) for name in self.disturbances
+        ]
 
     @property
     def noise(self) -> Array:
         """Covariance (n, n) of the process noise of one sample."""
-        return np.diag([self.process_noise.get(name, 0.0) ** 2 * self.sample_time for name in self.states])
+        return np.diag(
+            [self.process_noise.get(name, 0.0) ** 2 * self.sample_time for name in self.states]
+        )
 
     @property
     def variances(self) -> Array:
@@ -166,14 +221,21 @@ class StateEstimator(ShortRepr, abc.ABC):
     @property
     def magnitudes(self) -> Array:
         """Magnitudes (n,) of the estimated states, by which the equations are scaled."""
-        nominal = dict(zip(self._compiled.description.state_names, self._compiled.nominal.tolist(), strict=True))
+        nominal = dict(
+            zip(
+                self._compiled.description.state_names, self._compiled.nominal.tolist(), strict=True
+            )
+        )
         further = [abs(self._parameter_values[name]) or 1.0 for name in self.parameters]
-        return np.array([*nominal.values(), *further, *(nominal[name] for name in self.disturbances)])
+        return np.array(
+            [*nominal.values(), *further, *(nominal[name] for name in self.disturbances)]
+        )
 
     def start(self, state: Mapping[str, float], deviations: Mapping[str, float]) -> StateEstimate:
         """The first estimate: a state, and the standard deviations of its values; 0 unless given.
 
-        Parameters start at those of the plant and disturbances at 0, unless the state contains them.
+        Parameters start at those of the plant and disturbances at 0, unless the state contains
+        them.
         """
         check_known(f"{type(self).__name__}: deviations names", deviations, self.states)
         count = len(self._compiled.description.state_names)
@@ -194,25 +256,32 @@ class StateEstimator(ShortRepr, abc.ABC):
     def correct(
         self, estimate: StateEstimate, values: Sequence[float], inputs: Sequence[float]
     ) -> tuple[StateEstimate, Innovation]:
-        """The estimate after a measurement (p,) under the inputs (m,) at that instant, and the innovation.
+        """The estimate after a measurement (p,) under the inputs (m,) at that instant, and the
+        innovation.
 
-        A value that is NaN is missing: the others correct the estimate, and the innovation has as many (p' <= p). An
-        innovation beyond the gate leaves the estimate as it was. Raises SolveError for an infinite value, and where the
-        innovation has no positive definite covariance.
+        A value that is NaN is missing: the others correct the estimate, and the innovation has as
+        many (p' <= p). An innovation beyond the gate leaves the estimate as it was. Raises
+        SolveError for an infinite value, and where the innovation has no positive definite
+        covariance.
         """
         check_count(type(self).__name__, "measured values", values, self.measured)
         given = np.asarray(values, dtype=float)
         if np.isinf(given).any():
             raise SolveError(
-                f"{type(self).__name__}: the measured values must be finite, or NaN where one is missing; "
-                f"{', '.join(self.measured)} are {values}."
+                f"{type(self).__name__}: the measured values must be finite, or NaN where one is"
+                f" missing; {', '.join(self.measured)} are {values}."
             )
         here = ~np.isnan(given)
         # a missing value counts with a variance beside which nothing is known
         bound = self._filled(estimate, inputs)
-        bound.values[:], bound.variances[:] = np.where(here, given, 0.0), np.where(here, 1.0, UNKNOWN) * self.variances
+        bound.values[:], bound.variances[:] = (
+            np.where(here, given, 0.0),
+            np.where(here, 1.0, UNKNOWN) * self.variances,
+        )
         status = bound.correct()
-        innovation = Innovation(bound.difference[here], bound.difference_covariance[np.ix_(here, here)])
+        innovation = Innovation(
+            bound.difference[here], bound.difference_covariance[np.ix_(here, here)]
+        )
         corrected = self._taken(bound, status, UNDEFINED)
         if self.gate < 1.0 and here.any():
             from scipy.special import chdtri
@@ -231,23 +300,35 @@ class StateEstimator(ShortRepr, abc.ABC):
     def estimate(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """Columns (N,) that are estimated from a recording, row by row, and `time` [s].
 
-        The rows are whole multiples of `sample_time` apart: where samples are lost, nothing corrects the estimate
-        between them, nor does a value that is NaN. Inputs are the columns of their names, or the commands of a
-        controller; an input without a column is 0. Raises ParameterError for other times.
+        The rows are whole multiples of `sample_time` apart: where samples are lost, nothing
+        corrects the estimate between them, nor does a value that is NaN. Inputs are the columns of
+        their names, or the commands of a controller; an input without a column is 0. Raises
+        ParameterError for other times.
         """
         rows = self.rows(recording)
-        estimates = [passed.corrected for passed in self._passes(rows, first) if passed.row is not None]
-        return {"time": rows.time, **self.table(np.array([each.mean for each in estimates]), rows.held)}
+        estimates = [
+            passed.corrected for passed in self._passes(rows, first) if passed.row is not None
+        ]
+        return {
+            "time": rows.time,
+            **self.table(np.array([each.mean for each in estimates]), rows.held),
+        }
 
     def rows(self, recording: Recording) -> MeasuredRows:
-        """The rows of a recording. Raises ParameterError for times that are no multiples of the sample time apart."""
+        """The rows of a recording. Raises ParameterError for times that are no multiples of the
+        sample time apart.
+        """
         time = np.asarray(recording["time"], dtype=float)
         rounding = 1e-6 * self.sample_time + 2.0 * np.spacing(np.abs(time).max(initial=0.0))
         counts = np.round(np.diff(time) / self.sample_time)
-        if time.size < 2 or (counts < 1).any() or np.abs(np.diff(time) - counts * self.sample_time).max() > rounding:
+        if (
+            time.size < 2
+            or (counts < 1).any()
+            or np.abs(np.diff(time) - counts * self.sample_time).max() > rounding
+        ):
             raise ParameterError(
-                f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart, or whole multiples of "
-                "it; simulate or resample with this interval."
+                f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart, or"
+                " whole multiples of it; simulate or resample with this interval."
             )
         inputs = np.zeros((time.size, self._compiled.sizes.inputs))
         for i, name in enumerate(self._compiled.description.input_names):
@@ -255,7 +336,9 @@ class StateEstimator(ShortRepr, abc.ABC):
             if known:
                 inputs[:, i] = recording[known[0]]
         measured = np.column_stack([recording[name] for name in self.measured])
-        return MeasuredRows(time, measured, np.vstack([inputs[:1], inputs[:-1]]), counts.astype(int))
+        return MeasuredRows(
+            time, measured, np.vstack([inputs[:1], inputs[:-1]]), counts.astype(int)
+        )
 
     def _passes(self, rows: MeasuredRows, first: StateEstimate) -> Iterator[Pass]:
         """Prediction and correction of every sample, also of those without a row."""
@@ -272,29 +355,42 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def table(self, means: Array, inputs: Array) -> dict[str, Array]:
         """All states and outputs of the plant at estimates (N, n) and inputs (N, m), by name."""
-        known, count = self._compiled.description, len(self._compiled.description.state_names)
+        known = self._compiled.description
+        count = len(self._compiled.description.state_names)
         values = states_and_outputs(self._functions, count, means, inputs, len(known.output_names))
         further = dict(zip(self.states[count:], means[:, count:].T, strict=True))
-        return {**dict(zip((*known.state_names, *known.output_names), values.T, strict=True)), **further}
+        return {
+            **dict(zip((*known.state_names, *known.output_names), values.T, strict=True)),
+            **further,
+        }
 
     @property
     def _parameter_values(self) -> dict[str, float]:
-        return {leaf.path: float(leaf.value) for leaf in tree.leaves(self.plant) if leaf.path in self.parameters}
+        return {
+            leaf.path: float(leaf.value)
+            for leaf in tree.leaves(self.plant)
+            if leaf.path in self.parameters
+        }
 
     def _filled(self, estimate: StateEstimate, inputs: Sequence[float]) -> SimpleNamespace:
         """A bound filter that no other thread uses, at an estimate."""
         check_count(type(self).__name__, "inputs", inputs, self._compiled.description.input_names)
         bound = self._idle.pop() if self._idle else self._bind()
-        bound.mean[:], bound.covariance[:], bound.inputs[:] = estimate.mean, estimate.covariance, inputs
+        bound.mean[:] = estimate.mean
+        bound.covariance[:] = estimate.covariance
+        bound.inputs[:] = inputs
         return bound
 
     def _taken(self, bound: SimpleNamespace, status: int, reason: str = "") -> StateEstimate:
-        """The estimate that a bound filter has computed; it is free again. Raises SolveError with a reason."""
+        """The estimate that a bound filter has computed; it is free again. Raises SolveError with a
+        reason.
+        """
         estimate = StateEstimate(bound.mean.copy(), bound.covariance.copy())
         self._idle.append(bound)
         if status != Status.DONE:
             raise SolveError(
-                f"{type(self).__name__}: the step failed, because {reason or Status(status).message}. Check the "
-                "measured values, the first estimate and the noise."
+                f"{type(self).__name__}: the step failed, because"
+                f" {reason or Status(status).message}. Check the measured values, the first"
+                " estimate and the noise."
             )
         return estimate

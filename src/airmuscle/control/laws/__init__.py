@@ -1,4 +1,6 @@
-"""Control laws and controllers, and what compensates friction, hysteresis, dead zones and delays."""
+"""Control laws and controllers, and what compensates friction, hysteresis, dead zones and
+delays.
+"""
 
 from ...core.stubs import attach_stub
 

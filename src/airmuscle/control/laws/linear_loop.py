@@ -1,4 +1,6 @@
-"""Linear control loops: a loop at a working point with hold, sensors and delays, and its margins."""
+"""Linear control loops: a loop at a working point with hold, sensors and delays, and its
+margins.
+"""
 
 import dataclasses
 import math
@@ -11,31 +13,39 @@ import numpy.typing as npt
 from ...core import Array, ParameterError, System, check_known
 from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
 from ...physics.analysis import LinearModel, linearise
-from ...physics.analysis.sampled_model import SampledModel, bode_figure, checked_frequencies, nyquist_figure, sampled
+from ...physics.analysis.sampled_model import (
+    SampledModel,
+    bode_figure,
+    checked_frequencies,
+    nyquist_figure,
+    sampled,
+)
 from ...report.chapter import Chapter, NamedValue
 from .linear_law import LinearLaw, Point, linearise_law
 
-POINTS, DECADES = 4000, 6
-"""Frequencies below the Nyquist frequency between which crossings are sought, and their decades (chosen)."""
+POINTS = 4000
+DECADES = 6
+"""Frequencies below the Nyquist frequency between which crossings are sought, and their decades
+(chosen).
+"""
 SHOWN = 500
 """Frequencies of a Bode plot."""
 NO_GAIN = STABLE = 1e-9
-"""Greatest gain of an open loop that counts as none (a closed valve), and by how much the magnitude of a pole of
-a stable loop may exceed 1: enclosed air that is not controlled, rounding (chosen)."""
+"""Greatest gain of an open loop that counts as none (a closed valve), and by how much the magnitude
+of a pole of a stable loop may exceed 1: enclosed air that is not controlled, rounding (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Margins:
     """Distances of a stable loop from instability; L is the open loop, f frequencies [Hz].
 
-    gain          smallest factor above 1 by which the gain may rise, 1/|L| where L is negative; infinite: any
-    lower_gain    greatest factor below 1 to which the gain may fall; 0: any
-    gain_frequency    [Hz] of the smallest factor; NaN where there is none
-    phase         smallest angle to -1 [rad] where |L| = 1; infinite where there is no such frequency
-    phase_frequency   [Hz] of that; NaN where there is none
-    delay         smallest further dead time [s] at which the loop becomes unstable, phase/(2 pi f); infinite: any
-    peak          sensitivity peak, the greatest |1/(1 + L)|; its reciprocal is the distance of L from -1
-    peak_frequency    [Hz]
+    gain          smallest factor above 1 by which the gain may rise, 1/|L| where L is negative;
+    infinite: any lower_gain    greatest factor below 1 to which the gain may fall; 0: any
+    gain_frequency    [Hz] of the smallest factor; NaN where there is none phase         smallest
+    angle to -1 [rad] where |L| = 1; infinite where there is no such frequency phase_frequency
+    [Hz] of that; NaN where there is none delay         smallest further dead time [s] at which the
+    loop becomes unstable, phase/(2 pi f); infinite: any peak          sensitivity peak, the
+    greatest |1/(1 + L)|; its reciprocal is the distance of L from -1 peak_frequency    [Hz]
     """
 
     gain: float
@@ -50,15 +60,27 @@ class Margins:
     def chapter(self) -> Chapter:
         """The description of the margins, each with the frequency at which it stands."""
         frequencies = (self.gain_frequency, self.phase_frequency, self.peak_frequency)
-        of_gain, of_phase, of_peak = (f"at {f:.4g} Hz" if math.isfinite(f) else "" for f in frequencies)
+        of_gain, of_phase, of_peak = (
+            f"at {f:.4g} Hz" if math.isfinite(f) else "" for f in frequencies
+        )
         values = (
             NamedValue("gain margin", self.gain, remark=of_gain),
             NamedValue("phase margin", self.phase, "rad", "deg", remark=of_phase),
             NamedValue("delay margin", self.delay, "s", "ms"),
             NamedValue("sensitivity peak", self.peak, remark=of_peak),
         )
-        lower = (f"the gain may fall to {100 * self.lower_gain:.3g} %",) if self.lower_gain > 0.0 else ()
-        return Chapter("margins", "Margins", "Distances of the loop from instability.", values=values, notes=lower)
+        lower = (
+            (f"the gain may fall to {100 * self.lower_gain:.3g} %",)
+            if self.lower_gain > 0.0
+            else ()
+        )
+        return Chapter(
+            "margins",
+            "Margins",
+            "Distances of the loop from instability.",
+            values=values,
+            notes=lower,
+        )
 
 
 def frequency_grid(model: SampledModel) -> Array:
@@ -66,15 +88,19 @@ def frequency_grid(model: SampledModel) -> Array:
     top = model.nyquist_frequency
     grid = np.geomspace(top * 10.0**-DECADES, top, POINTS)
     turns = np.abs(np.angle(model.poles)) / (2 * math.pi * model.sample_time)
-    near = np.array([f * (1.0 + part) for f in turns if f > grid[0] for part in np.linspace(-0.02, 0.02, 21)])
+    near = np.array(
+        [f * (1.0 + part) for f in turns if f > grid[0] for part in np.linspace(-0.02, 0.02, 21)]
+    )
     found = np.unique(np.concatenate([grid, near]))
     return found[(found > 0) & (found <= top)]
 
 
 def loop_margins(opened: SampledModel) -> Margins:
-    """The margins of an open loop L with one input and one output, whose closed loop 1/(1 + L) is stable.
+    """The margins of an open loop L with one input and one output, whose closed loop 1/(1 + L) is
+    stable.
 
-    Crossings between the frequencies of a grid are refined to rounding; the Nyquist frequency is one of them.
+    Crossings between the frequencies of a grid are refined to rounding; the Nyquist frequency is
+    one of them.
     """
     frequencies = frequency_grid(opened)
 
@@ -93,30 +119,39 @@ def loop_margins(opened: SampledModel) -> Margins:
     peak, where = _peak(frequencies, np.abs(1.0 + values), lambda f: abs(1.0 + at(f)))
     gain = min((x for x in factors if x >= 1.0), default=math.inf)
     lower = max((x for x in factors if x < 1.0), default=0.0)
-    phase, delay = abs(angles.get(nearest, math.inf)), min(delays, default=math.inf)
+    phase = abs(angles.get(nearest, math.inf))
+    delay = min(delays, default=math.inf)
     return Margins(gain, lower, factors.get(gain, math.nan), phase, nearest, delay, peak, where)
 
 
 def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex128]:
-    """The responses (F,) of a loop, many at once: back substitution in the Schur form of its balanced state matrix."""
+    """The responses (F,) of a loop, many at once: back substitution in the Schur form of its
+    balanced state matrix.
+    """
     from scipy.linalg import matrix_balance, schur
 
     balanced, (scale, _) = matrix_balance(opened.A, permute=False, separate=True)
     triangle, turn = schur(balanced, output="complex")
-    b, c = turn.conj().T @ (opened.B[:, 0] / scale), (opened.C[0] * scale) @ turn
+    b = turn.conj().T @ (opened.B[:, 0] / scale)
+    c = (opened.C[0] * scale) @ turn
     z = np.exp(2j * math.pi * frequencies * opened.sample_time)
     states = np.zeros((len(b), z.size), dtype=complex)
     for i in reversed(range(len(b))):
         states[i] = (b[i] + triangle[i, i + 1 :] @ states[i + 1 :]) / (z - triangle[i, i])
     values = np.asarray(c @ states + opened.D[0, 0])
-    for signs in (np.sign(values.imag), np.sign(np.abs(values) - 1.0)):  # next to crossings a sign may be rounding
+    for signs in (
+        np.sign(values.imag),
+        np.sign(np.abs(values) - 1.0),
+    ):  # next to crossings a sign may be rounding
         near = np.unique(np.flatnonzero(np.diff(signs))[:, None] + np.arange(2))
         values[near] = opened.frequency_response(frequencies[near])[:, 0, 0]
     return values
 
 
 def _zeros(grid: Array, values: Array, function: Callable[[float], float]) -> list[float]:
-    """The zeros of a function between points where `values`, whose sign may be rounding, and it change their sign."""
+    """The zeros of a function between points where `values`, whose sign may be rounding, and it
+    change their sign.
+    """
     from scipy.optimize import brentq
 
     pairs = [grid[i : i + 2] for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
@@ -129,15 +164,19 @@ def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> 
     from scipy.optimize import minimize_scalar
 
     i = int(np.argmin(distances))
-    low, high = grid[max(i - 1, 0)], grid[min(i + 1, grid.size - 1)]
-    found = minimize_scalar(function, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * high})
+    low = grid[max(i - 1, 0)]
+    high = grid[min(i + 1, grid.size - 1)]
+    found = minimize_scalar(
+        function, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * high}
+    )
     best, where = min((float(found.fun), float(found.x)), (float(distances[i]), float(grid[i])))
     return (math.inf if best == 0 else 1.0 / best), where
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearLoop:
-    """A control loop near a working point, between its samples: the plant for held inputs, and the law.
+    """A control loop near a working point, between its samples: the plant for held inputs, and the
+    law.
 
     plant        linearised, with the delays of its inputs; outputs are the measured columns
     law          linearised, with the lag and the delay of its sensors in its memory
@@ -154,11 +193,13 @@ class LinearLoop:
         return self._model(None)
 
     def open_loop(self, column: str | None = None) -> SampledModel:
-        """The loop opened at a measured column: from the value that the law receives to minus that of the plant.
+        """The loop opened at a measured column: from the value that the law receives to minus that
+        of the plant.
 
-        Without a column it is the first that is measured. The loops of all other columns remain closed: opened at the
-        pressure, a cascade has the open loop of its pressure control, with that of the position around it. With L the
-        loop is stable where 1 + L(z) has no zero outside the unit circle. Raises ParameterError for another column.
+        Without a column it is the first that is measured. The loops of all other columns remain
+        closed: opened at the pressure, a cascade has the open loop of its pressure control, with
+        that of the position around it. With L the loop is stable where 1 + L(z) has no zero outside
+        the unit circle. Raises ParameterError for another column.
         """
         known = self.law.measured
         name = known[0] if column is None else column
@@ -167,7 +208,9 @@ class LinearLoop:
 
     @property
     def poles(self) -> npt.NDArray[np.complex128]:
-        """Poles z of the closed loop, that of the greatest magnitude first; unstable outside the unit circle."""
+        """Poles z of the closed loop, that of the greatest magnitude first; unstable outside the
+        unit circle.
+        """
         return self.closed.poles
 
     @property
@@ -176,90 +219,129 @@ class LinearLoop:
         return bool(np.abs(self.poles).max(initial=0.0) <= 1.0 + STABLE)
 
     def margins(self, column: str | None = None) -> Margins:
-        """Gain, phase and delay margin and sensitivity peak of the loop that is opened at a measured column.
+        """Gain, phase and delay margin and sensitivity peak of the loop that is opened at a
+        measured column.
 
-        Raises ParameterError where the closed loop is not stable: its margins would have no meaning.
+        Raises ParameterError where the closed loop is not stable: its margins would have no
+        meaning.
         """
         if not self.is_stable:
             raise ParameterError(
-                f"margins: the closed loop is not stable, its pole of the greatest magnitude is {self.poles[0]:.4g}. "
-                "Lower the gains, or shorten the sample time."
+                "margins: the closed loop is not stable, its pole of the greatest magnitude is"
+                f" {self.poles[0]:.4g}. Lower the gains, or shorten the sample time."
             )
         return loop_margins(self._acting(column))
 
     def bode(self, column: str | None = None, frequencies: npt.ArrayLike | None = None) -> Any:
-        """A Matplotlib figure of gain and phase of the open loop, up to the Nyquist frequency unless given [Hz]."""
+        """A Matplotlib figure of gain and phase of the open loop, up to the Nyquist frequency
+        unless given [Hz].
+        """
         opened = self._acting(column)
         own = np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
         return bode_figure(opened, own if frequencies is None else checked_frequencies(frequencies))
 
     def nyquist(self, column: str | None = None) -> Any:
-        """A Matplotlib figure of the open loop in the complex plane, with the circle of its sensitivity peak."""
+        """A Matplotlib figure of the open loop in the complex plane, with the circle of its
+        sensitivity peak.
+        """
         opened = self._acting(column)
-        return nyquist_figure(opened.frequency_response(frequency_grid(opened))[:, 0, 0], loop_margins(opened).peak)
+        return nyquist_figure(
+            opened.frequency_response(frequency_grid(opened))[:, 0, 0], loop_margins(opened).peak
+        )
 
     def _acting(self, column: str | None) -> SampledModel:
-        """The loop that is opened at a column; ParameterError where its gain is zero, as behind a closed valve."""
+        """The loop that is opened at a column; ParameterError where its gain is zero, as behind a
+        closed valve.
+        """
         opened = self.open_loop(column)
         if np.abs(opened.frequency_response(frequency_grid(opened))).max(initial=0.0) < NO_GAIN:
             raise ParameterError(
-                f"the loop that is opened at '{column or self.law.measured[0]}' has no gain at this working point. "
-                "Linearise where the valves are open by a little; a spool within its overlap is a valve that is closed."
+                f"the loop that is opened at '{column or self.law.measured[0]}' has no gain at this"
+                " working point. Linearise where the valves are open by a little; a spool within"
+                " its overlap is a valve that is closed."
             )
         return opened
 
     def step_response(self, setpoint: str, duration: float, size: float = 1.0) -> dict[str, Array]:
-        """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of a set point."""
+        """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of
+        a set point.
+        """
         known = self.law.setpoints
         check_known("step_response: the law has no set point", setpoint, known)
         time = self.sample_time * np.arange(max(round(duration / self.sample_time), 1) + 1)
         steps = np.zeros((time.size, len(known)))
         steps[:, known.index(setpoint)] = size
-        return {"time": time, **dict(zip(self.law.measured, self.closed.response(steps).T, strict=True))}
+        return {
+            "time": time,
+            **dict(zip(self.law.measured, self.closed.response(steps).T, strict=True)),
+        }
 
     def _model(self, opened: int | None) -> SampledModel:
-        """From the set points to the columns, or from the received value of a column to minus its own."""
-        plant, law = sampled(self.plant, self.sample_time, before=True), self.law
+        """From the set points to the columns, or from the received value of a column to minus its
+        own.
+        """
+        plant = sampled(self.plant, self.sample_time, before=True)
+        law = self.law
         back = np.eye(len(law.measured))
         if opened is not None:
             back[opened, opened] = 0.0
         seen = back @ plant.C
         a = np.block([[plant.A + plant.B @ law.D @ seen, plant.B @ law.C], [law.B @ seen, law.A]])
-        by_plant, by_law = (law.F, law.E) if opened is None else (law.D[:, [opened]], law.B[:, [opened]])
+        by_plant, by_law = (
+            (law.F, law.E) if opened is None else (law.D[:, [opened]], law.B[:, [opened]])
+        )
         c = np.hstack([plant.C, np.zeros((len(law.measured), len(law.memory)))])
         names = (*plant.states, *(f"controller.{name}" for name in law.memory))
         b = np.vstack([plant.B @ by_plant, by_law])
-        inputs, outputs = law.setpoints, law.measured
+        inputs = law.setpoints
+        outputs = law.measured
         if opened is not None:
-            c, inputs, outputs = -c[[opened]], (law.measured[opened],), ("open loop",)
-        return SampledModel(a, b, c, np.zeros((len(c), b.shape[1])), self.sample_time, names, inputs, outputs)
+            c = -c[[opened]]
+            inputs = (law.measured[opened],)
+            outputs = ("open loop",)
+        return SampledModel(
+            a, b, c, np.zeros((len(c), b.shape[1])), self.sample_time, names, inputs, outputs
+        )
 
 
 def linearise_loop(
-    plant: System, loop: ControlLoop, state: Mapping[str, float], inputs: Mapping[str, float] | None = None, *,
-    control_state: ControlLoopState | None = None, delay: float | Mapping[str, float] = 0.0,
-) -> LinearLoop:  # fmt: skip
+    plant: System,
+    loop: ControlLoop,
+    state: Mapping[str, float],
+    inputs: Mapping[str, float] | None = None,
+    *,
+    control_state: ControlLoopState | None = None,
+    delay: float | Mapping[str, float] = 0.0,
+) -> LinearLoop:
     """A control loop linearised at a state, by exact derivatives of plant and law.
 
-    inputs         of the plant at the working point; those of the control_state or 0 unless given. The memory of the
-                   law (if that does not suffice, its set points) is changed so that it commands them
-    control_state  of a run that ends there (`Solution.control_state`): the memory of the law; otherwise it is that
+    inputs         of the plant at the working point; those of the control_state or 0 unless given.
+    The memory of the
+                   law (if that does not suffice, its set points) is changed so that it commands
+                   them
+    control_state  of a run that ends there (`Solution.control_state`): the memory of the law;
+    otherwise it is that
                    after the first sample, in which integrals are where the law starts them
-    delay          dead time [s] between command and input, of all inputs or by name, such as that of the computer
+    delay          dead time [s] between command and input, of all inputs or by name, such as that
+    of the computer
 
-    Sensors have neither noise nor steps. A driver counts as its mean: the opening is the command. Set points that are
-    measured columns are their values. Raises ParameterError for a controller that is no ControlLaw, a state or input
-    that does not fit, and a working point at a kink of the law.
+    Sensors have neither noise nor steps. A driver counts as its mean: the opening is the command.
+    Set points that are measured columns are their values. Raises ParameterError for a controller
+    that is no ControlLaw, a state or input that does not fit, and a working point at a kink of the
+    law.
     """
     loop = designed_loop(loop, plant)
     law = loop.controller
     if not isinstance(law, ControlLaw):
         raise ParameterError(
-            f"linearise_loop: {type(law).__name__} is no ControlLaw, its samples have no derivatives. Write the "
-            "controller as a ControlLaw over airmuscle.core.ops."
+            f"linearise_loop: {type(law).__name__} is no ControlLaw, its samples have no"
+            " derivatives. Write the controller as a ControlLaw over airmuscle.core.ops."
         )
     present = control_state.applied_inputs if control_state else ()
-    given = {**dict(zip((i.name for i in plant.input_variables), present, strict=False)), **(inputs or {})}
+    given = {
+        **dict(zip((i.name for i in plant.input_variables), present, strict=False)),
+        **(inputs or {}),
+    }
     model = linearise(plant, state, given)
     loop.check_columns(model.outputs, model.inputs)
     columns = model.output_values
@@ -271,7 +353,13 @@ def linearise_loop(
     values = np.array(list(memory.values() if isinstance(memory, Mapping) else memory), dtype=float)
     time = control_state.time if control_state else 0.0
     signal = loop.setpoint.segments(law.setpoints, time, loop.sample_time).values[0]
-    setpoints = [columns.get(name, value) for name, value in zip(law.setpoints, signal.tolist(), strict=True)]
+    setpoints = [
+        columns.get(name, value) for name, value in zip(law.setpoints, signal.tolist(), strict=True)
+    ]
     point = Point(np.array(measured), np.array(setpoints), values, limits[:, 0], limits[:, 1])
-    linear = linearise_law(law, loop.sample_time, point, model.input_values, sizes, control_state is not None)
-    return LinearLoop(model.select(law.inputs, law.measured_columns).with_delay(delay), linear, loop.sample_time)
+    linear = linearise_law(
+        law, loop.sample_time, point, model.input_values, sizes, control_state is not None
+    )
+    return LinearLoop(
+        model.select(law.inputs, law.measured_columns).with_delay(delay), linear, loop.sample_time
+    )

@@ -1,4 +1,6 @@
-"""Linear model predictive control: a quadratic program in the inputs alone, solved at each sample."""
+"""Linear model predictive control: a quadratic program in the inputs alone, solved at each
+sample.
+"""
 
 import dataclasses
 import functools
@@ -15,16 +17,20 @@ from ...engine.loop.controller import Measurement, MultivariableController, fail
 RAWLINGS2017 = published("rawlings-2017")
 CHISCI2001 = published("chisci-2001")
 _sample = Kernel("predictive_sample", "predictive")
-UNLIMITED, TOLERANCES = 1e30, (1e-9, 1e-6, 1e-12, 1e-9)
-"""A limit that nothing reaches; tolerances of the quadratic program, by their places in the kernel (chosen)."""
+UNLIMITED = 1e30
+TOLERANCES = (1e-9, 1e-6, 1e-12, 1e-9)
+"""A limit that nothing reaches; tolerances of the quadratic program, by their places in the kernel
+(chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class CondensedProblem(ShortRepr):
     """min 1/2 z^T H z + (f e)^T z  with limits of z_0 + z, of A z + A_e e and of the changes of z.
 
-    z = (v_1, ..., v_B, s): deviations of the inputs from their target, each held over a block of samples, and one slack
-    variable s >= 0 for each limited column. e: deviation (n,) of the state from its target.
+    z = (v_1, ..., v_B, s): deviations of the inputs from their target, each held over a block of
+    samples, and one slack variable s >= 0 for each limited column. e: deviation (n,) of the state
+    from its target.
 
     horizon, inputs, slacks    number of samples, inputs and slack variables
     hessian      H (z, z)
@@ -53,9 +59,10 @@ class CondensedProblem(ShortRepr):
 
 
 class PredictiveMemory(NamedTuple):
-    """Memory of the controller: predicted deviation of states and disturbances (n + d,), planned inputs (N m,) of the
-    last solution, inputs (m,) of the last sample, limits (r,) that were active, and two numbers: how many samples ago
-    the solution was, -1 without one, and the number of failures so far."""
+    """Memory of the controller: predicted deviation of states and disturbances (n + d,), planned
+    inputs (N m,) of the last solution, inputs (m,) of the last sample, limits (r,) that were
+    active, and two numbers: how many samples ago the solution was, -1 without one, and the number
+    of failures so far."""
 
     predicted: Array
     plan: Array
@@ -71,10 +78,12 @@ class PredictiveMemory(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ObservedModel(ShortRepr):
-    """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, with its observer and steady state.
+    """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, with its observer
+    and steady state.
 
-    Deviations from an operating point, where the measured columns are `measured` (p,), the inputs `inputs` (m,) and the
-    controlled columns `controlled` (q,); inputs in units of `input_sizes` (m,).
+    Deviations from an operating point, where the measured columns are `measured` (p,), the inputs
+    `inputs` (m,) and the controlled columns `controlled` (q,); inputs in units of `input_sizes`
+    (m,).
 
     gain    of the observer
     by_disturbance, by_setpoint    (n + m, d) and (n + m, q): steady state and its inputs
@@ -98,27 +107,35 @@ class ObservedModel(ShortRepr):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class LinearModelPredictive(ShortRepr, MultivariableController):
-    """Linear model predictive control (MPC): the first input of the plan that minimises a quadratic cost.
+    """Linear model predictive control (MPC): the first input of the plan that minimises a quadratic
+    cost.
 
-        x^_k = x^-_k + L (y_k - y_0 - C x^-_k),   x^ = (x, d)                      observer with disturbances d
-        x_s = A x_s + B u_s + B_d d,   C_z x_s = r - z_0                            target, the smallest one
-        min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho |s|^2    over u_0 ... u_(N-1) and s >= 0
+        x^_k = x^-_k + L (y_k - y_0 - C x^-_k),   x^ = (x, d)                      observer with
+        disturbances d x_s = A x_s + B u_s + B_d d,   C_z x_s = r - z_0
+        target, the smallest one min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho
+        |s|^2    over u_0 ... u_(N-1) and s >= 0
              u_min + b_k <= u_k <= u_max - b_k,   z_min + c_k - s <= C_l x_k <= z_max - c_k + s,
              |u_k - u_(k-1)| <= R h,   u_k constant over each block of samples
 
-    P is the solution of the discrete Riccati equation, so that the law is the linear-quadratic regulator while no limit
-    is active. There are as many disturbances as measured columns, therefore measured and controlled columns have no
-    offset at rest (Rawlings et al. 2017, chapter 1). Limits of inputs are the ranges of the loop. b_k and c_k are the
-    reach of bounded disturbances under the regulator until sample k (Chisci et al. 2001); 0 without them. The input
+    P is the solution of the discrete Riccati equation, so that the law is the linear-quadratic
+    regulator while no limit is active. There are as many disturbances as measured columns,
+    therefore measured and controlled columns have no offset at rest (Rawlings et al. 2017, chapter
+    1). Limits of inputs are the ranges of the loop. b_k and c_k are the reach of bounded
+    disturbances under the regulator until sample k (Chisci et al. 2001); 0 without them. The input
     before the first sample is that of the operating point.
 
-    The quadratic program is condensed to the inputs and solved by a compiled dual active-set method (Goldfarb and
-    Idnani 1983), which starts from the limits that were active at the last sample; the export prints the same one in C.
-    If there is no solution, which is possible with hard limits only, the next input of the last plan is applied, after
-    its end the target; `notes` states how often. `design_predictive` designs it for a linearised plant.
+    The quadratic program is condensed to the inputs and solved by a compiled dual active-set method
+    (Goldfarb and Idnani 1983), which starts from the limits that were active at the last sample;
+    the export prints the same one in C. If there is no solution, which is possible with hard limits
+    only, the next input of the last plan is applied, after its end the target; `notes` states how
+    often. `design_predictive` designs it for a linearised plant.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017, published("goldfarb-idnani-1983"), CHISCI2001)
+    references: ClassVar[tuple[Reference, ...]] = (
+        RAWLINGS2017,
+        published("goldfarb-idnani-1983"),
+        CHISCI2001,
+    )
 
     measured: tuple[str, ...]
     controlled: tuple[str, ...]
@@ -133,14 +150,20 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without compiled samples, which belong to one process."""
-        return {key: value for key, value in self.__dict__.items() if key not in ("constants", "_idle")}
+        return {
+            key: value for key, value in self.__dict__.items() if key not in ("constants", "_idle")
+        }
 
     def init(self) -> PredictiveMemory:
-        problem, m = self.problem, len(self.commanded)
+        problem = self.problem
+        m = len(self.commanded)
         return PredictiveMemory(
-            np.zeros(len(self.model.transition)), np.zeros(problem.horizon * m), np.zeros(m),
-            np.zeros(len(self.constants["scale"])), np.array([-1, 0]),
-        )  # fmt: skip
+            np.zeros(len(self.model.transition)),
+            np.zeros(problem.horizon * m),
+            np.zeros(m),
+            np.zeros(len(self.constants["scale"])),
+            np.array([-1, 0]),
+        )
 
     def notes(self, memory: PredictiveMemory) -> tuple[str, ...]:
         return failure_notes("LinearModelPredictive", "quadratic program", memory.failures)
@@ -148,26 +171,37 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     def step(
         self, memory: PredictiveMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], PredictiveMemory]:
-        model, ranges = self.model, measurement.ranges
+        model = self.model
+        ranges = measurement.ranges
         low, high = np.array([ranges[name] for name in self.commanded]).T
         _, later = self._sample(
-            memory, np.array([measurement.columns[name] for name in self.measured]) - model.measured,
-            np.array([measurement.setpoints[name] for name in self.controlled]) - self.model.controlled,
+            memory,
+            np.array([measurement.columns[name] for name in self.measured]) - model.measured,
+            np.array([measurement.setpoints[name] for name in self.controlled])
+            - self.model.controlled,
             ((low - model.inputs) / model.input_sizes, (high - model.inputs) / model.input_sizes),
-        )  # fmt: skip
+        )
         commands = (model.inputs + model.input_sizes * later.inputs).tolist()
         return dict(zip(self.commanded, commands, strict=True)), later
 
     def plan(
-        self, estimate: Array, setpoint: Array, low: Array, high: Array, memory: PredictiveMemory | None = None
+        self,
+        estimate: Array,
+        setpoint: Array,
+        low: Array,
+        high: Array,
+        memory: PredictiveMemory | None = None,
     ) -> Array | None:
         """The planned inputs (N, m), or None where the program has no solution.
 
-        Everything is a deviation from the operating point, scaled: states and disturbances (n + d,), set points (q,),
-        limits of the inputs (m,). `memory` has the inputs of the last sample and the limits to start from.
+        Everything is a deviation from the operating point, scaled: states and disturbances (n +
+        d,), set points (q,), limits of the inputs (m,). `memory` has the inputs of the last sample
+        and the limits to start from.
         """
         before = (memory or self.init())._replace(predicted=estimate)
-        status, later = self._sample(before, self.model.output_matrix @ estimate, setpoint, (low, high))
+        status, later = self._sample(
+            before, self.model.output_matrix @ estimate, setpoint, (low, high)
+        )
         return later.plan.reshape(self.problem.horizon, -1) if status is Status.DONE else None
 
     def _sample(
@@ -178,7 +212,13 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
             arrays = self.arrays()
             self._idle.append((arrays, _sample.bind(*arrays.values())))
         arrays, run = self._idle.pop()
-        for name, value in {"y": y, "r": r, "low": limits[0], "high": limits[1], **memory._asdict()}.items():
+        for name, value in {
+            "y": y,
+            "r": r,
+            "low": limits[0],
+            "high": limits[1],
+            **memory._asdict(),
+        }.items():
             arrays[name][:] = value
         status = Status(run())
         later = PredictiveMemory(*[arrays[name].copy() for name in memory._fields])
@@ -188,18 +228,36 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     @property
     def initial_memory(self) -> dict[str, float]:
         """All values of the memory before the first sample, by name: `predicted0` and so on."""
-        return {f"{key}{i}": float(v) for key, values in self.init()._asdict().items() for i, v in enumerate(values)}
+        return {
+            f"{key}{i}": float(v)
+            for key, values in self.init()._asdict().items()
+            for i, v in enumerate(values)
+        }
 
     def arrays(self) -> dict[str, Array]:
-        """New arrays of all arguments of `predictive_sample`, by name: signals, constants, memory and workspace."""
-        known, memory, m = self.constants, self.init(), len(self.commanded)
-        (p, _), (r, n), q = self.model.output_matrix.shape, known["m"].shape, len(self.controlled)
+        """New arrays of all arguments of `predictive_sample`, by name: signals, constants, memory
+        and workspace.
+        """
+        known = self.constants
+        memory = self.init()
+        m = len(self.commanded)
+        p, _ = self.model.output_matrix.shape
+        r, n = known["m"].shape
+        q = len(self.controlled)
         return {
-            **{name: np.zeros(size) for name, size in (("y", p), ("r", q), ("low", m), ("high", m))}, **known,
-            **memory._asdict(), "innovation": np.zeros(p), "point": np.zeros(known["rest"].shape[1]),
-            "lower": np.zeros(r), "upper": np.zeros(r), "order": np.zeros(n, dtype=np.int64),
-            "factor": np.zeros((n, n)), **{name: np.zeros(n) for name in ("multipliers", "change", "spare", "w")},
-        }  # fmt: skip
+            **{
+                name: np.zeros(size) for name, size in (("y", p), ("r", q), ("low", m), ("high", m))
+            },
+            **known,
+            **memory._asdict(),
+            "innovation": np.zeros(p),
+            "point": np.zeros(known["rest"].shape[1]),
+            "lower": np.zeros(r),
+            "upper": np.zeros(r),
+            "order": np.zeros(n, dtype=np.int64),
+            "factor": np.zeros((n, n)),
+            **{name: np.zeros(n) for name in ("multipliers", "change", "spare", "w")},
+        }
 
     @functools.cached_property
     def constants(self) -> dict[str, Array]:
@@ -207,13 +265,17 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
 
         The program is the shortest vector w = L^T z + L^-1 f e with limits of its rows, H = L L^T.
         """
-        problem, model = self.problem, self.model
-        n, m, count = problem.gradient.shape[1], problem.inputs, problem.moves.shape[1]
+        problem = self.problem
+        model = self.model
+        n = problem.gradient.shape[1]
+        m = problem.inputs
+        count = problem.moves.shape[1]
         steady = np.hstack([self.model.by_disturbance, self.model.by_setpoint])
         width = n + steady.shape[1] + m
         at_rest = np.zeros((n + m, width))
         at_rest[:, n : width - m] = steady
-        error, rest = np.eye(n, width) - at_rest[:n], at_rest[n:]
+        error = np.eye(n, width) - at_rest[:n]
+        rest = at_rest[n:]
         rows, shift, low, high, of_input = self._limits(error, at_rest)
         factor = np.linalg.cholesky(problem.hessian)
         free = np.linalg.solve(factor, problem.gradient @ error)
@@ -224,30 +286,66 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
         matrix = matrix[used] * scale[:, None]
         held = np.linalg.inv(factor.T)[:count]
         arrays = (
-            model.output_matrix, model.gain, model.transition, model.input_matrix, rest, matrix, of_input[used], scale,
-            np.maximum(low[used] * scale, -UNLIMITED), np.minimum(high[used] * scale, UNLIMITED),
-            shift[used] * scale[:, None] + matrix @ free, problem.moves @ held,
-            np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free, np.array(TOLERANCES),
-        )  # fmt: skip
-        names = ("by_output", "gain", "transition", "by_input", "rest", "m", "of_input", "scale", "fixed_low",
-                 "fixed_high", "by_point", "plan_by_w", "plan_by_point", "tolerances")  # fmt: skip
-        return {name: np.ascontiguousarray(array) for name, array in zip(names, arrays, strict=True)}
+            model.output_matrix,
+            model.gain,
+            model.transition,
+            model.input_matrix,
+            rest,
+            matrix,
+            of_input[used],
+            scale,
+            np.maximum(low[used] * scale, -UNLIMITED),
+            np.minimum(high[used] * scale, UNLIMITED),
+            shift[used] * scale[:, None] + matrix @ free,
+            problem.moves @ held,
+            np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free,
+            np.array(TOLERANCES),
+        )
+        names = (
+            "by_output",
+            "gain",
+            "transition",
+            "by_input",
+            "rest",
+            "m",
+            "of_input",
+            "scale",
+            "fixed_low",
+            "fixed_high",
+            "by_point",
+            "plan_by_w",
+            "plan_by_point",
+            "tolerances",
+        )
+        return {
+            name: np.ascontiguousarray(array) for name, array in zip(names, arrays, strict=True)
+        }
 
     def _limits(self, error: Array, at_rest: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """All rows (r, z), what the point adds to their limits (r, N), the limits (r,), and their inputs (r,) or -1."""
-        problem, model, m = self.problem, self.model, self.problem.inputs
-        n, count, size = len(error), problem.moves.shape[1], len(problem.hessian)
-        own, slack = np.eye(size)[:count], np.eye(size)[count:]
+        """All rows (r, z), what the point adds to their limits (r, N), the limits (r,), and their
+        inputs (r,) or -1.
+        """
+        problem = self.problem
+        model = self.model
+        m = self.problem.inputs
+        n = len(error)
+        count = problem.moves.shape[1]
+        size = len(problem.hessian)
+        own = np.eye(size)[:count]
+        slack = np.eye(size)[count:]
         rest = np.tile(at_rest[n:], (count // m, 1))
         columns = (model.columns @ at_rest[:n])[problem.limited] + problem.rows_by_state @ error
         narrow_inputs, narrow_rows = problem.narrowed
         top = np.where(problem.upper, model.upper[problem.limited] - narrow_rows, np.inf)
         bottom = np.where(problem.upper, -np.inf, model.lower[problem.limited] + narrow_rows)
         changing = np.tile(np.isfinite(problem.max_change), count // m)
-        change, largest = own - np.eye(size, k=-m)[:count], np.tile(problem.max_change, count // m)
+        change = own - np.eye(size, k=-m)[:count]
+        largest = np.tile(problem.max_change, count // m)
         first = np.zeros_like(rest)
         first[:m] = np.eye(m, rest.shape[1], k=rest.shape[1] - m) - rest[:m]
-        kinds = np.concatenate([np.tile(np.arange(m), count // m), np.full(len(slack) + len(columns), -1)])
+        kinds = np.concatenate(
+            [np.tile(np.arange(m), count // m), np.full(len(slack) + len(columns), -1)]
+        )
         return (
             np.vstack([own, slack, problem.rows, change[changing]]),
             np.vstack([-rest, np.zeros((len(slack), rest.shape[1])), -columns, first[changing]]),

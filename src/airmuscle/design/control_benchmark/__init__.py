@@ -1,4 +1,6 @@
-"""Control benchmark: controllers of an antagonistic joint, tuned alike and judged on plants other than their model."""
+"""Control benchmark: controllers of an antagonistic joint, tuned alike and judged on plants other
+than their model.
+"""
 
 from ...core.stubs import attach_stub
 

@@ -1,4 +1,6 @@
-"""Contender of the control benchmark: tuned for a family of models, and its runs of all tasks on the truths."""
+"""Contender of the control benchmark: tuned for a family of models, and its runs of all tasks on
+the truths.
+"""
 
 import dataclasses
 import enum
@@ -10,14 +12,25 @@ from ...engine.loop import Controller
 from ...recording import Recording
 from ..tuning import Tuning
 from ..tuning.case import with_gains
-from . import BenchmarkJoint, BenchmarkTruth, Commissioning, Contender, commission, complete, search_gains, tuned_law
+from . import (
+    BenchmarkJoint,
+    BenchmarkTruth,
+    Commissioning,
+    Contender,
+    commission,
+    complete,
+    search_gains,
+    tuned_law,
+)
 from .commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN, Progress, run_loop
 from .signals import TrackingMetrics, task_signals, track
 from .tasks import STANDARD_TASKS, ControlTask
 
 
 class Group(enum.StrEnum):
-    """What a contender knows: the models alone, or also a number of runs on the truth on which it is judged."""
+    """What a contender knows: the models alone, or also a number of runs on the truth on which it
+    is judged.
+    """
 
     MODELS = "models only"
     COMMISSIONED = "commissioned"
@@ -25,7 +38,9 @@ class Group(enum.StrEnum):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class BenchmarkRun(ShortRepr):
-    """One task done on a truth: its metrics and recording, or the reason why the run ended early."""
+    """One task done on a truth: its metrics and recording, or the reason why the run ended
+    early.
+    """
 
     metrics: TrackingMetrics | None
     recording: Recording | None
@@ -65,13 +80,20 @@ class ContenderResult(ShortRepr):
 
 
 def benchmark_contender(
-    joint: BenchmarkJoint, contender: Contender, tasks: Sequence[ControlTask] = STANDARD_TASKS, *,
-    seeds: Sequence[int] = (1,), sets_per_gain: int = SETS_PER_GAIN, commissioning_runs: int = COMMISSIONING_RUNS,
-    progress: Progress | None = None, tuned_as: Sequence[ContenderResult] = (),
-) -> tuple[ContenderResult, ...]:  # fmt: skip
+    joint: BenchmarkJoint,
+    contender: Contender,
+    tasks: Sequence[ControlTask] = STANDARD_TASKS,
+    *,
+    seeds: Sequence[int] = (1,),
+    sets_per_gain: int = SETS_PER_GAIN,
+    commissioning_runs: int = COMMISSIONING_RUNS,
+    progress: Progress | None = None,
+    tuned_as: Sequence[ContenderResult] = (),
+) -> tuple[ContenderResult, ...]:
     """A contender with one search for each seed: tuned, commissioned on each truth, and its runs.
 
-    tuned_as  the results, with the same seeds, of the contender whose gains it takes; otherwise that one is tuned here
+    tuned_as  the results, with the same seeds, of the contender whose gains it takes; otherwise
+    that one is tuned here
     """
     progress = progress or (lambda text, done, total: None)
     tunings = [(each.tuning, each.restarts) for each in tuned_as] or search_gains(
@@ -79,25 +101,34 @@ def benchmark_contender(
     )
     results = []
     for seed, (tuning, restarts) in zip(seeds, tunings, strict=True):
-        law, bounds = tuned_law(joint, contender, seed, tuning), complete(joint, contender).commissioned
+        law = tuned_law(joint, contender, seed, tuning)
+        bounds = complete(joint, contender).commissioned
         found: dict[str, Commissioning] = {}
         runs: dict[RunKey, BenchmarkRun] = {}
         for i, truth in enumerate(joint.truths):
             progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
             laws = {Group.MODELS: law}
             if bounds and commissioning_runs:
-                made = commission(joint, truth, law, bounds, joint.commissioning_tasks, runs=commissioning_runs)
+                made = commission(
+                    joint, truth, law, bounds, joint.commissioning_tasks, runs=commissioning_runs
+                )
                 found[truth.name], laws[Group.COMMISSIONED] = made, with_gains(law, made.gains)
             for group, each in laws.items():
                 for task in tasks:
                     run = run_task(joint, truth, each, task)
-                    kept = run if truth is joint.truths[0] else dataclasses.replace(run, recording=None)
+                    kept = (
+                        run
+                        if truth is joint.truths[0]
+                        else dataclasses.replace(run, recording=None)
+                    )
                     runs[RunKey(group, truth.name, task.name)] = kept
         results.append(ContenderResult(contender, seed, law, tuning, found, runs, restarts))
     return tuple(results)
 
 
-def run_task(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> BenchmarkRun:
+def run_task(
+    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask
+) -> BenchmarkRun:
     """A task on a truth, with rows at the sampling instants."""
     try:
         record = run_loop(joint, truth, law, task)

@@ -1,4 +1,6 @@
-"""Gains in the control benchmark: searches for the family of models, and commissioning by runs on a truth."""
+"""Gains in the control benchmark: searches for the family of models, and commissioning by runs on a
+truth.
+"""
 
 import contextlib
 import dataclasses
@@ -24,26 +26,40 @@ SETS_PER_GAIN: int = 300
 COMMISSIONING_RUNS: int = 60
 """Most sets of gains for each gain of a search, and most runs of a commissioning (chosen)."""
 TUNING_INTEGRATOR = RungeKutta4(5e-4)
-"""Integrator of the searches (chosen); the median tracking index differs by less than 1e-6 from Rodas4(1e-6)."""
+"""Integrator of the searches (chosen); the median tracking index differs by less than 1e-6 from
+Rodas4(1e-6).
+"""
 SEARCH_SPREAD = 0.05
-"""Relative difference of the best objectives of two searches beyond which the worse one is restarted (chosen)."""
+"""Relative difference of the best objectives of two searches beyond which the worse one is
+restarted (chosen).
+"""
 RESTARTS = 2
 """Most restarts of the searches of a contender (chosen)."""
 Progress = Callable[[str, int, int], None]
 SensedLaw = TypeVar("SensedLaw", bound=Controller)
-PROBE, DAMPING, FIRST_REGION, LEAST_REGION, LEAST_GAIN = 0.04, 1e-4, 0.5, 0.1, 0.02
-"""Step of a difference quotient, relative damping of the least squares, first radius of the trusted region and the
-least one with derivatives measured anew, in parts of the ranges, and relative gain of a small step (chosen)."""
+PROBE = 0.04
+DAMPING = 1e-4
+FIRST_REGION = 0.5
+LEAST_REGION = 0.1
+LEAST_GAIN = 0.02
+"""Step of a difference quotient, relative damping of the least squares, first radius of the trusted
+region and the least one with derivatives measured anew, in parts of the ranges, and relative gain
+of a small step (chosen)."""
 
 
 def search_gains(
-    joint: BenchmarkJoint, contender: Contender, seeds: Sequence[int], sets_per_gain: int, progress: Progress
+    joint: BenchmarkJoint,
+    contender: Contender,
+    seeds: Sequence[int],
+    sets_per_gain: int,
+    progress: Progress,
 ) -> list[tuple[Tuning | None, int]]:
     """The search of each seed, with the number of its restarts.
 
-    Where the best objectives of two seeds differ by more than SEARCH_SPREAD, the worst search is restarted with another
-    sample of the ranges and all its sets of gains, and keeps its better result: until all agree, at most RESTARTS
-    times. A restart knows nothing of the gains that another seed has found.
+    Where the best objectives of two seeds differ by more than SEARCH_SPREAD, the worst search is
+    restarted with another sample of the ranges and all its sets of gains, and keeps its better
+    result: until all agree, at most RESTARTS times. A restart knows nothing of the gains that
+    another seed has found.
     """
     found = [find_gains(joint, contender, seed, sets_per_gain, progress) for seed in seeds]
     restarts = [0 for _ in seeds]
@@ -53,14 +69,23 @@ def search_gains(
         if objectives[worst] <= (1.0 + SEARCH_SPREAD) * min(objectives):
             break
         restarts[worst] += 1
-        again = find_gains(joint, contender, seeds[worst] + 1_000_000 * restarts[worst], sets_per_gain, progress)
-        found[worst] = min(found[worst], again, key=lambda each: each.objective if each else math.inf)
+        again = find_gains(
+            joint, contender, seeds[worst] + 1_000_000 * restarts[worst], sets_per_gain, progress
+        )
+        found[worst] = min(
+            found[worst], again, key=lambda each: each.objective if each else math.inf
+        )
     return list(zip(found, restarts, strict=True))
 
 
-def tuned_law(joint: BenchmarkJoint, contender: Contender, seed: int, tuning: Tuning | None) -> Controller:
-    """The completed law of a contender with the gains of a search, which may be that of another contender."""
-    law, gains = complete(joint, contender, seed).law, tuning.gains if tuning else {}
+def tuned_law(
+    joint: BenchmarkJoint, contender: Contender, seed: int, tuning: Tuning | None
+) -> Controller:
+    """The completed law of a contender with the gains of a search, which may be that of another
+    contender.
+    """
+    law = complete(joint, contender, seed).law
+    gains = tuning.gains if tuning else {}
     tuned: Controller = with_gains(law, alike(law, gains) if contender.tuned_as else gains)
     return tuned
 
@@ -68,7 +93,9 @@ def tuned_law(joint: BenchmarkJoint, contender: Contender, seed: int, tuning: Tu
 def find_gains(
     joint: BenchmarkJoint, contender: Contender, seed: int, sets_per_gain: int, progress: Progress
 ) -> Tuning | None:
-    """The search for the gains that are best for the tuning tasks in the family of models; None: nothing is tuned."""
+    """The search for the gains that are best for the tuning tasks in the family of models; None:
+    nothing is tuned.
+    """
     completed = complete(joint, contender, seed)
     if not completed.bounds or not sets_per_gain:
         return None
@@ -78,17 +105,23 @@ def find_gains(
         for name, plant in joint.family.items():
             cases.append(LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant)))
     return tune(
-        cases, completed.bounds, duration=joint.tuning_tasks[0].duration,
-        index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN), objective=joint.objective,
-        budget=sets_per_gain * len(completed.bounds) * len(cases), seed=seed,
+        cases,
+        completed.bounds,
+        duration=joint.tuning_tasks[0].duration,
+        index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN),
+        objective=joint.objective,
+        budget=sets_per_gain * len(completed.bounds) * len(cases),
+        seed=seed,
         integrator=None if joint.switching else TUNING_INTEGRATOR,
         progress=lambda done, total: progress(f"tuning {contender.name}", done, total),
-    )  # fmt: skip
+    )
 
 
 @dataclasses.dataclass(frozen=True)
 class Commissioning:
-    """The gains that suit a truth best, by path [SI]; rms errors with strokes [rad] before and after; the runs."""
+    """The gains that suit a truth best, by path [SI]; rms errors with strokes [rad] before and
+    after; the runs.
+    """
 
     gains: Mapping[str, float]
     before: float
@@ -101,30 +134,44 @@ class _Spent(Exception):
 
 
 def commission(
-    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, bounds: Mapping[str, tuple[float, float]],
-    tasks: Sequence[ControlTask], *, runs: int,
-) -> Commissioning:  # fmt: skip
-    """The gains within their bounds with which a truth follows some tasks best, with at most so many runs.
+    joint: BenchmarkJoint,
+    truth: BenchmarkTruth,
+    law: Controller,
+    bounds: Mapping[str, tuple[float, float]],
+    tasks: Sequence[ControlTask],
+    *,
+    runs: int,
+) -> Commissioning:
+    """The gains within their bounds with which a truth follows some tasks best, with at most so
+    many runs.
 
     law     tuned controller of the valves behind the sensors, whose gains are the first point
     bounds  minimum and maximum [SI] of each gain by its path
 
-    Each set of gains is tried in all tasks. Each run is judged by the error of set point and reading of the encoder,
-    whose dead time is known afterwards, and by the strokes commanded of proportional valves: Gauss-Newton steps in a
-    trusted region that shrinks where a step does not help. Their derivatives are difference quotients, corrected by
-    what each step has shown (Broyden's update), and measured again where a step does not help or hardly helps. Nothing
-    but the sensors of the truth is used.
+    Each set of gains is tried in all tasks. Each run is judged by the error of set point and
+    reading of the encoder, whose dead time is known afterwards, and by the strokes commanded of
+    proportional valves: Gauss-Newton steps in a trusted region that shrinks where a step does not
+    help. Their derivatives are difference quotients, corrected by what each step has shown
+    (Broyden's update), and measured again where a step does not help or hardly helps. Nothing but
+    the sensors of the truth is used.
     """
     ranges = [GainRange(path, *pair) for path, pair in bounds.items()]
     known = {leaf.path: leaf.value for leaf in leaves(law)}
-    start = np.array([float(each.to_unit(np.clip(known[each.path], each.low, each.high))) for each in ranges])
+    start = np.array(
+        [float(each.to_unit(np.clip(known[each.path], each.low, each.high))) for each in ranges]
+    )
     spent, complete = 0, list[tuple[float, Array]]()
 
     def gains(point: Array) -> dict[str, float]:
-        return {each.path: float(each.from_unit(value)) for each, value in zip(ranges, point, strict=True)}
+        return {
+            each.path: float(each.from_unit(value))
+            for each, value in zip(ranges, point, strict=True)
+        }
 
     def errors(point: Array) -> Array | None:
-        """The errors of the encoder (N,) [rad] in all tasks; None if a run fails. Raises _Spent without runs left."""
+        """The errors of the encoder (N,) [rad] in all tasks; None if a run fails. Raises _Spent
+        without runs left.
+        """
         nonlocal spent
         if spent + len(tasks) > runs:
             raise _Spent
@@ -145,37 +192,51 @@ def commission(
 
 
 def _descend(measure: Callable[[Array], Array | None], point: Array, errors: Array | None) -> None:
-    """Gauss-Newton steps until all runs are used, with derivatives that are measured or corrected by the last steps."""
+    """Gauss-Newton steps until all runs are used, with derivatives that are measured or corrected
+    by the last steps.
+    """
     from scipy.optimize import lsq_linear
 
-    region, slopes, measured = FIRST_REGION, None, False
+    region = FIRST_REGION
+    slopes = None
+    measured = False
     while errors is not None and region > 1e-3 and np.any(errors):
         if slopes is None:
-            measured, columns = True, list[Array]()
+            measured = True
+            columns = list[Array]()
             for i in range(point.size):
                 probe = point.copy()
                 probe[i] += PROBE if point[i] + PROBE <= 1.0 else -PROBE
                 found = measure(probe)
-                change = np.zeros_like(errors) if found is None else found - errors  # none where the run fails
+                change = (
+                    np.zeros_like(errors) if found is None else found - errors
+                )  # none where the run fails
                 columns.append(change / (probe[i] - point[i]))
             slopes = np.array(columns).T
         damping = DAMPING * np.linalg.norm(slopes) * np.eye(point.size)
         low, high = (np.clip(point + side * region, 0.0, 1.0) - point for side in (-1.0, 1.0))
         step = lsq_linear(
-            np.vstack([slopes, damping]), np.append(-errors, np.zeros(point.size)), (low - 1e-12, high + 1e-12)
+            np.vstack([slopes, damping]),
+            np.append(-errors, np.zeros(point.size)),
+            (low - 1e-12, high + 1e-12),
         ).x
         tried = np.clip(point + step, 0.0, 1.0)
-        step, found = tried - point, measure(tried)
+        step = tried - point
+        found = measure(tried)
         better = -1.0 if found is None else 1.0 - _rms(found) / _rms(errors)
         if found is not None and np.any(step):
             slopes = slopes + np.outer(found - errors - slopes @ step, step) / (step @ step)
         if found is not None and better > 0.0:
-            point, errors, region, measured = tried, found, 1.5 * region, False
+            point = tried
+            errors = found
+            region = 1.5 * region
+            measured = False
             slopes = slopes if better >= LEAST_GAIN else None
         elif measured:
             region *= 0.4
         else:
-            region, slopes = max(0.4 * region, LEAST_REGION), None
+            region = max(0.4 * region, LEAST_REGION)
+            slopes = None
 
 
 def _rms(errors: Array) -> float:
@@ -183,21 +244,33 @@ def _rms(errors: Array) -> float:
 
 
 def alike(law: Controller, gains: Mapping[str, float]) -> dict[str, float]:
-    """Gains of another law under the paths of this one that have most of their last names in common."""
-    known, found = [leaf.path for leaf in leaves(law)], dict[str, float]()
+    """Gains of another law under the paths of this one that have most of their last names in
+    common.
+    """
+    known = [leaf.path for leaf in leaves(law)]
+    found = dict[str, float]()
     for name, value in gains.items():
         ends = (name.split(".", i)[-1] for i in range(name.count(".") + 1))
-        found[next(path for end in ends for path in known if f".{path}".endswith(f".{end}"))] = value
+        found[next(path for end in ends for path in known if f".{path}".endswith(f".{end}"))] = (
+            value
+        )
     return found
 
 
-def run_loop(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> Recording:
-    """A task on a truth, whose sensors have their unknown dead time, with rows at the sampling instants."""
+def run_loop(
+    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask
+) -> Recording:
+    """A task on a truth, whose sensors have their unknown dead time, with rows at the sampling
+    instants.
+    """
     loop = task_loop(joint, on_truth(law, truth.extra_delay), task, truth.plant, truth.drivers)
     return simulate(
-        truth.plant, loop, duration=task.duration, initial_state=joint.start(truth.plant),
+        truth.plant,
+        loop,
+        duration=task.duration,
+        initial_state=joint.start(truth.plant),
         output_times=joint.sample_time,
-    )  # fmt: skip
+    )
 
 
 def on_truth(law: SensedLaw, delay: int) -> SensedLaw:
@@ -209,9 +282,13 @@ def on_truth(law: SensedLaw, delay: int) -> SensedLaw:
     return dataclasses.replace(law, sensors=late)
 
 
-def tracking_errors(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> Array | None:
-    """The difference [rad] of set point and reading of the encoder in a run on a truth, and one more row (N + 1,): the
-    strokes of proportional valves with their weight in the tuning, as an error of all rows. None if the run fails."""
+def tracking_errors(
+    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask
+) -> Array | None:
+    """The difference [rad] of set point and reading of the encoder in a run on a truth, and one
+    more row (N + 1,): the strokes of proportional valves with their weight in the tuning, as an
+    error of all rows. None if the run fails.
+    """
     try:
         record = run_loop(joint, truth, law, task)
     except (PhysicsError, SimulationError):
@@ -222,5 +299,7 @@ def tracking_errors(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controlle
     reading = ENCODER_STEP * np.round(angle / ENCODER_STEP)
     errors = (signals.angle[: time.size] - reading)[time >= TUNING_BEGIN]
     travel = valve_travel(truth.plant, record, np.asarray(record["time"]) >= TUNING_BEGIN).sum()
-    weight = 0.0 if joint.switching else joint.objective.travel_weight  # counts of switchings have no derivative
+    weight = (
+        0.0 if joint.switching else joint.objective.travel_weight
+    )  # counts of switchings have no derivative
     return np.append(errors, math.sqrt(errors.size) * weight * DEGREE * travel)

@@ -1,4 +1,6 @@
-"""Contenders of the control benchmark: laws and called controllers, completed by sensors and pressure control."""
+"""Contenders of the control benchmark: laws and called controllers, completed by sensors and
+pressure control.
+"""
 
 import dataclasses
 import functools
@@ -10,15 +12,25 @@ from ...control.laws import DIFFERENCE, Cascade, CoContraction, ProportionalFeed
 from ...core import ParameterError, Value, check_field_types, leaves, model, one_line, ops
 from ...core.declaration import forwarded
 from ...core.system import select_prefix, united, with_prefix
-from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
+from ...engine.loop import (
+    ControlLaw,
+    Controller,
+    Measurement,
+    Memory,
+    Sampled,
+    SigmaDelta,
+    SplitRange,
+    WithSensors,
+)
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
 from . import BenchmarkJoint
 from .truths import SIDES
 
 ELSEWHERE = (
-    "A controller of another plant, such as a fitted arm, is judged by airmuscle tune {}, whose table has the error of "
-    "its present gains and of tuned ones on perturbed plants; give each controller a scenario of its own."
+    "A controller of another plant, such as a fitted arm, is judged by airmuscle tune {}, whose"
+    " table has the error of its present gains and of tuned ones on perturbed plants; give each"
+    " controller a scenario of its own."
 )
 """What to do with a controller that does not fit the joint, by the path of its scenario."""
 
@@ -28,9 +40,11 @@ COMMANDED = "commanded."
 
 @model
 class PassedSignals(ControlLaw):
-    """Measured columns as commands, and set points `commanded.<input>` as commands that are limited and remembered.
+    """Measured columns as commands, and set points `commanded.<input>` as commands that are limited
+    and remembered.
 
-    Sensors in front of it deliver their readings. In a `Cascade` with tracking it remembers what the inner law attains.
+    Sensors in front of it deliver their readings. In a `Cascade` with tracking it remembers what
+    the inner law attains.
     """
 
     from_file: ClassVar[bool] = False
@@ -53,8 +67,11 @@ class PassedSignals(ControlLaw):
         return dict.fromkeys(self.commanded, 0.0)
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        wanted, ranges = measurement.setpoints, measurement.ranges
-        applied = {name: ops.clip(wanted[f"{COMMANDED}{name}"], *ranges[name]) for name in self.commanded}
+        wanted = measurement.setpoints
+        ranges = measurement.ranges
+        applied = {
+            name: ops.clip(wanted[f"{COMMANDED}{name}"], *ranges[name]) for name in self.commanded
+        }
         return {**{name: measurement.columns[name] for name in self.columns}, **applied}, applied
 
 
@@ -68,9 +85,11 @@ class SensedController(Controller):
 
     sensors     of all columns that controller and actuation measure
     controller  commands half the pressure difference, both pressures, or the valves
-    actuation   law from these commands, as set points `commanded.<input>`, to the valves, which remembers them as they
+    actuation   law from these commands, as set points `commanded.<input>`, to the valves, which
+    remembers them as they
                 are attained: the controller goes on as if it had commanded those
-    ranges      minimum and maximum [SI] of the controller's commands; those of the plant unless given
+    ranges      minimum and maximum [SI] of the controller's commands; those of the plant unless
+    given
     """
 
     sensors: WithSensors
@@ -100,15 +119,20 @@ class SensedController(Controller):
         sensors, actuation = self._compiled
         return sensors.initial, self.controller.init(), actuation.initial
 
-    def step(self, memory: Memories, measurement: Measurement, dt: float) -> tuple[Mapping[str, float], Memories]:
-        (sense, act), (sensors, before, actuation) = self._compiled, memory
+    def step(
+        self, memory: Memories, measurement: Measurement, dt: float
+    ) -> tuple[Mapping[str, float], Memories]:
+        sense, act = self._compiled
+        sensors, before, actuation = memory
         readings, sensors = sense.step(sensors, measurement, dt)
         seen = Measurement(readings, measurement.setpoints, {**measurement.ranges, **self.ranges})
         commands, own = self.controller.step(before, seen, dt)
         points = {**measurement.setpoints, **with_prefix(COMMANDED, commands)}
         valves, actuation = act.step(actuation, seen._replace(setpoints=points), dt)
         memories = zip(self.actuation.initial_memory, actuation, strict=True)
-        applied = {key.rpartition("outer.")[2].removeprefix("law."): value for key, value in memories}
+        applied = {
+            key.rpartition("outer.")[2].removeprefix("law."): value for key, value in memories
+        }
         attained = {name: applied[name] for name in commands}
         if any(abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()):
             only = {**seen.ranges, **{name: (value, value) for name, value in attained.items()}}
@@ -132,16 +156,21 @@ class Contender:
     """A controller that takes part in the benchmark.
 
     name     for tables
-    law      a ControlLaw, which is compiled with the plant, or another Controller, which is called at each sample. It
+    law      a ControlLaw, which is compiled with the plant, or another Controller, which is called
+    at each sample. It
              commands half the pressure difference (`difference`), both pressures (`left.pressure`,
-             `right.pressure`) or the valves. It may measure the angle, the angular speed and both pressures. Its set
-             points are names of TaskSignals: `angle`, `angular_speed`, `angular_acceleration`, `mean_pressure`,
-             `stiffness`, `feed_forward`, `feed_forward_rate`
-    bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without bounds, and with a law
+             `right.pressure`) or the valves. It may measure the angle, the angular speed and both
+             pressures. Its set points are names of TaskSignals: `angle`, `angular_speed`,
+             `angular_acceleration`, `mean_pressure`, `stiffness`, `feed_forward`,
+             `feed_forward_rate`
+    bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without
+    bounds, and with a law
              that commands the valves, nothing is tuned
-    commissioned  the same of the gains that are sought afterwards on each truth, by the same routine and number of runs
+    commissioned  the same of the gains that are sought afterwards on each truth, by the same
+    routine and number of runs
              for all contenders; none: the contender is not commissioned
-    tuned_as  a contender whose tuned gains it takes, by the ends of their paths, in place of its own tuning
+    tuned_as  a contender whose tuned gains it takes, by the ends of their paths, in place of its
+    own tuning
     """
 
     name: str
@@ -153,22 +182,23 @@ class Contender:
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):
             raise ParameterError(
-                f"Contender '{one_line(self.name)}': its law is a {type(self.law).__name__}; give a ControlLaw or "
-                "another Controller."
+                f"Contender '{one_line(self.name)}': its law is a {type(self.law).__name__}; give a"
+                " ControlLaw or another Controller."
             )
         check_field_types(self)
         known = [leaf.path for leaf in leaves(self.law)]
         for purpose, bounds in (("tuned", self.bounds), ("commissioned", self.commissioned)):
             if unknown := [path for path in bounds if path not in known]:
                 raise ParameterError(
-                    f"contender '{self.name}': {type(self.law).__name__} has no declared parameter '{unknown[0]}' to "
-                    f"be {purpose}; there are {', '.join(known) or 'none'}. Omit its bounds."
+                    f"contender '{self.name}': {type(self.law).__name__} has no declared parameter"
+                    f" '{unknown[0]}' to be {purpose}; there are {', '.join(known) or 'none'}. Omit"
+                    " its bounds."
                 )
 
 
 class CompleteLaw(NamedTuple):
-    """A law that commands the valves of a joint through its sensors, and the ranges of the gains that are tuned, and of
-    those that are commissioned."""
+    """A law that commands the valves of a joint through its sensors, and the ranges of the gains
+    that are tuned, and of those that are commissioned."""
 
     law: WithSensors | SensedController
     bounds: Bounds
@@ -176,22 +206,31 @@ class CompleteLaw(NamedTuple):
 
 
 def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> CompleteLaw:
-    """The law of a contender with the parts that it lacks: co-contraction, pressure control, modulation, sensors.
+    """The law of a contender with the parts that it lacks: co-contraction, pressure control,
+    modulation, sensors.
 
-    Raises ParameterError for a law that commands other inputs, or measures a column without a sensor.
+    Raises ParameterError for a law that commands other inputs, or measures a column without a
+    sensor.
     """
     _check_columns(joint, contender)
-    ranges, known = (contender.bounds, contender.commissioned), {sensor.column: sensor for sensor in joint.sensors}
+    ranges = (contender.bounds, contender.commissioned)
+    known = {sensor.column: sensor for sensor in joint.sensors}
     if isinstance(contender.law, ControlLaw):
         law, prefix, own = _actuated(joint, contender.law, contender.name)
         sensors = tuple(known[name] for name in law.measured_columns)
         tuned, commissioned = (with_prefix(f"law.{prefix}", bounds) for bounds in ranges)
-        return CompleteLaw(WithSensors(law, sensors, float(seed)), {**tuned, **with_prefix("law.", own)}, commissioned)
+        return CompleteLaw(
+            WithSensors(law, sensors, float(seed)),
+            {**tuned, **with_prefix("law.", own)},
+            commissioned,
+        )
     inputs = contender.law.inputs
     law, _, own = _actuated(joint, PassedSignals((), inputs), contender.name)
     tuned, commissioned = (with_prefix("controller.", bounds) for bounds in ranges)
     span = joint.pressure_span
-    limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
+    limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {
+        DIFFERENCE: (-span, span)
+    }
     limited = {name: limits[name] for name in inputs if name in limits}
     tuned = {**tuned, **with_prefix("actuation.", own)} if tuned else {}
     columns = united(contender.law.measured_columns, law.measured_columns)
@@ -199,59 +238,77 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     return CompleteLaw(SensedController(sense, contender.law, law, limited), tuned, commissioned)
 
 
-def _check_columns(joint: BenchmarkJoint, contender: Contender, path: str | Path = "FILE.toml") -> None:
-    """Raise ParameterError where a law, of the scenario `path`, measures a column without a sensor."""
+def _check_columns(
+    joint: BenchmarkJoint, contender: Contender, path: str | Path = "FILE.toml"
+) -> None:
+    """Raise ParameterError where a law, of the scenario `path`, measures a column without a
+    sensor.
+    """
     known = [sensor.column for sensor in joint.sensors]
     if without := [name for name in contender.law.measured_columns if name not in known]:
         raise ParameterError(
-            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}. "
-            f"{ELSEWHERE.format(path)}"
+            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of"
+            f" {', '.join(known)}. {ELSEWHERE.format(path)}"
         )
 
 
 def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
-    """A law with the parts from its commands to the valves, the prefix of its parameters, and ranges of the parts."""
-    prefix, ranges, tracking = "", dict[str, tuple[float, float]](), not joint.switching
+    """A law with the parts from its commands to the valves, the prefix of its parameters, and
+    ranges of the parts.
+    """
+    prefix = ""
+    ranges = dict[str, tuple[float, float]]()
+    tracking = not joint.switching
     if law.inputs == (DIFFERENCE,):
         span = (joint.pressure_span,)
-        law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span, tracking)
+        law = Cascade(
+            law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span, tracking
+        )
         prefix = "outer."
     if set(law.inputs) == set(joint.pressures):
         valves = tuple(SplitRange(f"{side}.fill", f"{side}.discharge") for side in SIDES)
         start = (10.0 / BAR, 0.02 * BAR) if joint.switching else (2.0 / BAR, 0.0)
         inner = ProportionalFeedback(joint.pressures, valves, *start)
         law = Cascade(law, inner, (joint.min_pressure,) * 2, (joint.max_pressure,) * 2, tracking)
-        prefix, ranges = f"outer.{prefix}", {"inner.gain": joint.pressure_gains}
+        prefix = f"outer.{prefix}"
+        ranges = {"inner.gain": joint.pressure_gains}
         if joint.switching:
             law = SigmaDelta(law)
-            prefix, ranges = f"law.{prefix}", with_prefix("law.", {**ranges, "inner.zone": ZONE})
+            prefix = f"law.{prefix}"
+            ranges = with_prefix("law.", {**ranges, "inner.zone": ZONE})
     if set(law.inputs) != set(joint.model.inputs) - {"external_torque"}:
         raise ParameterError(
-            f"contender '{name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
-            f"{', '.join(joint.pressures)}, or all valves."
+            f"contender '{name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the"
+            f" pressures {', '.join(joint.pressures)}, or all valves."
         )
     return law, prefix, ranges
 
 
 def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
-    """The contender of a scenario file: its control law, with the ranges of its gains that `airmuscle tune` has.
+    """The contender of a scenario file: its control law, with the ranges of its gains that
+    `airmuscle tune` has.
 
-    The benchmark has its own sensors and, for a law that commands pressures, its own pressure control: `WithSensors`
-    around the law is removed, and of a `Cascade` whose inputs the joint does not have the outer law is taken. Raises
-    FileError, ParameterError, UnitError or UnknownNameError with the location; ParameterError for a law that commands
-    none of half the pressure difference, the pressures and the valves of the joint.
+    The benchmark has its own sensors and, for a law that commands pressures, its own pressure
+    control: `WithSensors` around the law is removed, and of a `Cascade` whose inputs the joint does
+    not have the outer law is taken. Raises FileError, ParameterError, UnitError or UnknownNameError
+    with the location; ParameterError for a law that commands none of half the pressure difference,
+    the pressures and the valves of the joint.
     """
     scenario = load_scenario_loop(path)
-    law, prefix = scenario.loop.controller, ""
+    law = scenario.loop.controller
+    prefix = ""
     allowed = {DIFFERENCE}, set(joint.pressures), set(joint.model.inputs) - {"external_torque"}
-    while isinstance(law, WithSensors | Cascade) and (isinstance(law, WithSensors) or set(law.inputs) not in allowed):
+    while isinstance(law, WithSensors | Cascade) and (
+        isinstance(law, WithSensors) or set(law.inputs) not in allowed
+    ):
         name, law = ("law", law.law) if isinstance(law, WithSensors) else ("outer", law.outer)
         prefix = f"{prefix}{name}."
     if not isinstance(law, ControlLaw) or set(law.inputs) not in allowed:
         raise ParameterError(
-            f"{scenario.location.inside('input').inside('controller')}: the law commands {', '.join(law.inputs)}; "
-            f"allowed are '{DIFFERENCE}', the pressures {', '.join(joint.pressures)}, or all valves "
-            f"{', '.join(sorted(allowed[2]))}. {ELSEWHERE.format(path)}"
+            f"{scenario.location.inside('input').inside('controller')}: the law commands"
+            f" {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures"
+            f" {', '.join(joint.pressures)}, or all valves {', '.join(sorted(allowed[2]))}."
+            f" {ELSEWHERE.format(path)}"
         )
     contender = Contender(Path(path).stem, law, select_prefix(prefix, scenario.bounds()))
     _check_columns(joint, contender, path)

@@ -10,16 +10,28 @@ from . import ContenderResult, ControlTask, Group, LearningCurve, RunKey
 
 
 def marker_style(number: int) -> dict[str, Any]:
-    """Marker of a contender; beyond those of the shared style the markers are open, with the colours moved by one."""
+    """Marker of a contender; beyond those of the shared style the markers are open, with the
+    colours moved by one.
+    """
     turn, place = divmod(number, len(MARKERS))
     colour = LINES[(place + turn) % len(LINES)]
-    return {"marker": MARKERS[place], "color": colour, "markerfacecolor": "none" if turn else colour}
+    return {
+        "marker": MARKERS[place],
+        "color": colour,
+        "markerfacecolor": "none" if turn else colour,
+    }
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Line of a contender; beyond those of the shared style each colour has another dash pattern."""
+    """Line of a contender; beyond those of the shared style each colour has another dash
+    pattern.
+    """
     turn, place = divmod(number, len(LINES))
-    return {"color": LINES[place], "linestyle": DASHES[(place + 3 * turn) % len(DASHES)], "linewidth": 1.0}
+    return {
+        "color": LINES[place],
+        "linestyle": DASHES[(place + 3 * turn) % len(DASHES)],
+        "linewidth": 1.0,
+    }
 
 
 def error_figure(names: Sequence[str], errors: Mapping[str, Array]) -> Any:
@@ -27,7 +39,8 @@ def error_figure(names: Sequence[str], errors: Mapping[str, Array]) -> Any:
     figure, axis = new_figure(height=1.2 + 0.32 * len(names))
     rows = np.arange(len(names))
     for i, (contender, found) in enumerate(errors.items()):
-        style, shift = marker_style(i), 0.08 * (i - (len(errors) - 1) / 2)
+        style = marker_style(i)
+        shift = 0.08 * (i - (len(errors) - 1) / 2)
         axis.plot(found[:, 0], rows + shift, linestyle="none", label=contender, **style)
         axis.hlines(rows + shift, found[:, 1], found[:, 2], color=style["color"], linewidth=0.7)
     axis.set(xscale="log", xlabel="rms error [degree]")
@@ -39,25 +52,34 @@ def error_figure(names: Sequence[str], errors: Mapping[str, Array]) -> Any:
     return figure
 
 
-def run_figure(results: Sequence[ContenderResult], tasks: Sequence[ControlTask], group: Group, truth: str) -> Any:
+def run_figure(
+    results: Sequence[ContenderResult], tasks: Sequence[ControlTask], group: Group, truth: str
+) -> Any:
     """Angle and error over time of some tasks on a truth, one column for each."""
     count = len(tasks)
-    figure, axes = new_figure(2, count, width=2.4 * max(count, 2), height=4.4, squeeze=False, sharex="col")
+    figure, axes = new_figure(
+        2, count, width=2.4 * max(count, 2), height=4.4, squeeze=False, sharex="col"
+    )
     for (upper, lower), task in zip(axes.T, tasks, strict=True):
         first = task.begin if task.event is None else min(task.begin, task.event)
-        limit, begin = 0.0, max(0.0, first - 0.2)  # a little before the event and what is judged
+        # a little before the event and what is judged
+        limit = 0.0
+        begin = max(0.0, first - 0.2)
         for i, each in enumerate(results):
             run = each.runs[RunKey(group, truth, task.name)]
             if run.recording is None or run.metrics is None:
                 continue
             time = np.asarray(run.recording["time"])
-            kept, wanted = time >= begin, np.degrees(task.motion.at(time)[0])
+            kept = time >= begin
+            wanted = np.degrees(task.motion.at(time)[0])
             angle = np.degrees(np.asarray(run.recording["angle"]))
             upper.plot(time[kept], angle[kept], label=each.name, **line_style(i))
             lower.plot(time[kept], (wanted - angle)[kept], **line_style(i))
             limit = max(limit, run.metrics.rmse)
         time = np.linspace(begin, task.duration, 500)
-        upper.plot(time, np.degrees(task.motion.at(time)[0]), color=BLACK, linewidth=0.7, label="set point")
+        upper.plot(
+            time, np.degrees(task.motion.at(time)[0]), color=BLACK, linewidth=0.7, label="set point"
+        )
         upper.set_title(task.name)
         lower.set(xlabel="time [s]", ylim=(-2.5 * limit - 1e-3, 2.5 * limit + 1e-3))
     axes[0, 0].set_ylabel("angle [degree]")
@@ -72,7 +94,13 @@ def learning_figure(curves: Sequence[LearningCurve]) -> Any:
     for i, curve in enumerate(curves):
         trials = np.arange(1, curve.errors.size + 1)
         label = f"{curve.contender}, {curve.task.name}"
-        axis.semilogy(trials, curve.errors, marker=MARKERS[i % len(MARKERS)], color=LINES[i % len(LINES)], label=label)
+        axis.semilogy(
+            trials,
+            curve.errors,
+            marker=MARKERS[i % len(MARKERS)],
+            color=LINES[i % len(LINES)],
+            label=label,
+        )
     axis.set(xlabel="trial", ylabel="rms error [degree]")
     legend_below(figure, axis)
     return figure

@@ -1,4 +1,6 @@
-"""Control benchmark: contenders are tuned for a family of models and judged on truths; the result with its chapter."""
+"""Control benchmark: contenders are tuned for a family of models and judged on truths; the result
+with its chapter.
+"""
 
 import dataclasses
 import math
@@ -14,7 +16,15 @@ from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ..tuning.case import check_names
-from . import BenchmarkJoint, Contender, ContenderResult, Group, LearningCurve, RunKey, benchmark_contender
+from . import (
+    BenchmarkJoint,
+    Contender,
+    ContenderResult,
+    Group,
+    LearningCurve,
+    RunKey,
+    benchmark_contender,
+)
 from .commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN, Progress
 from .plots import error_figure, learning_figure, run_figure
 from .signals import BONE2019, METRICS
@@ -27,22 +37,36 @@ from .tables import (
     search_table,
     settings_of,
     truth_table,
-)  # fmt: skip
+)
 from .tasks import STANDARD_TASKS, ControlTask
 
-REST_TASK, REST_LIFE = "hold", 10_000.0
-"""Task at whose end the joint rests, and life [h] of the busiest valve that an engineer requires there (chosen)."""
+REST_TASK = "hold"
+REST_LIFE = 10_000.0
+"""Task at whose end the joint rests, and life [h] of the busiest valve that an engineer requires
+there (chosen).
+"""
 MAX_PANELS = 4
-DRAWN = ("step", "sine 2 Hz", "minimum jerk", "load change", "torque disturbance", "sine 1 Hz", "valve stuck", "hold")
+DRAWN = (
+    "step",
+    "sine 2 Hz",
+    "minimum jerk",
+    "load change",
+    "torque disturbance",
+    "sine 1 Hz",
+    "valve stuck",
+    "hold",
+)
 """Tasks that are drawn over time, the first four that the benchmark contains."""
-MAX_BRIEF, SHORT_CONTROLLERS = 16, 4
+MAX_BRIEF = 16
+SHORT_CONTROLLERS = 4
 """Tasks and controllers of the table of errors in the brief view (chosen)."""
 LEARNING = "Iterative learning: rms error of repeated trials on a truth."
 PROCEDURE = (
-    "Every controller is tuned by the same optimiser, with at most the same number of sets of gains for each gain, for "
-    "perturbed models. In the group 'commissioned' it has then as many runs on the truth as every other one. The "
-    "truths are drawn at random from a family that has no characteristic, friction law, valve or gas of the models. "
-    "The measurements have the resolution of a 12-bit encoder, noise and dead time, of which a part is unknown."
+    "Every controller is tuned by the same optimiser, with at most the same number of sets of gains"
+    " for each gain, for perturbed models. In the group 'commissioned' it has then as many runs on"
+    " the truth as every other one. The truths are drawn at random from a family that has no"
+    " characteristic, friction law, valve or gas of the models. The measurements have the"
+    " resolution of a 12-bit encoder, noise and dead time, of which a part is unknown."
 )
 
 
@@ -88,10 +112,17 @@ class BenchmarkResult(Reported):
         return tuple(dict.fromkeys(names))
 
     def values(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Array:
-        """A metric of a contender in a task, (searches, truths); infinite where a run ended early."""
+        """A metric of a contender in a task, (searches, truths); infinite where a run ended
+        early.
+        """
         of_seeds = {each.seed: each.runs for each in self.results if each.name == contender}
-        runs = [[of_seeds[seed][RunKey(group, truth, task)].metrics for truth in self.truths] for seed in self.seeds]
-        return np.array([[math.inf if m is None else float(getattr(m, metric)) for m in row] for row in runs])
+        runs = [
+            [of_seeds[seed][RunKey(group, truth, task)].metrics for truth in self.truths]
+            for seed in self.seeds
+        ]
+        return np.array(
+            [[math.inf if m is None else float(getattr(m, metric)) for m in row] for row in runs]
+        )
 
     def metric(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Spread:
         """A metric of a contender in a task, over searches and truths."""
@@ -100,19 +131,30 @@ class BenchmarkResult(Reported):
     def ratios(self, group: Group) -> dict[str, Array]:
         """The score of each contender of a group, (searches, truths).
 
-        It is the geometric mean over the tasks of the ratio of the rms error to the smallest of the group in the same
-        search, truth and task, times how much the life of the busiest valve at rest falls short of REST_LIFE. 1 is best
-        in every task; infinite is a contender that did not complete a task.
+        It is the geometric mean over the tasks of the ratio of the rms error to the smallest of the
+        group in the same search, truth and task, times how much the life of the busiest valve at
+        rest falls short of REST_LIFE. 1 is best in every task; infinite is a contender that did not
+        complete a task.
         """
         names = self.contenders(group)
-        errors = np.array([[self.values(n, task, "rmse", group) for task in self._task_names] for n in names])
+        errors = np.array(
+            [[self.values(n, task, "rmse", group) for task in self._task_names] for n in names]
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithms = np.log(errors / errors.min(axis=0))
-        scores = dict(zip(names, np.exp(np.where(np.isfinite(errors), logarithms, math.inf).mean(axis=1)), strict=True))
+        scores = dict(
+            zip(
+                names,
+                np.exp(np.where(np.isfinite(errors), logarithms, math.inf).mean(axis=1)),
+                strict=True,
+            )
+        )
         if REST_TASK not in self._task_names:
             return scores
         lives = {name: self.values(name, REST_TASK, "valve_life", group) for name in names}
-        return {name: score * np.maximum(1.0, REST_LIFE / lives[name]) for name, score in scores.items()}
+        return {
+            name: score * np.maximum(1.0, REST_LIFE / lives[name]) for name, score in scores.items()
+        }
 
     def scores(self, group: Group = Group.MODELS) -> dict[str, Spread]:
         """The scores of a group over searches and truths, ascending by their medians."""
@@ -120,41 +162,82 @@ class BenchmarkResult(Reported):
         return dict(sorted(scores.items(), key=lambda item: item[1].median))
 
     def chapter(self, curves: Sequence[LearningCurve] = ()) -> Chapter:
-        """The description of the benchmark: ranking and errors of each group, searches, gains, truths; and learning."""
-        joint, tables = self.joint, list[Table | None]()
+        """The description of the benchmark: ranking and errors of each group, searches, gains,
+        truths; and learning.
+        """
+        joint = self.joint
+        tables = list[Table | None]()
         for group in self.groups:
-            order = self.order_table(group) if len(self.contenders(group)) > 1 < len(self.truths) else None
+            order = (
+                self.order_table(group)
+                if len(self.contenders(group)) > 1 < len(self.truths)
+                else None
+            )
             tables += [self.ranking_table(group), order, self.error_table("rmse", group)]
         tables += [search_table(joint, self.results), gains_table(self.results), truth_table(joint)]
-        tables += [metrics_table(self.results), learning_table(curves) if curves else None, failure_table(self.results)]
+        tables += [
+            metrics_table(self.results),
+            learning_table(curves) if curves else None,
+            failure_table(self.results),
+        ]
         drawn = [name for name in DRAWN if name in self._task_names] + self._task_names
         plots = [self.error_plot(group) for group in self.groups]
         plots.append(self.run_plot(list(dict.fromkeys(drawn))[:MAX_PANELS], self.groups[-1]))
         if curves:
             plots.append(Plot("learning", LEARNING, partial(learning_figure, curves)))
         errors = [each.errors for each in curves]
-        learned = [f"learning: {e[0]:.3g} degrees in trial 1, {e[-1]:.3g} in trial {e.size}" for e in errors]
-        sources = cite((joint.model, *(truth.plant for truth in joint.truths), *(each.law for each in self.results)))
-        tuned = [reference for each in self.results if each.tuning for reference in each.tuning.references]
+        learned = [
+            f"learning: {e[0]:.3g} degrees in trial 1, {e[-1]:.3g} in trial {e.size}"
+            for e in errors
+        ]
+        sources = cite(
+            (
+                joint.model,
+                *(truth.plant for truth in joint.truths),
+                *(each.law for each in self.results),
+            )
+        )
+        tuned = [
+            reference
+            for each in self.results
+            if each.tuning
+            for reference in each.tuning.references
+        ]
         return Chapter(
-            "benchmark", f"Control of an antagonistic joint with {joint.name}", self._summary(),
+            "benchmark",
+            f"Control of an antagonistic joint with {joint.name}",
+            self._summary(),
             values=(NamedValue("seeds", ", ".join(map(str, self.seeds)), brief=False),),
-            tables=tuple(table for table in tables if table is not None), plots=tuple(plots), notes=tuple(learned),
-            references=tuple({reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values()),
+            tables=tuple(table for table in tables if table is not None),
+            plots=tuple(plots),
+            notes=tuple(learned),
+            references=tuple(
+                {reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values()
+            ),
             chosen=settings_of(joint),
-        )  # fmt: skip
+        )
 
     def ranking_table(self, group: Group) -> Table:
         """The contenders of a group by score, with what they cost."""
-        scores, tasks = self.scores(group), self._task_names
+        scores = self.scores(group)
+        tasks = self._task_names
         air = [[self.metric(name, task, "air", group).median for task in tasks] for name in scores]
         errors = [[self.values(name, task, "rmse", group) for task in tasks] for name in scores]
         strokes, life = (
-            [self.metric(name, REST_TASK, metric, group).median if REST_TASK in tasks else math.nan for name in scores]
+            [
+                (
+                    self.metric(name, REST_TASK, metric, group).median
+                    if REST_TASK in tasks
+                    else math.nan
+                )
+                for name in scores
+            ]
             for metric in ("strokes", "valve_life")
         )
         return Table(
-            f"ranking_{group.name.lower()}", f"Ranking, {group}", {
+            f"ranking_{group.name.lower()}",
+            f"Ranking, {group}",
+            {
                 "controller": list(scores),
                 "score": [each.median for each in scores.values()],
                 "lowest": [each.low for each in scores.values()],
@@ -162,25 +245,37 @@ class BenchmarkResult(Reported):
                 "air, mean": metric_column("air", [sum(each) / len(each) for each in air]),
                 "strokes at rest": metric_column("strokes", strokes),
                 "valve life at rest": metric_column("valve_life", life, short="life at rest"),
-                "runs completed": TableColumn([float(np.isfinite(e).mean()) for e in errors], "1", "%", brief=False),
+                "runs completed": TableColumn(
+                    [float(np.isfinite(e).mean()) for e in errors], "1", "%", brief=False
+                ),
             },
-            "Score: geometric mean over the tasks of the rms error, divided by the smallest of the group on the same "
-            f"truth, times {REST_LIFE:g} h over the life of the busiest valve in the task '{REST_TASK}' where it is "
-            f"shorter; 1 is the best in every task. Over {self.extent}.",
+            "Score: geometric mean over the tasks of the rms error, divided by the smallest of the"
+            f" group on the same truth, times {REST_LIFE:g} h over the life of the busiest valve in"
+            f" the task '{REST_TASK}' where it is shorter; 1 is the best in every task. Over"
+            f" {self.extent}.",
             brief=len(scores),
-        )  # fmt: skip
+        )
 
     def order_table(self, group: Group) -> Table:
         """On how many truths one contender is better than another one in every search."""
-        ratios, names = self.ratios(group), list(self.scores(group))
-        rows = {a: [int((ratios[a].max(axis=0) < ratios[b].min(axis=0)).sum()) for b in names] for a in names}
+        ratios = self.ratios(group)
+        names = list(self.scores(group))
+        rows = {
+            a: [int((ratios[a].max(axis=0) < ratios[b].min(axis=0)).sum()) for b in names]
+            for a in names
+        }
         columns: dict[str, Any] = {"better": names}
-        columns |= {f"than {b}": [rows[a][j] if a != b else None for a in names] for j, b in enumerate(names)}
+        columns |= {
+            f"than {b}": [rows[a][j] if a != b else None for a in names]
+            for j, b in enumerate(names)
+        }
         return Table(
-            f"order_{group.name.lower()}", f"Order, {group}", columns,
-            f"Number of truths, of {len(self.truths)}, on which every search of a controller has a smaller score than "
-            "every search of another one.",
-        )  # fmt: skip
+            f"order_{group.name.lower()}",
+            f"Order, {group}",
+            columns,
+            f"Number of truths, of {len(self.truths)}, on which every search of a controller has a"
+            " smaller score than every search of another one.",
+        )
 
     def error_table(self, metric: str, group: Group) -> Table:
         """The median of one metric of all contenders of a group, one row for each task."""
@@ -191,24 +286,35 @@ class BenchmarkResult(Reported):
         name = METRICS[metric][0]
         title = f"RMS{name[3:]}" if name.startswith("rms") else name.capitalize()
         return Table(
-            f"{metric}_{group.name.lower()}", f"{title}, {group}", columns,
-            f"Median over searches and truths, from the beginning of the judged time of each task. Over {self.extent}.",
+            f"{metric}_{group.name.lower()}",
+            f"{title}, {group}",
+            columns,
+            "Median over searches and truths, from the beginning of the judged time of each task."
+            f" Over {self.extent}.",
             brief=MAX_BRIEF,
-        )  # fmt: skip
+        )
 
     def error_plot(self, group: Group = Group.MODELS) -> Plot:
-        """The rms error of every controller of a group in every task: median and range over searches and truths."""
+        """The rms error of every controller of a group in every task: median and range over
+        searches and truths.
+        """
         names = self._task_names
-        errors = {each: np.array([self.metric(each, name, "rmse", group) for name in names])
-                  for each in self.contenders(group)}  # fmt: skip
-        caption = (f"Error in each task with {self.joint.name}, {group}: median and range over {self.extent}; "
-                   f"{self.joint.valve}.")  # fmt: skip
+        errors = {
+            each: np.array([self.metric(each, name, "rmse", group) for name in names])
+            for each in self.contenders(group)
+        }
+        caption = (
+            f"Error in each task with {self.joint.name}, {group}: median and range over"
+            f" {self.extent}; {self.joint.valve}."
+        )
         return Plot(f"errors_{group.name.lower()}", caption, partial(error_figure, names, errors))
 
     def run_plot(self, names: Sequence[str], group: Group = Group.MODELS) -> Plot:
         """Angle and error over time of some tasks on the first truth, one column for each."""
-        truth, shown = self.truths[0], {each.name: each for each in reversed(self.results)}
-        results, tasks = [shown[name] for name in self.contenders(group)], {task.name: task for task in self.tasks}
+        truth = self.truths[0]
+        shown = {each.name: each for each in reversed(self.results)}
+        results = [shown[name] for name in self.contenders(group)]
+        tasks = {task.name: task for task in self.tasks}
         figure = partial(run_figure, results, [tasks[name] for name in names], group, truth)
         return Plot("runs", f"Angle and error over time, {group}, {truth}, first search.", figure)
 
@@ -217,9 +323,16 @@ class BenchmarkResult(Reported):
         return [task.name for task in self.tasks]
 
     def _summary(self) -> tuple[str, str]:
-        joint, number = self.joint, len({each.name for each in self.results})
-        best = (f"Smallest score, {group}: {next(iter(self.scores(group)))}." for group in self.groups)
-        counts = counted(number, "controller"), counted(len(self.tasks), "task"), counted(len(joint.truths), "truth")
+        joint = self.joint
+        number = len({each.name for each in self.results})
+        best = (
+            f"Smallest score, {group}: {next(iter(self.scores(group)))}." for group in self.groups
+        )
+        counts = (
+            counted(number, "controller"),
+            counted(len(self.tasks), "task"),
+            counted(len(joint.truths), "truth"),
+        )
         valves = f"Valves: {joint.valve}. Sampled every {joint.sample_time * 1e3:g} ms."
         return f"{', '.join(counts)}. {' '.join(best)} {valves}", PROCEDURE
 
@@ -230,23 +343,34 @@ def spread(values: Array) -> Spread:
 
 
 def benchmark_controllers(
-    joint: BenchmarkJoint, contenders: Sequence[Contender], tasks: Sequence[ControlTask] = STANDARD_TASKS, *,
-    seeds: Sequence[int] = (1,), sets_per_gain: int = SETS_PER_GAIN, commissioning_runs: int = COMMISSIONING_RUNS,
-    progress: Progress | None = None, workers: Workers = 1,
-) -> BenchmarkResult:  # fmt: skip
-    """Tune every contender for the models of a joint, commission it on each truth, and run every task on the truths.
+    joint: BenchmarkJoint,
+    contenders: Sequence[Contender],
+    tasks: Sequence[ControlTask] = STANDARD_TASKS,
+    *,
+    seeds: Sequence[int] = (1,),
+    sets_per_gain: int = SETS_PER_GAIN,
+    commissioning_runs: int = COMMISSIONING_RUNS,
+    progress: Progress | None = None,
+    workers: Workers = 1,
+) -> BenchmarkResult:
+    """Tune every contender for the models of a joint, commission it on each truth, and run every
+    task on the truths.
 
     joint               model, family, truths, sensors
     tasks               STANDARD_TASKS unless given
-    seeds               of the searches and of the noise: one search each, which `search_gains` may restart
-    sets_per_gain       sets of gains that a search evaluates at most for each gain; it ends before where it has
+    seeds               of the searches and of the noise: one search each, which `search_gains` may
+    restart sets_per_gain       sets of gains that a search evaluates at most for each gain; it ends
+    before where it has
                         converged. 0: none is tuned
-    commissioning_runs  runs of each contender on a truth for the group `commissioned`; 0: there is none
-    progress            called with the name of the present step, the number done and their number
-    workers             number of processes, for several of which a script needs `if __name__ == "__main__":`, or an
-                        executor: a contender with all its searches is a task. The result does not depend on it
+    commissioning_runs  runs of each contender on a truth for the group `commissioned`; 0: there is
+    none progress            called with the name of the present step, the number done and their
+    number workers             number of processes, for several of which a script needs `if __name__
+    == "__main__":`, or an
+                        executor: a contender with all its searches is a task. The result does not
+                        depend on it
 
-    A run that fails has a reason and no metrics. Raises ParameterError for a contender that does not suit the joint.
+    A run that fails has a reason and no metrics. Raises ParameterError for a contender that does
+    not suit the joint.
     """
     check_names("benchmark_controllers", "contender", [each.name for each in contenders])
     check_names("benchmark_controllers", "task", [each.name for each in tasks])
@@ -254,15 +378,28 @@ def benchmark_controllers(
     found: dict[str, tuple[ContenderResult, ...]] = {}
     with process_pool(workers) as executor:
         options = {
-            "joint": joint, "tasks": tuple(tasks), "seeds": tuple(seeds), "sets_per_gain": sets_per_gain,
-            "commissioning_runs": commissioning_runs, "progress": show if executor is None else None,
-        }  # fmt: skip
+            "joint": joint,
+            "tasks": tuple(tasks),
+            "seeds": tuple(seeds),
+            "sets_per_gain": sets_per_gain,
+            "commissioning_runs": commissioning_runs,
+            "progress": show if executor is None else None,
+        }
         distribution = DistributedCalls(executor, _benchmark_task, options)
-        other = {each.name: known.name for each in contenders for known in contenders if each.tuned_as is known}
+        other = {
+            each.name: known.name
+            for each in contenders
+            for known in contenders
+            if each.tuned_as is known
+        }
         for later in (False, True):  # those that take the gains of the others
             due = [each for each in contenders if (each.name in other) == later]
-            for i, results in distribution.completed([(each, found.get(other.get(each.name, ""), ())) for each in due]):
-                found[due[i].name] = tuple(dataclasses.replace(result, contender=due[i]) for result in results)
+            for i, results in distribution.completed(
+                [(each, found.get(other.get(each.name, ""), ())) for each in due]
+            ):
+                found[due[i].name] = tuple(
+                    dataclasses.replace(result, contender=due[i]) for result in results
+                )
                 show(due[i].name, len(found), len(contenders))
     ordered = (found[contender.name][i] for i in range(len(seeds)) for contender in contenders)
     return BenchmarkResult(joint, tuple(tasks), tuple(ordered))

@@ -28,8 +28,9 @@ ANGLE_STEP = 1e-4
 class TaskSignals(NamedTuple):
     """Signals of a task at the sampling instants (N,), all in SI units.
 
-    feed_forward is half the pressure difference [Pa] by which the model would follow the motion without friction,
-    feed_forward_rate its rate [Pa/s]; stiffness is that of the model at these pressures [N m/rad].
+    feed_forward is half the pressure difference [Pa] by which the model would follow the motion
+    without friction, feed_forward_rate its rate [Pa/s]; stiffness is that of the model at these
+    pressures [N m/rad].
     """
 
     time: Array
@@ -42,15 +43,21 @@ class TaskSignals(NamedTuple):
     stiffness: Array
 
     def setpoint(self, names: Sequence[str]) -> SampledSignal:
-        """The named signals as set points. Raises ParameterError for a name that a task does not have."""
+        """The named signals as set points. Raises ParameterError for a name that a task does not
+        have.
+        """
         known = self._asdict()
         time = known.pop("time").tolist()
         check_known("a task has no set point", names, known)
-        return SampledSignal({name: tuple(zip(time, known[name].tolist(), strict=True)) for name in names})
+        return SampledSignal(
+            {name: tuple(zip(time, known[name].tolist(), strict=True)) for name in names}
+        )
 
 
 def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
-    """The signals of a task at the sampling instants of a joint; kept, because every run of the task needs them."""
+    """The signals of a task at the sampling instants of a joint; kept, because every run of the
+    task needs them.
+    """
     try:
         hash(task)
     except TypeError:  # a motion of a user may have no hash
@@ -75,50 +82,76 @@ def _signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
 _kept_signals = functools.lru_cache(maxsize=128)(_signals)
 
 
-def inverse_dynamics(joint: BenchmarkJoint, plant: Plant, motion: JointMotion, time: Array, mean: Array) -> Array:
-    """Half the pressure difference (N,) [Pa] by which a plant without friction follows a motion at times (N,) [s].
+def inverse_dynamics(
+    joint: BenchmarkJoint, plant: Plant, motion: JointMotion, time: Array, mean: Array
+) -> Array:
+    """Half the pressure difference (N,) [Pa] by which a plant without friction follows a motion at
+    times (N,) [s].
 
-    The torque of both muscles, with their dampers, gives the acceleration of the motion; it is solved for the pressure
-    difference by bisection within the range of the joint. A motion beyond the range receives the limit.
+    The torque of both muscles, with their dampers, gives the acceleration of the motion; it is
+    solved for the pressure difference by bisection within the range of the joint. A motion beyond
+    the range receives the limit.
     """
     angle, speed, acceleration = motion.at(time)
     (coordinate,) = plant.mechanism.coordinates
-    wanted = plant.mechanism.driving_force({coordinate.name: angle}, {coordinate.speed: speed}, acceleration)
-    low, high = np.full(time.shape, -joint.pressure_span), np.full(time.shape, joint.pressure_span)
+    wanted = plant.mechanism.driving_force(
+        {coordinate.name: angle}, {coordinate.speed: speed}, acceleration
+    )
+    low = np.full(time.shape, -joint.pressure_span)
+    high = np.full(time.shape, joint.pressure_span)
     for _ in range(BISECTIONS):
         half = 0.5 * (low + high)
         below = _torque(plant, angle, speed, mean + half, mean - half) < wanted
-        low, high = np.where(below, half, low), np.where(below, high, half)
+        low = np.where(below, half, low)
+        high = np.where(below, high, half)
     return np.asarray(0.5 * (low + high))
 
 
-def angular_acceleration(joint: BenchmarkJoint, plant: Plant, angle: float, speed: float, half: float) -> float:
-    """Acceleration [rad/s2] of a plant without friction at an angle [rad], a speed [rad/s] and half a pressure
-    difference [Pa] about the mean pressure."""
+def angular_acceleration(
+    joint: BenchmarkJoint, plant: Plant, angle: float, speed: float, half: float
+) -> float:
+    """Acceleration [rad/s2] of a plant without friction at an angle [rad], a speed [rad/s] and half
+    a pressure difference [Pa] about the mean pressure."""
     torque = _torque(plant, angle, speed, joint.mean_pressure + half, joint.mean_pressure - half)
-    coordinate, inputs = plant.mechanism.coordinates[0], {each.name: 0.0 for each in plant.mechanism.inputs}
-    q, v, forces = {coordinate.name: angle}, {coordinate.speed: speed}, {coordinate.name: torque}
+    coordinate = plant.mechanism.coordinates[0]
+    inputs = {each.name: 0.0 for each in plant.mechanism.inputs}
+    q = {coordinate.name: angle}
+    v = {coordinate.speed: speed}
+    forces = {coordinate.name: torque}
     return float(plant.mechanism.acceleration(q, v, forces, inputs)[coordinate.name])
 
 
 def _torque(plant: Plant, angle: Any, speed: Any, first: Any, second: Any) -> Any:
-    """Torque of both muscles [N m] with their dampers and without friction, at their gauge pressures [Pa]."""
-    mechanism, lengths, name = plant.mechanism, plant.resting_lengths, plant.mechanism.coordinates[0].name
-    here, ahead, behind = (mechanism.contractions({name: angle + i * ANGLE_STEP}, lengths) for i in (0.0, 0.5, -0.5))
+    """Torque of both muscles [N m] with their dampers and without friction, at their gauge
+    pressures [Pa].
+    """
+    mechanism = plant.mechanism
+    lengths = plant.resting_lengths
+    name = plant.mechanism.coordinates[0].name
+    here, ahead, behind = (
+        mechanism.contractions({name: angle + i * ANGLE_STEP}, lengths) for i in (0.0, 0.5, -0.5)
+    )
     tensions = [
-        static_force(muscle, p, c) - muscle.damper.force(p, c, length * (b - a) / ANGLE_STEP * speed)
+        static_force(muscle, p, c)
+        - muscle.damper.force(p, c, length * (b - a) / ANGLE_STEP * speed)
         for muscle, length, p, c, b, a in zip(
             plant.muscles, lengths, (first, second), here, ahead, behind, strict=True
         )
-    ]  # fmt: skip
+    ]
     return mechanism.generalised_forces({name: angle}, tensions, lengths)[name]
 
 
 def task_loop(
-    joint: BenchmarkJoint, law: Controller, task: ControlTask, plant: Plant, drivers: Mapping[str, Driver],
+    joint: BenchmarkJoint,
+    law: Controller,
+    task: ControlTask,
+    plant: Plant,
+    drivers: Mapping[str, Driver],
     signals: TaskSignals | None = None,
-) -> ControlLoop:  # fmt: skip
-    """The control loop of a task at a plant with drivers of its valves; signals other than those of the task."""
+) -> ControlLoop:
+    """The control loop of a task at a plant with drivers of its valves; signals other than those of
+    the task.
+    """
     if TORQUE_INPUT not in plant.inputs:
         raise ParameterError(
             f"task '{task.name}': the plant has no input '{TORQUE_INPUT}'; wrap its mechanism in "
@@ -128,7 +161,11 @@ def task_loop(
         acting = law.actuation if isinstance(law, SensedController) else law
         assert isinstance(acting, ControlLaw)
         faulty = WithStuckValve(acting, task.stuck.input, task.stuck.time, task.stuck.opening)
-        law = dataclasses.replace(law, actuation=faulty) if isinstance(law, SensedController) else faulty
+        law = (
+            dataclasses.replace(law, actuation=faulty)
+            if isinstance(law, SensedController)
+            else faulty
+        )
     setpoint = (signals or task_signals(joint, task)).setpoint(law.setpoints)
     torque = SampledSignal({TORQUE_INPUT: task.torque or ((0.0, 0.0),)})
     return ControlLoop(law, joint.sample_time, setpoint, torque, drivers)
@@ -153,15 +190,16 @@ def _metric(name: str, unit: str, shown: str) -> Any:
 class TrackingMetrics:
     """Metrics of one run of a task; NaN where a metric does not exist for the task.
 
-    rmse, max_error    root mean square and largest magnitude of the error r - y [degree], from the task's begin on
-    itae                integral of (t - t_begin) |e| [degree s^2]
-    settling            time from the event until the error remains within 0.5 degrees [s]; infinite if it does not
-    overshoot           largest excess over the final set point [%] of the motion's change
-    steady              mean magnitude of the error over the last 0.3 s [degree]; NaN for a sine
-    air                 air drawn from the supply, as litres of reference atmosphere per second [l/s (ANR)]
-    strokes             opening travel of all valves [full strokes/s]; for on/off valves openings and closings
-    valve_life          of the busiest valve at this rate and 5e8 full strokes, one closing for each opening [h]
-    stiffness_error     rms of the stiffness of the truth over that wanted, less 1 [%], over the last 0.3 s
+    rmse, max_error    root mean square and largest magnitude of the error r - y [degree], from the
+    task's begin on itae                integral of (t - t_begin) |e| [degree s^2] settling
+    time from the event until the error remains within 0.5 degrees [s]; infinite if it does not
+    overshoot           largest excess over the final set point [%] of the motion's change steady
+    mean magnitude of the error over the last 0.3 s [degree]; NaN for a sine air                 air
+    drawn from the supply, as litres of reference atmosphere per second [l/s (ANR)] strokes
+    opening travel of all valves [full strokes/s]; for on/off valves openings and closings
+    valve_life          of the busiest valve at this rate and 5e8 full strokes, one closing for each
+    opening [h] stiffness_error     rms of the stiffness of the truth over that wanted, less 1 [%],
+    over the last 0.3 s
     """
 
     rmse: float = _metric("rms error", "rad", "deg")
@@ -183,21 +221,29 @@ METRICS = {field.name: field.metadata["column"] for field in dataclasses.fields(
 def track(
     joint: BenchmarkJoint, plant: Plant, task: ControlTask, signals: TaskSignals, record: Recording
 ) -> TrackingMetrics:
-    """The metrics of a run of a task on a true joint; means are over time, by the trapezoidal rule."""
+    """The metrics of a run of a task on a true joint; means are over time, by the trapezoidal
+    rule.
+    """
     time = np.asarray(record["time"], dtype=float)
     angle = np.degrees(np.asarray(record["angle"], dtype=float))
     wanted = np.degrees(np.interp(time, signals.time, signals.angle))
-    judged, error = time >= task.begin - 1e-9, wanted - angle
+    judged = time >= task.begin - 1e-9
+    error = wanted - angle
     late = time >= task.duration - STEADY_TIME - 1e-9
-    magnitude, t = np.abs(error[judged]), time[judged]
+    magnitude = np.abs(error[judged])
+    t = time[judged]
     strokes = valve_travel(plant, record, judged)
     state = (np.asarray(record[name])[late] for name in (*joint.pressures, "angle"))
-    reached = np.asarray(AntagonisticInverse(plant.muscles, plant.mechanism).stiffness(*state), dtype=float)
+    reached = np.asarray(
+        AntagonisticInverse(plant.muscles, plant.mechanism).stiffness(*state), dtype=float
+    )
     stiff = np.interp(time[late], signals.time, signals.stiffness)
     settling = overshoot = math.nan
     if task.event is not None:
         outside = np.flatnonzero((np.abs(error) > SETTLING_BAND) & (time > task.event))
-        settling = float(np.append(time, math.inf)[outside[-1] + 1] - task.event) if outside.size else 0.0
+        settling = (
+            float(np.append(time, math.inf)[outside[-1] + 1] - task.event) if outside.size else 0.0
+        )
         change = wanted[-1] - wanted[0]
         if not (task.torque or task.stiffening or change == 0.0):
             overshoot = max(0.0, 100.0 * float(((angle - wanted[-1]) / change)[judged].max()))
@@ -210,13 +256,17 @@ def track(
         steady=time_mean(time[late], np.abs(error[late])) if task.event is not None else math.nan,
         air=time_mean(t, _drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
         strokes=float(strokes.sum()),
-        valve_life=2.0 * RATED_STROKES / float(strokes.max()) / 3600.0 if strokes.max() > 0 else math.inf,
+        valve_life=(
+            2.0 * RATED_STROKES / float(strokes.max()) / 3600.0 if strokes.max() > 0 else math.inf
+        ),
         stiffness_error=100.0 * math.sqrt(time_mean(time[late], (reached / stiff - 1.0) ** 2)),
     )
 
 
 def _drawn_flow(plant: Plant, record: Recording) -> Array:
-    """The mass flow (N,) [kg/s] from the supplies, also what a stuck valve loses; else that into the muscle."""
+    """The mass flow (N,) [kg/s] from the supplies, also what a stuck valve loses; else that into
+    the muscle.
+    """
     flow = np.zeros(len(record["time"]))
     for muscle, circuit in zip(plant.muscles, plant.circuits, strict=True):
         inner = circuit.circuit if isinstance(circuit, WithTubes) else circuit
@@ -228,7 +278,9 @@ def _drawn_flow(plant: Plant, record: Recording) -> Array:
         pressure = record[tube] if tube in record.columns else record[f"{muscle.name}.pressure"]
         opening = np.asarray(record[f"{muscle.name}.fill"])
         absolute = absolute_pressure(np.asarray(pressure), plant.ambient)
-        flow += np.maximum(inner.fill.mass_flow(air.pressure, absolute, opening, air.temperature), 0.0)
+        flow += np.maximum(
+            inner.fill.mass_flow(air.pressure, absolute, opening, air.temperature), 0.0
+        )
     return flow
 
 

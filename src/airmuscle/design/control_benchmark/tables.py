@@ -1,4 +1,6 @@
-"""Tables of the control benchmark: searches, gains, truths, all metrics, learning and failed runs."""
+"""Tables of the control benchmark: searches, gains, truths, all metrics, learning and failed
+runs.
+"""
 
 import dataclasses
 import math
@@ -18,43 +20,75 @@ ANR = " (ANR)"
 def metric_column(metric: str, values: Sequence[float], **declared: Any) -> TableColumn:
     """The column of a metric."""
     _, unit, shown = METRICS[metric]
-    factor = 1.0 if unit == shown else conversion(shown.removesuffix(ANR), unit.removesuffix(ANR)).factor
+    factor = (
+        1.0 if unit == shown else conversion(shown.removesuffix(ANR), unit.removesuffix(ANR)).factor
+    )
     return TableColumn([factor * value for value in values], unit, shown, **declared)
 
 
 def search_table(joint: BenchmarkJoint, results: Sequence[ContenderResult]) -> Table | None:
-    """The searches for the models: sets of gains, agreement of their descents, objective and its spread."""
-    tuned = [each for each in results if each.tuning is not None and each.contender.tuned_as is None]
+    """The searches for the models: sets of gains, agreement of their descents, objective and its
+    spread.
+    """
+    tuned = [
+        each for each in results if each.tuning is not None and each.contender.tuned_as is None
+    ]
     names = list(dict.fromkeys(each.name for each in tuned))
     if not names:
         return None
-    searches = {name: [each.tuning for each in tuned if each.name == name and each.tuning] for name in names}
+    searches = {
+        name: [each.tuning for each in tuned if each.name == name and each.tuning] for name in names
+    }
     seeds = ", ".join(dict.fromkeys(str(each.seed) for each in results))
     best = {name: [tuning.objective for tuning in found] for name, found in searches.items()}
     columns: dict[str, Any] = {
         "controller": names,
         "gains": [len(found[0].ranges) for found in searches.values()],
         "sets of gains": [max(len(each.history) for each in found) for found in searches.values()],
-        "converged": [f"{sum(each.converged for each in found)} of {len(found)}" for found in searches.values()],
+        "converged": [
+            f"{sum(each.converged for each in found)} of {len(found)}"
+            for found in searches.values()
+        ],
         "restarts": [sum(each.restarts for each in tuned if each.name == name) for name in names],
-        "objective": metric_column("rmse", [sorted(values)[len(values) // 2] for values in best.values()]),
-        "spread": TableColumn([max(v) / min(v) - 1.0 if v[1:] else None for v in best.values()], "1", "%"),
+        "objective": metric_column(
+            "rmse", [sorted(values)[len(values) // 2] for values in best.values()]
+        ),
+        "spread": TableColumn(
+            [max(v) / min(v) - 1.0 if v[1:] else None for v in best.values()], "1", "%"
+        ),
     }
     return Table(
-        "searches", "Searches", columns,
-        f"For {len(joint.family)} models, none of which is a truth; seeds {seeds}. "
-        f"Objective: {joint.objective}, median over the seeds; spread: largest over smallest. A search has "
-        f"converged where its two best descents agree. Where two seeds differ by more than {100 * SEARCH_SPREAD:g} %, "
-        f"the worst one is restarted, at most {RESTARTS} times.",
-    )  # fmt: skip
+        "searches",
+        "Searches",
+        columns,
+        f"For {len(joint.family)} models, none of which is a truth; seeds {seeds}. Objective:"
+        f" {joint.objective}, median over the seeds; spread: largest over smallest. A search has"
+        " converged where its two best descents agree. Where two seeds differ by more than"
+        f" {100 * SEARCH_SPREAD:g} %, the worst one is restarted, at most {RESTARTS} times.",
+    )
 
 
 def gains_table(results: Sequence[ContenderResult]) -> Table | None:
     """The gains of the searches and of the commissionings, in SI units."""
-    rows = [(each.name, each.seed, "models", path, value, "on a bound" if path in each.tuning.on_bound else "")
-            for each in results if each.tuning is not None for path, value in each.tuning.gains.items()]  # fmt: skip
-    rows += [(each.name, each.seed, truth, path, value, f"{found.runs} runs") for each in results
-             for truth, found in each.commissionings.items() for path, value in found.gains.items()]  # fmt: skip
+    rows = [
+        (
+            each.name,
+            each.seed,
+            "models",
+            path,
+            value,
+            "on a bound" if path in each.tuning.on_bound else "",
+        )
+        for each in results
+        if each.tuning is not None
+        for path, value in each.tuning.gains.items()
+    ]
+    rows += [
+        (each.name, each.seed, truth, path, value, f"{found.runs} runs")
+        for each in results
+        for truth, found in each.commissionings.items()
+        for path, value in found.gains.items()
+    ]
     names = ("controller", "seed", "found on", "gain", "value [SI]", "remark")
     return _rows("gains", "Gains", names, rows, shown=False)
 
@@ -65,7 +99,9 @@ def truth_table(joint: BenchmarkJoint) -> Table:
     columns: dict[str, Any] = {"truth": [truth.name for truth in truths]}
     described = [joint.describe(truth) for truth in truths]
     columns |= {key: [each[key] for each in described] for key in described[0]}
-    return Table("truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model.")
+    return Table(
+        "truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model."
+    )
 
 
 def metrics_table(results: Sequence[ContenderResult]) -> Table:
@@ -80,32 +116,58 @@ def metrics_table(results: Sequence[ContenderResult]) -> Table:
     }
     found = [each.runs[key].metrics for each, key in keys]
     for field, (title, _, _) in METRICS.items():
-        columns[title] = metric_column(field, [math.nan if m is None else float(getattr(m, field)) for m in found])
+        columns[title] = metric_column(
+            field, [math.nan if m is None else float(getattr(m, field)) for m in found]
+        )
     return Table(
-        "metrics", "All metrics", columns,
-        f"Settling: until the error remains within {SETTLING_BAND:g} degrees. Steady-state error: mean of the last "
-        f"{STEADY_TIME:g} s. Valve life: of the busiest valve at {RATED_STROKES:g} openings (chosen). Stiffness error: "
-        "of the true stiffness of the muscles against that wanted.",
+        "metrics",
+        "All metrics",
+        columns,
+        f"Settling: until the error remains within {SETTLING_BAND:g} degrees. Steady-state error:"
+        f" mean of the last {STEADY_TIME:g} s. Valve life: of the busiest valve at"
+        f" {RATED_STROKES:g} openings (chosen). Stiffness error: of the true stiffness of the"
+        " muscles against that wanted.",
         shown=False,
-    )  # fmt: skip
+    )
 
 
 def learning_table(curves: Sequence[LearningCurve]) -> Table:
     """The rms errors of repeated trials."""
     columns: dict[str, Any] = {"trial": list(range(1, max(c.errors.size for c in curves) + 1))}
-    columns |= {f"{each.contender}, {each.task.name}": metric_column("rmse", each.errors.tolist()) for each in curves}
-    return Table("learning", "Iterative learning", columns, "rms error of each trial; the first is without learning.")
+    columns |= {
+        f"{each.contender}, {each.task.name}": metric_column("rmse", each.errors.tolist())
+        for each in curves
+    }
+    return Table(
+        "learning",
+        "Iterative learning",
+        columns,
+        "rms error of each trial; the first is without learning.",
+    )
 
 
 def failure_table(results: Sequence[ContenderResult]) -> Table | None:
     """The runs that ended early, with their reasons; None if there are none."""
-    rows = [(each.name, each.seed, *key, run.reason) for each in results for key, run in each.runs.items()
-            if run.metrics is None]  # fmt: skip
-    return _rows("failed", "Runs that ended early", ("controller", "seed", "group", "truth", "task", "reason"), rows)
+    rows = [
+        (each.name, each.seed, *key, run.reason)
+        for each in results
+        for key, run in each.runs.items()
+        if run.metrics is None
+    ]
+    return _rows(
+        "failed",
+        "Runs that ended early",
+        ("controller", "seed", "group", "truth", "task", "reason"),
+        rows,
+    )
 
 
 def _rows(
-    key: str, title: str, names: Sequence[str], rows: Sequence[tuple[object, ...]], shown: bool = True
+    key: str,
+    title: str,
+    names: Sequence[str],
+    rows: Sequence[tuple[object, ...]],
+    shown: bool = True,
 ) -> Table | None:
     """A table of rows; None if there are none."""
     columns = {name: [row[i] for row in rows] for i, name in enumerate(names)}
@@ -116,7 +178,11 @@ def settings_of(joint: BenchmarkJoint) -> tuple[tuple[str, str, str], ...]:
     """The settings of the joint."""
     sensors = list[tuple[str, str, str]]()
     for sensor in joint.sensors:
-        known = {f.name: getattr(sensor, f.name) for f in dataclasses.fields(sensor) if f.name != "column"}
+        known = {
+            f.name: getattr(sensor, f.name)
+            for f in dataclasses.fields(sensor)
+            if f.name != "column"
+        }
         text = ", ".join(f"{name} {value:.4g}" for name, value in known.items() if value)
         sensors.append((f"sensor of {sensor.column}", text, "chosen"))
     return (

@@ -1,4 +1,6 @@
-"""Sizing of muscles for a lift or a joint: shortest muscles of a catalogue, ranked, and a scenario of the choice."""
+"""Sizing of muscles for a lift or a joint: shortest muscles of a catalogue, ranked, and a scenario
+of the choice.
+"""
 
 from ...core.stubs import attach_stub
 

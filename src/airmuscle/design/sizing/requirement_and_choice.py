@@ -1,4 +1,6 @@
-"""Requirements of a sizing, a lift or a joint, conditions of operation, and choices of muscles that meet them."""
+"""Requirements of a sizing, a lift or a joint, conditions of operation, and choices of muscles that
+meet them.
+"""
 
 import dataclasses
 import math
@@ -11,7 +13,13 @@ import numpy as np
 
 from ...core import STANDARD_GRAVITY, Array, ParameterError, ShortRepr, model, parameter
 from ...files.library.entry import Entry
-from ...physics.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal, absolute_pressure
+from ...physics.pneumatics.gas import (
+    GAS_CONSTANT,
+    REFERENCE_DENSITY,
+    Ambient,
+    Isothermal,
+    absolute_pressure,
+)
 from .static_muscle import EndPoint, StaticMuscle
 
 MAX_COUNT = 20
@@ -22,29 +30,38 @@ PATH_POINTS = 33
 
 @model
 class LiftRequirement:
-    """Lift: muscles in parallel move a load over a stroke; F(s) = m g + F_0 + k s at a displacement s from the start.
+    """Lift: muscles in parallel move a load over a stroke; F(s) = m g + F_0 + k s at a displacement
+    s from the start.
 
-    m mass, F_0 constant force, k stiffness of a spring that is relaxed at the start. The load must pull at both ends.
-    The mass adds the force of a harmonic motion over the stroke with the cycle time, m (S/2 - s) (2 pi/T)^2.
+    m mass, F_0 constant force, k stiffness of a spring that is relaxed at the start. The load must
+    pull at both ends. The mass adds the force of a harmonic motion over the stroke with the cycle
+    time, m (S/2 - s) (2 pi/T)^2.
     """
 
     from_file: ClassVar[bool] = False
 
     stroke: float = parameter("m", "S", "stroke", bounds=(1e-4, 10.0))
     mass: float = parameter("kg", "m", "mass of the load", bounds=(0.0, 1e5), default=0.0)
-    force: float = parameter("N", "F_0", "constant force of the load", bounds=(0.0, 1e6), default=0.0)
-    stiffness: float = parameter("N/m", "k", "stiffness of a spring", bounds=(-1e7, 1e7), default=0.0)
+    force: float = parameter(
+        "N", "F_0", "constant force of the load", bounds=(0.0, 1e6), default=0.0
+    )
+    stiffness: float = parameter(
+        "N/m", "k", "stiffness of a spring", bounds=(-1e7, 1e7), default=0.0
+    )
 
     def check(self) -> None:
         for position, place in ((0.0, "start"), (self.stroke, "end")):
             if not self.load(position) > 0.0:
                 raise ParameterError(
-                    f"LiftRequirement: the load at the {place} of the stroke is {self.load(position):.4g} N; it must "
-                    "be greater than 0, because a muscle only pulls. Give a mass, a force, or a spring with a preload."
+                    f"LiftRequirement: the load at the {place} of the stroke is"
+                    f" {self.load(position):.4g} N; it must be greater than 0, because a muscle"
+                    " only pulls. Give a mass, a force, or a spring with a preload."
                 )
 
     def load(self, displacement: Any) -> Any:
-        """Force of the load at rest [N] at a displacement [m] from the start of the stroke; arrays as well."""
+        """Force of the load at rest [N] at a displacement [m] from the start of the stroke; arrays
+        as well.
+        """
         return self.mass * STANDARD_GRAVITY + self.force + self.stiffness * displacement
 
     @property
@@ -54,9 +71,13 @@ class LiftRequirement:
         return displacement, np.broadcast_to(self.load(displacement), displacement.shape)
 
     def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
-        """Least and greatest force of the load [N] at displacements [m], at rest or moving with a cycle time [s]."""
+        """Least and greatest force of the load [N] at displacements [m], at rest or moving with a
+        cycle time [s].
+        """
         held = self.load(displacement)
-        moving = held + self.mass * (0.5 * self.stroke - displacement) * (2 * math.pi / cycle_time) ** 2
+        moving = (
+            held + self.mass * (0.5 * self.stroke - displacement) * (2 * math.pi / cycle_time) ** 2
+        )
         return np.minimum(held, moving), np.maximum(held, moving)
 
     @property
@@ -67,13 +88,17 @@ class LiftRequirement:
     def reduced(self, load: float = 1.0, travel: float = 1.0) -> "LiftRequirement":
         """The requirement with a fraction of the load and of the stroke."""
         return replace(
-            self, mass=load * self.mass, force=load * self.force, stiffness=load * self.stiffness / travel,
+            self,
+            mass=load * self.mass,
+            force=load * self.force,
+            stiffness=load * self.stiffness / travel,
             stroke=travel * self.stroke,
-        )  # fmt: skip
+        )
 
     def describe(self) -> str:
         """Load and stroke as text."""
-        first, last = self.load(0.0), self.load(self.stroke)
+        first = self.load(0.0)
+        last = self.load(self.stroke)
         load = f"{first:.4g} N" if math.isclose(first, last) else f"{first:.4g} to {last:.4g} N"
         load = f"{self.mass:.4g} kg ({load})" if self.mass else load
         return f"{load} over {1e3 * self.stroke:.4g} mm"
@@ -81,27 +106,34 @@ class LiftRequirement:
 
 @model
 class JointRequirement:
-    """Joint: two equal groups of muscles turn a joint over an angle, symmetric about its middle, on equal pulleys.
+    """Joint: two equal groups of muscles turn a joint over an angle, symmetric about its middle, on
+    equal pulleys.
 
-    The torque may act in either direction, also at the ends of the range. The inertia adds the torque of a harmonic
-    motion over the range with the cycle time, J (Theta/2) (2 pi/T)^2, at the ends.
+    The torque may act in either direction, also at the ends of the range. The inertia adds the
+    torque of a harmonic motion over the range with the cycle time, J (Theta/2) (2 pi/T)^2, at the
+    ends.
     """
 
     from_file: ClassVar[bool] = False
 
     angle: float = parameter("rad", "Theta", "range of the angle", bounds=(1e-3, 2 * math.pi))
     torque: float = parameter("N m", "M", "torque of the load", bounds=(0.0, 1e5), default=0.0)
-    inertia: float = parameter("kg m^2", "J", "moment of inertia about the joint axis", bounds=(0.0, 1e4), default=0.0)
+    inertia: float = parameter(
+        "kg m^2", "J", "moment of inertia about the joint axis", bounds=(0.0, 1e4), default=0.0
+    )
 
     def check(self) -> None:
         if not self.torque > 0.0:
             raise ParameterError(
-                "JointRequirement: the torque of the load is 0 N m; it must be greater than 0: with it the joint holds "
-                "the ends of its range. Give the maximum torque of weight, friction or disturbance."
+                "JointRequirement: the torque of the load is 0 N m; it must be greater than 0: with"
+                " it the joint holds the ends of its range. Give the maximum torque of weight,"
+                " friction or disturbance."
             )
 
     def acceleration_torque(self, cycle_time: float) -> float:
-        """Torque that accelerates the inertia at the ends of a harmonic motion with this cycle time [s]; in N m."""
+        """Torque that accelerates the inertia at the ends of a harmonic motion with this cycle time
+        [s]; in N m.
+        """
         return self.inertia * 0.5 * self.angle * (2 * math.pi / cycle_time) ** 2
 
     @property
@@ -111,7 +143,9 @@ class JointRequirement:
 
     def reduced(self, load: float = 1.0, travel: float = 1.0) -> "JointRequirement":
         """The requirement with a fraction of torque and inertia, and of the angle."""
-        return replace(self, torque=load * self.torque, inertia=load * self.inertia, angle=travel * self.angle)
+        return replace(
+            self, torque=load * self.torque, inertia=load * self.inertia, angle=travel * self.angle
+        )
 
     def describe(self) -> str:
         """Torque and angle as text."""
@@ -122,21 +156,34 @@ class JointRequirement:
 class SizingConditions:
     """Conditions of operation of a sizing: supply, safety factor, cycle time and limits of size.
 
-    The muscle holds the safety factor times the load at the working range of pressure, and within its permitted force.
-    The defaults are chosen. A safety factor of at least 1.05 keeps a pressure difference for the flow into the muscle.
+    The muscle holds the safety factor times the load at the working range of pressure, and within
+    its permitted force. The defaults are chosen. A safety factor of at least 1.05 keeps a pressure
+    difference for the flow into the muscle.
     """
 
     from_file: ClassVar[bool] = False
 
-    supply: float = parameter("Pa", "p_s", "supply pressure (gauge)", bounds=(1e4, 2e6), plausible=1e3)
+    supply: float = parameter(
+        "Pa", "p_s", "supply pressure (gauge)", bounds=(1e4, 2e6), plausible=1e3
+    )
     safety_factor: float = parameter(
         "1", "S_F", "factor on the load that the muscle must hold", bounds=(1.05, 20.0), default=1.5
     )
-    cycle_time: float = parameter("s", "T", "time of a cycle, there and back", bounds=(0.02, 1e4), default=2.0)
-    max_length: float = parameter("m", "L_max", "maximum nominal length", bounds=(1e-3, 20.0), default=20.0)
-    max_diameter: float = parameter("m", "D_max", "maximum outer diameter", bounds=(1e-3, 1.0), default=1.0)
+    cycle_time: float = parameter(
+        "s", "T", "time of a cycle, there and back", bounds=(0.02, 1e4), default=2.0
+    )
+    max_length: float = parameter(
+        "m", "L_max", "maximum nominal length", bounds=(1e-3, 20.0), default=20.0
+    )
+    max_diameter: float = parameter(
+        "m", "D_max", "maximum outer diameter", bounds=(1e-3, 1.0), default=1.0
+    )
     min_pressure: float = parameter(
-        "Pa", "p_min", "minimum working pressure; discharge to 0 takes an infinite time", bounds=(0.0, 1e6), default=1e4
+        "Pa",
+        "p_min",
+        "minimum working pressure; discharge to 0 takes an infinite time",
+        bounds=(0.0, 1e6),
+        default=1e4,
     )
     max_count: int = 3
     """Maximum number of muscles in parallel; with a joint, on each side."""
@@ -148,11 +195,13 @@ class SizingConditions:
         for name, least in (("min_count", 1), ("max_count", self.min_count)):
             count = getattr(self, name)
             if isinstance(count, bool) or not least <= count <= MAX_COUNT:
-                raise ParameterError(f"SizingConditions: {name} is {count!r}; allowed range: {least} to {MAX_COUNT}.")
+                raise ParameterError(
+                    f"SizingConditions: {name} is {count!r}; allowed range: {least} to {MAX_COUNT}."
+                )
         if not self.min_pressure < self.supply:
             raise ParameterError(
-                f"SizingConditions: min_pressure is {self.min_pressure:g} Pa; it must be less than the supply "
-                f"pressure, {self.supply:g} Pa."
+                f"SizingConditions: min_pressure is {self.min_pressure:g} Pa; it must be less than"
+                f" the supply pressure, {self.supply:g} Pa."
             )
 
 
@@ -163,12 +212,13 @@ Requirement = LiftRequirement | JointRequirement
 class MuscleDesign(ShortRepr):
     """Design of one requirement: end points of a muscle, pulley radius and force reserve.
 
-    extended    end point at which the muscle is long: start of the lift, stretched muscle of the joint
-    contracted  end point at which the muscle is short
-    reserve     least capacity divided by the need, minus 1, along the stroke of a lift and at the ends of the range of
+    extended    end point at which the muscle is long: start of the lift, stretched muscle of the
+    joint contracted  end point at which the muscle is short reserve     least capacity divided by
+    the need, minus 1, along the stroke of a lift and at the ends of the range of
                 a joint; at least the safety factor minus 1
     radius      pulley radius [m] of a joint; None for a lift
-    radii       minimum and maximum pulley radius [m] of a muscle that is a tenth longer; None for a lift
+    radii       minimum and maximum pulley radius [m] of a muscle that is a tenth longer; None for a
+    lift
     """
 
     extended: EndPoint
@@ -213,25 +263,31 @@ class MuscleChoice(ShortRepr):
     def air(self) -> float | None:
         """Mass of the air [kg] that all muscles take in a cycle; None without a geometry.
 
-        The magnitude of the difference of m = p V/(R T) between both end points, at ambient temperature, without tubes.
+        The magnitude of the difference of m = p V/(R T) between both end points, at ambient
+        temperature, without tubes.
         """
-        masses, ambient = [], self.conditions.ambient
+        masses = []
+        ambient = self.conditions.ambient
         for point in (self.design.contracted, self.design.extended):
             volume = self.muscle.volume(point.pressure, point.contraction)
             if volume is None:
                 return None
-            masses.append(Isothermal().air_mass(absolute_pressure(point.pressure, ambient), volume, ambient))
+            masses.append(
+                Isothermal().air_mass(absolute_pressure(point.pressure, ambient), volume, ambient)
+            )
         return self.total_count * abs(float(masses[0]) - float(masses[1]))
 
     @property
     def reference_volume(self) -> float | None:
-        """Volume of the air of a cycle [m3] at the reference atmosphere of ISO 8778; None without a geometry."""
+        """Volume of the air of a cycle [m3] at the reference atmosphere of ISO 8778; None without a
+        geometry.
+        """
         return None if self.air is None else self.air / REFERENCE_DENSITY
 
     @property
     def air_energy(self) -> float | None:
-        """Available energy [J] of the air of a cycle at the supply pressure p_s, m R T ln(p_s/p_amb) for isothermal
-        expansion; None without a geometry."""
+        """Available energy [J] of the air of a cycle at the supply pressure p_s, m R T
+        ln(p_s/p_amb) for isothermal expansion; None without a geometry."""
         if self.air is None:
             return None
         ambient = self.conditions.ambient
@@ -240,12 +296,16 @@ class MuscleChoice(ShortRepr):
 
     @property
     def efficiency(self) -> float | None:
-        """Work against the load divided by the available energy of the air [1]; None without a geometry."""
+        """Work against the load divided by the available energy of the air [1]; None without a
+        geometry.
+        """
         return None if not self.air_energy else self.requirement.work / self.air_energy
 
     @property
     def diameter(self) -> float | None:
-        """Maximum outer diameter at the contracted end point [m], without the wall; None without a geometry."""
+        """Maximum outer diameter at the contracted end point [m], without the wall; None without a
+        geometry.
+        """
         return self.muscle.diameter(self.design.contracted.contraction)
 
 
@@ -278,19 +338,34 @@ def by_reserve(choice: MuscleChoice) -> float:
     return -choice.design.reserve
 
 
-SORT_KEYS: Mapping[str, SortKey] = MappingProxyType({
-    "air": by_air, "length": by_length, "count": by_count, "reserve": by_reserve, "diameter": by_diameter,
-})  # fmt: skip
+SORT_KEYS: Mapping[str, SortKey] = MappingProxyType(
+    {
+        "air": by_air,
+        "length": by_length,
+        "count": by_count,
+        "reserve": by_reserve,
+        "diameter": by_diameter,
+    }
+)
 """The criteria by their names."""
 
 
 def rank(choices: list[MuscleChoice], sort: SortKey) -> tuple[MuscleChoice, ...]:
-    """The choices by a criterion, equal ones by length, then by number and name. Raises ParameterError."""
+    """The choices by a criterion, equal ones by length, then by number and name. Raises
+    ParameterError.
+    """
     if not callable(sort):
-        raise ParameterError(f"sort is {sort!r}; it must be a function of a choice, such as by_air or by_length.")
+        raise ParameterError(
+            f"sort is {sort!r}; it must be a function of a choice, such as by_air or by_length."
+        )
 
     def order(choice: MuscleChoice) -> tuple[float, float, int, str]:
         value = sort(choice)
-        return (math.inf if value is None else value, choice.length, choice.count, choice.entry.name)
+        return (
+            math.inf if value is None else value,
+            choice.length,
+            choice.count,
+            choice.entry.name,
+        )
 
     return tuple(sorted(choices, key=order))

@@ -1,4 +1,6 @@
-"""Scenario of a choice: a lift with on/off valves or a joint with pressure regulators, as text for `load_scenario`."""
+"""Scenario of a choice: a lift with on/off valves or a joint with pressure regulators, as text for
+`load_scenario`.
+"""
 
 import dataclasses
 import math
@@ -9,28 +11,55 @@ import numpy as np
 
 from ...core import STANDARD_GRAVITY, AirmuscleError, Array, SolveError
 from ...files.library.write import scenario_toml
-from ...physics import AntagonisticJoint, HangingMass, Isotonic, LinearDamper, Mechanism, Muscle, Plant, SpringLoad
-from ...physics.pneumatics import FillDischarge, Orifice, ProportionalRegulator, SecondOrderLag, Supply, Valve
+from ...physics import (
+    AntagonisticJoint,
+    HangingMass,
+    Isotonic,
+    LinearDamper,
+    Mechanism,
+    Muscle,
+    Plant,
+    SpringLoad,
+)
+from ...physics.pneumatics import (
+    FillDischarge,
+    Orifice,
+    ProportionalRegulator,
+    SecondOrderLag,
+    Supply,
+    Valve,
+)
 from ...physics.pneumatics.gas import Isothermal, absolute_pressure
-from .requirement_and_choice import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions
+from .requirement_and_choice import (
+    JointRequirement,
+    LiftRequirement,
+    MuscleChoice,
+    SizingConditions,
+)
 
 STATIONS = 65
 """Stations of the quasi-static path (chosen)."""
 CRITICAL_RATIO = 0.3
 """Critical pressure ratio of the valves (chosen)."""
 TRIAL = 1e-8
-"""Conductance [m3/(s Pa)] for which the time is computed first; the time is inversely proportional to it."""
+"""Conductance [m3/(s Pa)] for which the time is computed first; the time is inversely proportional
+to it.
+"""
 
 
 class AirPath(NamedTuple):
-    """Absolute pressures [Pa] and air masses [kg] of one muscle along the path from long to short, (N,) each."""
+    """Absolute pressures [Pa] and air masses [kg] of one muscle along the path from long to short,
+    (N,) each.
+    """
 
     pressure: Array
     mass: Array
     conditions: SizingConditions
 
     def time(self, orifice: Orifice, *, filling: bool) -> float:
-        """Time [s] in which an open valve fills one muscle from the supply, or discharges it into the surroundings."""
+        """Time [s] in which an open valve fills one muscle from the supply, or discharges it into
+        the surroundings.
+        """
         ambient = self.conditions.ambient
         if filling:
             supply = absolute_pressure(self.conditions.supply, ambient)
@@ -42,28 +71,37 @@ class AirPath(NamedTuple):
 
 
 def air_path(choice: MuscleChoice) -> AirPath:
-    """The quasi-static path of one muscle; with a joint, pressure and contraction are proportional on it.
+    """The quasi-static path of one muscle; with a joint, pressure and contraction are proportional
+    on it.
 
     Raises SolveError for a choice without a geometry.
     """
-    muscle, ambient = choice.muscle, choice.conditions.ambient
+    muscle = choice.muscle
+    ambient = choice.conditions.ambient
     if muscle.muscle is None:
         raise SolveError(
-            f"{choice.entry.name}: the enclosed volume is not known, because its law has no geometry; valves and a "
-            "scenario need it. Write a muscle file with a table [geometry]."
+            f"{choice.entry.name}: the enclosed volume is not known, because its law has no"
+            " geometry; valves and a scenario need it. Write a muscle file with a table"
+            " [geometry]."
         )
-    first, last = choice.design.extended, choice.design.contracted
+    first = choice.design.extended
+    last = choice.design.contracted
     fraction = np.linspace(0.0, 1.0, STATIONS)
     contractions = first.contraction + fraction * (last.contraction - first.contraction)
     if isinstance(choice.requirement, LiftRequirement):
-        loads = [choice.requirement.load(f * choice.requirement.stroke) / choice.count for f in fraction.tolist()]
+        loads = [
+            choice.requirement.load(f * choice.requirement.stroke) / choice.count
+            for f in fraction.tolist()
+        ]
         points = zip(contractions.tolist(), loads, strict=True)
         pressures = np.array([muscle.end_point(eps, load).pressure for eps, load in points])
     else:
         pressures = first.pressure + fraction * (last.pressure - first.pressure)
     volumes = np.array(list(map(muscle.volume, pressures.tolist(), contractions.tolist())))
     absolute = np.asarray(absolute_pressure(pressures, ambient))
-    return AirPath(absolute, np.asarray(Isothermal().air_mass(absolute, volumes, ambient)), choice.conditions)
+    return AirPath(
+        absolute, np.asarray(Isothermal().air_mass(absolute, volumes, ambient)), choice.conditions
+    )
 
 
 def fill_valve(choice: MuscleChoice, duration: float) -> Valve:
@@ -72,26 +110,33 @@ def fill_valve(choice: MuscleChoice, duration: float) -> Valve:
 
 
 def discharge_valve(choice: MuscleChoice, duration: float) -> Valve:
-    """Valve between one muscle and the surroundings that discharges it in a time [s]. Raises SolveError."""
+    """Valve between one muscle and the surroundings that discharges it in a time [s]. Raises
+    SolveError.
+    """
     return _valve(choice, duration, filling=False)
 
 
 def _valve(choice: MuscleChoice, duration: float, *, filling: bool) -> Valve:
     limit = 1e-5
-    conductance = TRIAL * air_path(choice).time(Valve(TRIAL, CRITICAL_RATIO), filling=filling) / duration
+    conductance = (
+        TRIAL * air_path(choice).time(Valve(TRIAL, CRITICAL_RATIO), filling=filling) / duration
+    )
     if not 0.0 < conductance <= limit:
         raise SolveError(
-            f"{choice.entry.name}: to move its air in {duration:.3g} s, a valve needs a sonic conductance of "
-            f"{1e8 * conductance:.4g} dm3/(s bar); allowed range: above 0 to {1e8 * limit:.4g}. Give a longer cycle "
-            "time."
+            f"{choice.entry.name}: to move its air in {duration:.3g} s, a valve needs a sonic"
+            f" conductance of {1e8 * conductance:.4g} dm3/(s bar); allowed range: above 0 to"
+            f" {1e8 * limit:.4g}. Give a longer cycle time."
         )
     return Valve(conductance, CRITICAL_RATIO)
 
 
-MOVING, RESTING = 0.375, 0.125
+MOVING = 0.375
+RESTING = 0.125
 """Parts of the cycle for each motion and for each rest (chosen)."""
 DAMPING_RATIO = 0.7
-"""Damping ratio of the load on the stiffness of the muscles in the middle of the motion (chosen)."""
+"""Damping ratio of the load on the stiffness of the muscles in the middle of the motion
+(chosen).
+"""
 FORCE_MASS = 0.1
 """Moving mass of a load that is a force: this part of the mass with the same weight (chosen)."""
 LAG = SecondOrderLag(20.0)
@@ -99,7 +144,9 @@ LAG = SecondOrderLag(20.0)
 BAND = 5e3
 """Proportional band of a regulator [Pa] (chosen)."""
 JOINT_MASS_TIME = 0.1
-"""Inertia of a joint without a stated one: the torque turns it over its range in this part of the cycle (chosen)."""
+"""Inertia of a joint without a stated one: the torque turns it over its range in this part of the
+cycle (chosen).
+"""
 
 
 def scenario_text(choice: MuscleChoice) -> str:
@@ -109,25 +156,35 @@ def scenario_text(choice: MuscleChoice) -> str:
     """
     is_lift = isinstance(choice.requirement, LiftRequirement)
     plant, inputs, run, is_inertia_chosen = (_lift if is_lift else _joint)(choice)
-    damper = "" if choice.entry.damper is not None else f", the damper (damping ratio {DAMPING_RATIO:g})"
+    damper = (
+        "" if choice.entry.damper is not None else f", the damper (damping ratio {DAMPING_RATIO:g})"
+    )
     inertia = ", the moving mass or inertia" if is_inertia_chosen else ""
     note = (
-        "Sized by airmuscle size; SI units.\n"
-        f"The valves are sized after ISO 6358 to fill and to discharge in {100 * MOVING:.4g} % of the cycle.\n"
-        f"Chosen: this part, the critical pressure ratio of the valves, isothermal air{damper}{inertia}.\n"
+        "Sized by airmuscle size; SI units.\nThe valves are sized after ISO 6358 to fill and to"
+        f" discharge in {100 * MOVING:.4g} % of the cycle.\nChosen: this part, the critical"
+        f" pressure ratio of the valves, isothermal air{damper}{inertia}.\n"
     )
     if is_lift:
         note += (
-            "The times of the valves are for isothermal air: with the default gas, which warms while it fills, they "
-            "lift 3 to 6 % of the stroke too far. Delete the gas to see it, and close a loop where that matters."
+            "The times of the valves are for isothermal air: with the default gas, which warms"
+            " while it fills, they lift 3 to 6 % of the stroke too far. Delete the gas to see it,"
+            " and close a loop where that matters."
         )
     else:
-        note += "Chosen: the regulators, and a pendulum that gives the torque at both ends of the range."
-    return scenario_toml(f"{choice.size}: {choice.requirement.describe()}", plant, inputs, run, note)
+        note += (
+            "Chosen: the regulators, and a pendulum that gives the torque at both ends of the"
+            " range."
+        )
+    return scenario_toml(
+        f"{choice.size}: {choice.requirement.describe()}", plant, inputs, run, note
+    )
 
 
 class SizingScenario(NamedTuple):
-    """The scenario of the first choice that can be simulated: choice, text, and a sentence on it; none without."""
+    """The scenario of the first choice that can be simulated: choice, text, and a sentence on it;
+    none without.
+    """
 
     choice: MuscleChoice | None
     text: str
@@ -135,7 +192,9 @@ class SizingScenario(NamedTuple):
 
 
 def sizing_scenario(choices: Sequence[MuscleChoice], file: str) -> SizingScenario:
-    """The scenario of the first choice that has one; the sentence names `file`, or the reason why there is none."""
+    """The scenario of the first choice that has one; the sentence names `file`, or the reason why
+    there is none.
+    """
     reasons = []
     for rank, choice in enumerate(choices):
         try:
@@ -143,13 +202,18 @@ def sizing_scenario(choices: Sequence[MuscleChoice], file: str) -> SizingScenari
         except AirmuscleError as error:
             reasons.append(str(error))
             continue
-        note = f"The scenario of choice {rank + 1}, {choice.size}, is {file}; run airmuscle simulate with it."
+        note = (
+            f"The scenario of choice {rank + 1}, {choice.size}, is {file}; run airmuscle simulate"
+            " with it."
+        )
         return SizingScenario(choice, text, note)
     return SizingScenario(None, "", f"No scenario is written: {reasons[0]}" if reasons else "")
 
 
 def scenario_valves(choice: MuscleChoice | None) -> tuple[Valve, ...]:
-    """Fill and discharge valve of each muscle in the scenario of a choice; none without a choice."""
+    """Fill and discharge valve of each muscle in the scenario of a choice; none without a
+    choice.
+    """
     if choice is None:
         return ()
     duration = MOVING * choice.conditions.cycle_time
@@ -165,20 +229,31 @@ def _muscles(choice: MuscleChoice, names: tuple[str, ...], damping: float) -> tu
 
 def _stiffness(choice: MuscleChoice) -> float:
     """Stiffness [N/m] of one muscle at constant pressure in the middle between its end points."""
-    muscle, (first, last) = choice.muscle.muscle, (choice.design.extended, choice.design.contracted)
+    muscle = choice.muscle.muscle
+    first, last = (choice.design.extended, choice.design.contracted)
     assert muscle is not None
-    pressure, contraction = 0.5 * (first.pressure + last.pressure), 0.5 * (first.contraction + last.contraction)
+    pressure = 0.5 * (first.pressure + last.pressure)
+    contraction = 0.5 * (first.contraction + last.contraction)
     return max(float(muscle.stiffness(pressure, contraction)), 0.0) / choice.length
 
 
 def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism, float]:
-    """The mechanism of a lift and its moving mass [kg]; the position 0 is that of the muscles at rest."""
-    start, weight = choice.design.extended.contraction * choice.length, requirement.load(0.0)
+    """The mechanism of a lift and its moving mass [kg]; the position 0 is that of the muscles at
+    rest.
+    """
+    start = choice.design.extended.contraction * choice.length
+    weight = requirement.load(0.0)
     mass = requirement.mass or FORCE_MASS * weight / STANDARD_GRAVITY
     if requirement.stiffness < 0.0:
-        raise SolveError("the scenario of a load that decreases over the stroke is not written; give a constant load.")
+        raise SolveError(
+            "the scenario of a load that decreases over the stroke is not written; give a constant"
+            " load."
+        )
     if requirement.stiffness:
-        return SpringLoad(mass, requirement.stiffness, preload=weight - requirement.stiffness * start), mass
+        return (
+            SpringLoad(mass, requirement.stiffness, preload=weight - requirement.stiffness * start),
+            mass,
+        )
     return Isotonic(weight, mass) if requirement.force else HangingMass(mass), mass
 
 
@@ -188,55 +263,85 @@ def _lift(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], 
     cycle = choice.conditions.cycle_time
     mechanism, mass = _load(choice, choice.requirement)
     fill, discharge = scenario_valves(choice)
-    damping = 2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
-    names = tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
-    several, muscles = choice.count > 1, _muscles(choice, names, damping)
+    damping = (
+        2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
+    )
+    names = (
+        tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
+    )
+    several = choice.count > 1
+    muscles = _muscles(choice, names, damping)
     circuit = FillDischarge(Supply(choice.conditions.supply), fill, discharge)
     plant = Plant(
-        muscles if several else muscles[0], (circuit,) * choice.count if several else circuit, mechanism, Isothermal(),
+        muscles if several else muscles[0],
+        (circuit,) * choice.count if several else circuit,
+        mechanism,
+        Isothermal(),
         choice.conditions.ambient,
-    )  # fmt: skip
+    )
     rows = {"fill": (RESTING, RESTING + MOVING), "discharge": (2 * RESTING + MOVING, 1.0)}
     prefixes = [f"{name}." for name in names] if choice.count > 1 else [""]
-    inputs = {f"{prefix}{name}": [[start * cycle, 1.0], [end * cycle, 0.0]]
-              for prefix in prefixes for name, (start, end) in rows.items()}  # fmt: skip
+    inputs = {
+        f"{prefix}{name}": [[start * cycle, 1.0], [end * cycle, 0.0]]
+        for prefix in prefixes
+        for name, (start, end) in rows.items()
+    }
     start = choice.design.extended
     run = {
         "duration": (1.0 + RESTING) * cycle,
         "output_times": cycle / 400.0,
-        "initial_state": {"pressure": start.pressure, "position": start.contraction * choice.length},
+        "initial_state": {
+            "pressure": start.pressure,
+            "position": start.contraction * choice.length,
+        },
     }
     return plant, inputs, run, mass != choice.requirement.mass
 
 
 def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
     """Plant, input signals and run of a joint, and whether its inertia is chosen."""
-    requirement, cycle = choice.requirement, choice.conditions.cycle_time
+    requirement = choice.requirement
+    cycle = choice.conditions.cycle_time
     assert isinstance(requirement, JointRequirement)
     if choice.count > 1:
         raise SolveError(
-            f"{choice.entry.name}: the joint of a scenario has one muscle on each side, not {choice.count}. Give a "
-            "maximum number of 1."
+            f"{choice.entry.name}: the joint of a scenario has one muscle on each side, not"
+            f" {choice.count}. Give a maximum number of 1."
         )
-    design, half = choice.design, 0.5 * requirement.angle
+    design = choice.design
+    half = 0.5 * requirement.angle
     fill, discharge = scenario_valves(choice)  # raises for a choice without a geometry
     assert design.radius is not None
-    inertia = requirement.inertia or requirement.torque * (JOINT_MASS_TIME * cycle) ** 2 / requirement.angle
+    inertia = (
+        requirement.inertia
+        or requirement.torque * (JOINT_MASS_TIME * cycle) ** 2 / requirement.angle
+    )
     stiffness = 2.0 * _stiffness(choice) * design.radius**2
     damping = 2.0 * DAMPING_RATIO * math.sqrt(stiffness * inertia) / (2.0 * design.radius**2)
     weight = requirement.torque / math.sin(min(half, 0.5 * math.pi))
     joint = AntagonisticJoint(
-        design.radius, inertia, weight_torque=weight, min_angle=-1.5 * half, max_angle=1.5 * half,
+        design.radius,
+        inertia,
+        weight_torque=weight,
+        min_angle=-1.5 * half,
+        max_angle=1.5 * half,
         offset=0.5 * (design.extended.contraction + design.contracted.contraction),
-    )  # fmt: skip
+    )
     supply = choice.conditions.supply
-    regulator = ProportionalRegulator(Supply(supply), fill, discharge, LAG, BAND, max_setpoint=supply)
+    regulator = ProportionalRegulator(
+        Supply(supply), fill, discharge, LAG, BAND, max_setpoint=supply
+    )
     muscles = _muscles(choice, ("left", "right"), damping)
     plant = Plant(muscles, (regulator, regulator), joint, Isothermal(), choice.conditions.ambient)
-    low, high = design.extended.pressure, design.contracted.pressure
+    low = design.extended.pressure
+    high = design.contracted.pressure
     middle = 0.5 * (low + high)
     inputs = {
-        f"{name}.setpoint": [[0.0, middle], [RESTING * cycle, first], [(1.0 - MOVING) * cycle, second]]
+        f"{name}.setpoint": [
+            [0.0, middle],
+            [RESTING * cycle, first],
+            [(1.0 - MOVING) * cycle, second],
+        ]
         for name, first, second in (("left", high, low), ("right", low, high))
     }
     run = {

@@ -11,12 +11,17 @@ from .lengths import JointSearch, LiftSearch
 from .static_muscle import at_length, least_sufficient, length_range
 
 LENGTHS = 49
-"""Lengths that are tried for a law that depends on its length, before the shortest is refined (chosen)."""
+"""Lengths that are tried for a law that depends on its length, before the shortest is refined
+(chosen).
+"""
 Search = LiftSearch | JointSearch
 
 
-def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions, count: int = 1) -> MuscleChoice:
-    """The shortest muscles of one type, `count` in parallel (with a joint, on each side), that meet a requirement.
+def choose(
+    entry: Entry, requirement: Requirement, conditions: SizingConditions, count: int = 1
+) -> MuscleChoice:
+    """The shortest muscles of one type, `count` in parallel (with a joint, on each side), that meet
+    a requirement.
 
     Raises SolveError or ParameterError, with the reason, if there are none.
     """
@@ -29,42 +34,60 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
     if design is None:
         raise SolveError(f"{entry.name}: {search.shortfall(muscle, length)}.")
     choice = MuscleChoice(muscle, length, count, design, requirement, conditions)
-    limit, diameter = conditions.max_diameter, choice.diameter
+    limit = conditions.max_diameter
+    diameter = choice.diameter
     if limit == SizingConditions.max_diameter:  # no limit was given
         return choice
     if diameter is None:
         raise ParameterError("its diameter is not known, because its law has no geometry")
     if diameter > limit:
         raise ParameterError(
-            f"its diameter at the contracted end is {1e3 * diameter:.4g} mm; at most {1e3 * limit:.4g} mm is allowed"
+            f"its diameter at the contracted end is {1e3 * diameter:.4g} mm; at most"
+            f" {1e3 * limit:.4g} mm is allowed"
         )
     return choice
 
 
 def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
-    """The static muscle of an entry. Raises ParameterError if it has no working range, with the reason."""
+    """The static muscle of an entry. Raises ParameterError if it has no working range, with the
+    reason.
+    """
     valid = validity_range_of(entry.characteristic, entry.validity_range)
     if valid is None:
-        raise ParameterError("no validity range is stated for its law; add [validity_range] to a muscle file")
+        raise ParameterError(
+            "no validity range is stated for its law; add [validity_range] to a muscle file"
+        )
     if isinstance(entry.series, ElasticSeriesElement):
-        raise ParameterError("it has a series spring, of which the sizing does not know the stretch")
-    limits = {row.quantity: row for row in entry.ratings.ranges()} if entry.ratings is not None else {}
-    rated_pressure, rated_contraction = limits.get("pressure"), limits.get("contraction")
+        raise ParameterError(
+            "it has a series spring, of which the sizing does not know the stretch"
+        )
+    limits = (
+        {row.quantity: row for row in entry.ratings.ranges()} if entry.ratings is not None else {}
+    )
+    rated_pressure = limits.get("pressure")
+    rated_contraction = limits.get("contraction")
     if rated_pressure is not None and not conditions.supply <= rated_pressure.high * (1 + 1e-9):
         raise ParameterError(
             f"the supply pressure of {conditions.supply / 1e5:.4g} bar exceeds the permitted "
             f"{rated_pressure.high / 1e5:.4g} bar; reduce it"
         )
-    low = max(valid.min_pressure, conditions.min_pressure, rated_pressure.low if rated_pressure else -np.inf)
+    low = max(
+        valid.min_pressure,
+        conditions.min_pressure,
+        rated_pressure.low if rated_pressure else -np.inf,
+    )
     high = min(valid.max_pressure, conditions.supply)
     if not low < high:
         raise ParameterError(
-            f"its law is valid from {valid.min_pressure / 1e5:.4g} to {valid.max_pressure / 1e5:.4g} bar; the working "
-            f"range is {conditions.min_pressure / 1e5:.4g} to {conditions.supply / 1e5:.4g} bar"
+            f"its law is valid from {valid.min_pressure / 1e5:.4g} to"
+            f" {valid.max_pressure / 1e5:.4g} bar; the working range is"
+            f" {conditions.min_pressure / 1e5:.4g} to {conditions.supply / 1e5:.4g} bar"
         )
     ranges = [valid.contraction, entry.characteristic.contraction_range]
     ranges += [entry.geometry.contraction_range] if entry.geometry is not None else []
-    ranges += [(rated_contraction.low, rated_contraction.high)] if rated_contraction is not None else []
+    ranges += (
+        [(rated_contraction.low, rated_contraction.high)] if rated_contraction is not None else []
+    )
     contraction = max(r[0] for r in ranges), min(r[1] for r in ranges)
     if not contraction[0] < contraction[1]:
         raise ParameterError("the ranges of contraction of its law and of its maker do not overlap")
@@ -101,11 +124,15 @@ def _depends_on_length(entry: Entry, search: Search, lengths: tuple[float, float
     if own_length(entry) is None:
         return False
     try:
-        first, second = (static_muscle(at_length(entry, length), search.conditions) for length in lengths)
+        first, second = (
+            static_muscle(at_length(entry, length), search.conditions) for length in lengths
+        )
     except ParameterError:  # the law is not defined for the least length
         return True
     if not np.allclose(first.contraction_range, second.contraction_range, rtol=1e-12, atol=1e-12):
         return True
     grid = np.linspace(*first.contraction_range, 17)
-    short, long = (np.asarray(muscle.force(muscle.pressure_range[1], grid)) for muscle in (first, second))
+    short, long = (
+        np.asarray(muscle.force(muscle.pressure_range[1], grid)) for muscle in (first, second)
+    )
     return not np.allclose(short, long, rtol=1e-9, atol=1e-9 * float(np.abs(short).max()))

@@ -1,4 +1,6 @@
-"""Studies of a scenario: designs of experiments, metrics and sensitivities; tuning of a controller's gains."""
+"""Studies of a scenario: designs of experiments, metrics and sensitivities; tuning of a
+controller's gains.
+"""
 
 from ...core.stubs import attach_stub
 

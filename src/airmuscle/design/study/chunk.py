@@ -1,8 +1,9 @@
-"""Execution of a study in chunks: groups of runs, their simulation on any executor, and the files of their results.
+"""Execution of a study in chunks: groups of runs, their simulation on any executor, and the files
+of their results.
 
-The name of a chunk file is the fingerprint of everything that its content depends on. An existing chunk therefore need
-not be computed again, even if the study was interrupted; if an input has changed, no file matches, and the chunk is
-computed.
+The name of a chunk file is the fingerprint of everything that its content depends on. An existing
+chunk therefore need not be computed again, even if the study was interrupted; if an input has
+changed, no file matches, and the chunk is computed.
 """
 
 import dataclasses
@@ -14,7 +15,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import AirmuscleError, Array, FileError, SimulationError, atomic_file, check_writable, program_fingerprint
+from ...core import (
+    AirmuscleError,
+    Array,
+    FileError,
+    SimulationError,
+    atomic_file,
+    check_writable,
+    program_fingerprint,
+)
 from ...core.system import with_prefix
 from ...core.tree import fingerprint
 from ...engine.distribution import DistributedCalls
@@ -30,16 +39,25 @@ RUN_ERRORS = (AirmuscleError, ArithmeticError, ValueError)
 
 
 def simulate_all(scenarios: Sequence[Scenario], times: Array) -> Iterator[Recording | str]:
-    """Simulate scenarios in order, with additional rows at `times` [s]; yield the reason (text) of a failed run.
+    """Simulate scenarios in order, with additional rows at `times` [s]; yield the reason (text) of
+    a failed run.
 
     Raises KeyboardInterrupt if the user interrupts a run.
     """
     for scenario in scenarios:
         try:
             problem = scenario.problem
-            instants = np.append(times[(times >= problem.start_time) & (times < problem.end_time)], problem.end_time)
-            rows = output_times(problem.output_times, problem.start_time, problem.duration, instants)
-            yield solve(dataclasses.replace(problem, output_times=rows)).raise_if_incomplete().recording
+            instants = np.append(
+                times[(times >= problem.start_time) & (times < problem.end_time)], problem.end_time
+            )
+            rows = output_times(
+                problem.output_times, problem.start_time, problem.duration, instants
+            )
+            yield (
+                solve(dataclasses.replace(problem, output_times=rows))
+                .raise_if_incomplete()
+                .recording
+            )
         except RUN_ERRORS as error:
             if isinstance(error, SimulationError) and error.interrupted:
                 raise KeyboardInterrupt from None
@@ -73,11 +91,14 @@ def study_fingerprint(study: Study) -> str:
 def chunk_file_names(study: Study) -> list[str]:
     """The names of the files of all chunks."""
     common = program_fingerprint(), study.fingerprint()
-    return [f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in study.chunks]
+    return [
+        f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in study.chunks
+    ]
 
 
 def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
-    """Run one chunk of the study in a file, its path and fingerprint, in any process; the plants are built there.
+    """Run one chunk of the study in a file, its path and fingerprint, in any process; the plants
+    are built there.
 
     Raises FileError if the study in the file does not have the fingerprint.
     """
@@ -86,8 +107,9 @@ def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
         study = load_study(path)
         if study_fingerprint(study) != identity:
             raise FileError(
-                f"{path}: a worker process has read a different study. Either the file was edited after the start, or "
-                "the worker uses other versions of airmuscle, of its dependencies, or of the files named in the study."
+                f"{path}: a worker process has read a different study. Either the file was edited"
+                " after the start, or the worker uses other versions of airmuscle, of its"
+                " dependencies, or of the files named in the study."
             )
         _loaded[path, identity] = study
     return compute_chunk(_loaded[path, identity], index)
@@ -96,8 +118,12 @@ def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
 def compute_chunk(study: Study, index: int) -> Chunk:
     """The results of one chunk; a failed run is recorded as NaN with its reason."""
     runs = study.chunks[index]
-    scalars, reasons = np.full((len(runs), len(study.scalars)), np.nan), [""] * len(runs)
-    series = {name: np.full((len(runs), each.times.size), np.nan) for name, each in study.time_series.items()}
+    scalars = np.full((len(runs), len(study.scalars)), np.nan)
+    reasons = [""] * len(runs)
+    series = {
+        name: np.full((len(runs), each.times.size), np.nan)
+        for name, each in study.time_series.items()
+    }
     states = study.template.initial_states(*study.varying(runs))
     scenarios: dict[int, Scenario] = {}
     for row, (run, initial_state) in enumerate(zip(runs, states, strict=True)):
@@ -140,22 +166,28 @@ Progress = Callable[[int, int], None]
 
 
 def run_study(
-    study: Study, folder: Path | str | None, executor: Executor | None = None, progress: Progress | None = None
+    study: Study,
+    folder: Path | str | None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> StudyResult:
-    """Compute the runs that are not yet saved in `folder`/chunks, and return the result of all runs.
+    """Compute the runs that are not yet saved in `folder`/chunks, and return the result of all
+    runs.
 
-    folder    None: nothing is saved, for an executor that keeps all results, as that of a shared folder does
-    executor  any executor of concurrent.futures; by default this process itself
+    folder    None: nothing is saved, for an executor that keeps all results, as that of a shared
+    folder does executor  any executor of concurrent.futures; by default this process itself
     progress  called with the number of completed runs and the total number of runs
 
-    The result does not depend on the executor. Completed chunks are saved, even if the study is interrupted or killed:
-    the next call resumes it. A failed run is recorded with its reason. Raises FileError if the folder cannot be written
-    to, SimulationError if a worker process dies.
+    The result does not depend on the executor. Completed chunks are saved, even if the study is
+    interrupted or killed: the next call resumes it. A failed run is recorded with its reason.
+    Raises FileError if the folder cannot be written to, SimulationError if a worker process dies.
     """
     files = _chunk_files(study, Path(folder) / CHUNK_FOLDER) if folder is not None else []
     # before the workers start, so that kernels are compiled only once
     (nominal,) = simulate_all([study.template.scenario], study.metric_times)
-    chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(study, file))}
+    chunks = {
+        index: chunk for index, file in enumerate(files) if (chunk := read_chunk(study, file))
+    }
     missing = [index for index in range(len(study.chunks)) if index not in chunks]
     done = len(study) - sum(len(study.chunks[index]) for index in missing)
     report = progress or (lambda done, total: None)
@@ -168,24 +200,34 @@ def run_study(
             write_chunk(chunk, files[index])
         done += len(study.chunks[index])
         report(done, len(study))
-    joined = {name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in chunks[0]}
+    joined = {
+        name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in chunks[0]
+    }
     return StudyResult(
         study,
         joined["scalars"],
         {name: joined[f"{SERIES}{name}"] for name in study.time_series},
         tuple(map(str, joined["failure_reasons"])),
-        dict.fromkeys(study.scalars, np.nan) if isinstance(nominal, str) else study.scalar_values(nominal),
+        (
+            dict.fromkeys(study.scalars, np.nan)
+            if isinstance(nominal, str)
+            else study.scalar_values(nominal)
+        ),
     )
 
 
 def _chunk_files(study: Study, folder: Path) -> list[Path]:
-    """The files of all chunks in a folder, which is created, without what a study that was killed has left there."""
+    """The files of all chunks in a folder, which is created, without what a study that was killed
+    has left there.
+    """
     check_writable(folder.parent)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or error
-        raise FileError(f"{folder}: cannot be created ({reason}). Choose a folder with write permission.") from None
+        raise FileError(
+            f"{folder}: cannot be created ({reason}). Choose a folder with write permission."
+        ) from None
     for leftover in folder.glob(".*.part"):
         leftover.unlink(missing_ok=True)
     return [folder / name for name in chunk_file_names(study)]
@@ -194,4 +236,6 @@ def _chunk_files(study: Study, folder: Path) -> list[Path]:
 def count_finished_runs(study: Study, folder: Path | str) -> int:
     """The number of runs of a study that are saved in `folder`/chunks."""
     files = (Path(folder) / CHUNK_FOLDER / name for name in chunk_file_names(study))
-    return sum(len(runs) for runs, file in zip(study.chunks, files, strict=True) if read_chunk(study, file))
+    return sum(
+        len(runs) for runs, file in zip(study.chunks, files, strict=True) if read_chunk(study, file)
+    )

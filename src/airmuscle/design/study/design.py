@@ -1,7 +1,7 @@
 """Designs of experiments: grid, Monte Carlo, Latin hypercube, Sobol and Saltelli.
 
-Each design places its points in the unit cube; the variation of each parameter converts a coordinate to a value. The
-same designs therefore serve for levels and for all distributions.
+Each design places its points in the unit cube; the variation of each parameter converts a
+coordinate to a value. The same designs therefore serve for levels and for all distributions.
 """
 
 import abc
@@ -20,8 +20,8 @@ from .paths import read_count
 MAX_RUNS = 10_000_000
 """Maximum number of runs of a study, whose table fits into the memory of a usual computer."""
 HALF_CELL = 2.0**-31
-"""Half the spacing of Sobol points with 30 bits: the minimum distance of a coordinate from 0 and 1, where the quantiles
-of a normal distribution are infinite."""
+"""Half the spacing of Sobol points with 30 bits: the minimum distance of a coordinate from 0 and 1,
+where the quantiles of a normal distribution are infinite."""
 
 
 class Design(abc.ABC):
@@ -42,9 +42,13 @@ class Design(abc.ABC):
         """
         runs = self.run_count(variations)
         if runs > MAX_RUNS:
-            raise ParameterError(f"{type(self).__name__}: {runs:.3g} runs; the maximum is {MAX_RUNS}.")
+            raise ParameterError(
+                f"{type(self).__name__}: {runs:.3g} runs; the maximum is {MAX_RUNS}."
+            )
         points = np.clip(self._unit_points(variations), HALF_CELL, 1.0 - HALF_CELL)
-        return np.column_stack([variation.ppf(points[:, i]) for i, variation in enumerate(variations)])
+        return np.column_stack(
+            [variation.ppf(points[:, i]) for i, variation in enumerate(variations)]
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,15 +61,17 @@ class Grid(Design):
     def _levels(self, variation: Variation) -> tuple[float, ...]:
         if not isinstance(variation, LevelSet):
             raise ParameterError(
-                f"Grid: {variation} has no levels; give a list or a Range, or use a sampling design such as "
-                "LatinHypercube."
+                f"Grid: {variation} has no levels; give a list or a Range, or use a sampling design"
+                " such as LatinHypercube."
             )
         return variation.values
 
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         sizes = [len(self._levels(variation)) for variation in variations]
         indices = np.unravel_index(np.arange(math.prod(sizes)), sizes)
-        return np.column_stack([(index + 0.5) / size for index, size in zip(indices, sizes, strict=True)])
+        return np.column_stack(
+            [(index + 0.5) / size for index, size in zip(indices, sizes, strict=True)]
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,12 +85,14 @@ class SampledDesign(Design):
 
     def __post_init__(self) -> None:
         if self.count < 1:
-            raise ParameterError(f"{type(self).__name__}: count is {self.count}; it must be at least 1.")
+            raise ParameterError(
+                f"{type(self).__name__}: count is {self.count}; it must be at least 1."
+            )
         if self.balanced and self.count & (self.count - 1):
             below = 1 << (self.count.bit_length() - 1)
             raise ParameterError(
-                f"{type(self).__name__}: count is {self.count}; Sobol points are balanced only if their number is a "
-                f"power of two. Use {below} or {2 * below}."
+                f"{type(self).__name__}: count is {self.count}; Sobol points are balanced only if"
+                f" their number is a power of two. Use {below} or {2 * below}."
             )
 
     def run_count(self, variations: Sequence[Variation]) -> int:
@@ -92,7 +100,9 @@ class SampledDesign(Design):
 
 
 class MonteCarlo(SampledDesign):
-    """Independent random points. With a larger count, the points of the smaller design come first."""
+    """Independent random points. With a larger count, the points of the smaller design come
+    first.
+    """
 
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         return np.random.default_rng(self.seed).random((self.count, len(variations)))
@@ -112,7 +122,9 @@ class LatinHypercube(SampledDesign):
 
 
 class Sobol(SampledDesign):
-    """Scrambled Sobol points, a low-discrepancy sequence; `count` is a power of two. A larger count adds points."""
+    """Scrambled Sobol points, a low-discrepancy sequence; `count` is a power of two. A larger count
+    adds points.
+    """
 
     balanced: ClassVar[bool] = True
 
@@ -121,10 +133,12 @@ class Sobol(SampledDesign):
 
 
 class Saltelli(SampledDesign):
-    """Design for variance-based sensitivities: `count` base points, a power of two, give count (d + 2) runs.
+    """Design for variance-based sensitivities: `count` base points, a power of two, give count (d +
+    2) runs.
 
-    Two Sobol samples A and B of d parameters. For each base point: the run A, the d runs A with one parameter taken
-    from B, and the run B. Saltelli et al., Computer Physics Communications 181 (2010) 259-270.
+    Two Sobol samples A and B of d parameters. For each base point: the run A, the d runs A with one
+    parameter taken from B, and the run B. Saltelli et al., Computer Physics Communications 181
+    (2010) 259-270.
     """
 
     balanced: ClassVar[bool] = True

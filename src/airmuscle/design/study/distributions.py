@@ -14,7 +14,9 @@ from ...files.scenario.values import Number
 from .paths import read_count, read_difference
 
 MIN_PROBABILITY = 1e-6
-"""Minimum probability of the range of a truncated distribution, so that its bounds are exact to ten digits."""
+"""Minimum probability of the range of a truncated distribution, so that its bounds are exact to ten
+digits.
+"""
 MAX_LISTED_LEVELS = 6
 """Maximum number of levels that are listed; of more levels, only range and number are printed."""
 
@@ -26,18 +28,28 @@ class Variation(abc.ABC):
     """Fields that must be positive."""
 
     def __post_init__(self) -> None:
-        numbers = {name: value for name, value in vars(self).items() if isinstance(value, float | int)}
+        numbers = {
+            name: value for name, value in vars(self).items() if isinstance(value, float | int)
+        }
         _check_finite(self, *numbers.values())
         for name in self.positive:
             if not numbers[name] > 0:
-                raise ParameterError(f"{type(self).__name__}: {name} is {numbers[name]:g}; it must be positive.")
-        low, high = numbers.get("low", 0.0), numbers.get("high", 1.0)
+                raise ParameterError(
+                    f"{type(self).__name__}: {name} is {numbers[name]:g}; it must be positive."
+                )
+        low = numbers.get("low", 0.0)
+        high = numbers.get("high", 1.0)
         if not low < high:
-            raise ParameterError(f"{type(self).__name__}: low is {low:g} and high is {high:g}; low must be below high.")
+            raise ParameterError(
+                f"{type(self).__name__}: low is {low:g} and high is {high:g}; low must be below"
+                " high."
+            )
 
     @abc.abstractmethod
     def ppf(self, probabilities: Array) -> Array:
-        """The quantiles (N,) at probabilities (N,) in (0, 1): the inverse of the cumulative distribution function."""
+        """The quantiles (N,) at probabilities (N,) in (0, 1): the inverse of the cumulative
+        distribution function.
+        """
 
     @property
     @abc.abstractmethod
@@ -84,8 +96,8 @@ class Range:
         _check_finite(self, self.low, self.high)
         if not 2 <= self.count <= 1_000_000 or self.low == self.high:
             raise ParameterError(
-                f"Range: {self.count} values from {self.low:g} to {self.high:g}; two different ends and 2 to 1000000 "
-                "values are required."
+                f"Range: {self.count} values from {self.low:g} to {self.high:g}; two different ends"
+                " and 2 to 1000000 values are required."
             )
 
     @property
@@ -95,7 +107,9 @@ class Range:
 
 
 class Distribution(Variation):
-    """A continuous probability distribution, of functions of `scipy.special`: `scipy.stats` takes long to import."""
+    """A continuous probability distribution, of functions of `scipy.special`: `scipy.stats` takes
+    long to import.
+    """
 
     @abc.abstractmethod
     def cdf(self, values: Array) -> Array:
@@ -123,7 +137,9 @@ class Uniform(Distribution):
 
 @dataclasses.dataclass(frozen=True)
 class Normal(Distribution):
-    """Normal distribution. It is unbounded: use Truncated if values beyond a bound are impossible."""
+    """Normal distribution. It is unbounded: use Truncated if values beyond a bound are
+    impossible.
+    """
 
     positive: ClassVar[tuple[str, ...]] = ("std",)
     mean: float = custom_field(read_finite_number, "mean")
@@ -147,7 +163,9 @@ class LogNormal(Distribution):
     positive: ClassVar[tuple[str, ...]] = ("median", "log_std")
     median: float = custom_field(read_finite_number, "median")
     log_std: float = custom_field(
-        Number("1"), "standard deviation of the natural logarithm; approximately the relative standard deviation"
+        Number("1"),
+        "standard deviation of the natural logarithm; approximately the relative standard"
+        " deviation",
     )
 
     def ppf(self, probabilities: Array) -> Array:
@@ -169,10 +187,13 @@ class Triangular(Distribution):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.low <= self.mode <= self.high:
-            raise ParameterError(f"Triangular: mode is {self.mode:g}; allowed range: {self.low:g} to {self.high:g}.")
+            raise ParameterError(
+                f"Triangular: mode is {self.mode:g}; allowed range: {self.low:g} to {self.high:g}."
+            )
 
     def ppf(self, probabilities: Array) -> Array:
-        q, c = probabilities, (self.mode - self.low) / (self.high - self.low)
+        q = probabilities
+        c = (self.mode - self.low) / (self.high - self.low)
         unit = np.where(q < c, np.sqrt(c * q), 1.0 - np.sqrt((1.0 - c) * (1.0 - q)))
         return unit * (self.high - self.low) + self.low
 
@@ -193,19 +214,24 @@ def _read_inner(value: Any, unit: str, where: Location) -> Distribution:
 class Truncated(Variation):
     """A distribution truncated to the range between two bounds."""
 
-    inner: Distribution = custom_field(_read_inner, "the distribution to be truncated, a table with a model")
+    inner: Distribution = custom_field(
+        _read_inner, "the distribution to be truncated, a table with a model"
+    )
     low: float = custom_field(read_finite_number, "lower bound")
     high: float = custom_field(read_finite_number, "upper bound")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if not isinstance(self.inner, Distribution):
-            raise ParameterError(f"Truncated: {self.inner!r} is not a continuous distribution; only these are allowed.")
+            raise ParameterError(
+                f"Truncated: {self.inner!r} is not a continuous distribution; only these are"
+                " allowed."
+            )
         below, above = self._probability_range()
         if above - below < MIN_PROBABILITY:
             raise ParameterError(
-                f"Truncated: the probability of {self.low:g} to {self.high:g} in {self.inner} is {above - below:.2g}; "
-                f"it must be at least {MIN_PROBABILITY:g}."
+                f"Truncated: the probability of {self.low:g} to {self.high:g} in {self.inner} is"
+                f" {above - below:.2g}; it must be at least {MIN_PROBABILITY:g}."
             )
 
     def _probability_range(self) -> tuple[float, float]:
@@ -222,22 +248,30 @@ class Truncated(Variation):
         return max(low, self.low), min(high, self.high)
 
 
-DISTRIBUTIONS: dict[str, type[Any]] = {cls.__name__: cls for cls in (Uniform, Normal, LogNormal, Triangular)}
+DISTRIBUTIONS: dict[str, type[Any]] = {
+    cls.__name__: cls for cls in (Uniform, Normal, LogNormal, Triangular)
+}
 """The continuous distributions that may be truncated."""
 VARIATIONS: dict[str, type[Any]] = {"Range": Range, **DISTRIBUTIONS, "Truncated": Truncated}
 """The variations that a study file may name."""
 
 
 def read_variation(value: Any, unit: str, location: Location) -> Variation:
-    """The variation in a list or table of a study file. Raises ParameterError, UnitError or UnknownNameError."""
+    """The variation in a list or table of a study file. Raises ParameterError, UnitError or
+    UnknownNameError.
+    """
     if isinstance(value, list):
         if not value:
             raise ParameterError(f"{location}: the list is empty; give at least one value.")
-        return LevelSet(tuple(read_finite_number(item, unit, f"{location}[{i}]") for i, item in enumerate(value)))
+        return LevelSet(
+            tuple(
+                read_finite_number(item, unit, f"{location}[{i}]") for i, item in enumerate(value)
+            )
+        )
     if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{location} is {abridged(value)}; write a list of values, or a distribution such as {{ model = "Uniform", '
-            "low = ..., high = ... }."
+            f"{location} is {abridged(value)}; write a list of values, or a distribution such as {{"
+            ' model = "Uniform", low = ..., high = ... }.'
         )
     variation = TableReader(classes=VARIATIONS, known=unit).build(value, location)
     return variation.levels if isinstance(variation, Range) else variation

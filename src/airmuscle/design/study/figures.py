@@ -19,14 +19,22 @@ FEW_POINTS = 50
 MAX_LABEL_LENGTH = 28
 """Number of letters that fit below a panel."""
 _DISPLAY_UNITS = {
-    "Pa": (1e-3, "kPa"), "Pa(a)": (1e-3, "kPa(a)"), "m": (1e3, "mm"), "m3": (1e6, "cm³"), "rad": (180 / math.pi, "deg"),
-    "m3/(s Pa)": (1e8, "dm³/(s bar)"), "kg/s": (1e3, "g/s"), "1": (1.0, ""),
-}  # fmt: skip
+    "Pa": (1e-3, "kPa"),
+    "Pa(a)": (1e-3, "kPa(a)"),
+    "m": (1e3, "mm"),
+    "m3": (1e6, "cm³"),
+    "rad": (180 / math.pi, "deg"),
+    "m3/(s Pa)": (1e8, "dm³/(s bar)"),
+    "kg/s": (1e3, "g/s"),
+    "1": (1.0, ""),
+}
 """Factor and unit in which quantities with these SI units are displayed."""
 
 
 def _shown(name: str, unit: str) -> tuple[float, str]:
-    """Factor by which a quantity with an SI unit is displayed, and label of its axis, on two lines if it is long."""
+    """Factor by which a quantity with an SI unit is displayed, and label of its axis, on two lines
+    if it is long.
+    """
     factor, shown = _DISPLAY_UNITS.get(unit, (1.0, unit))
     if len(name) > MAX_LABEL_LENGTH:
         name = f"{name.rpartition('.')[0]}\n.{name.rpartition('.')[2]}"
@@ -39,13 +47,17 @@ def _panels(count: int, height: float = 2.3, **options: Any) -> tuple[Any, Itera
     columns = min(count, PANELS_PER_ROW)
     rows = -(-count // columns)
     width = 3.4 if columns == 1 else 2.5 * columns
-    figure, axes = new_figure(rows, columns, width=width, height=height * rows, squeeze=False, **options)
+    figure, axes = new_figure(
+        rows, columns, width=width, height=height * rows, squeeze=False, **options
+    )
     for axis in axes.flat[count:]:
         axis.set_visible(False)
     return figure, iter(axes.flat[:count])
 
 
-def histogram_figure(study: Study, metrics: Mapping[str, Array], nominal: Mapping[str, float]) -> Any:
+def histogram_figure(
+    study: Study, metrics: Mapping[str, Array], nominal: Mapping[str, float]
+) -> Any:
     """The histogram of each scalar metric over all runs, with its value of the nominal scenario."""
     figure, panels = _panels(len(study.scalars))
     for name, axis in zip(study.scalars, panels, strict=True):
@@ -55,7 +67,9 @@ def histogram_figure(study: Study, metrics: Mapping[str, Array], nominal: Mappin
         axis.yaxis.get_major_locator().set_params(integer=True)
         if values.size:
             equal = np.ptp(values) <= 1e-12 * np.abs(values).max()
-            bins = 1 if equal else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))  # Rice rule
+            bins = (
+                1 if equal else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))
+            )  # Rice rule
             axis.hist(values, bins=bins, color=SKY, edgecolor="white", linewidth=0.4)
         else:
             axis.text(0.5, 0.5, "no values", ha="center", transform=axis.transAxes)
@@ -70,15 +84,23 @@ def scatter_plot(study: Study, name: str, values: Array) -> Plot:
     drawn = finite[:: max(1, -(-finite.size // MAX_POINTS))]
     subset = f" {drawn.size} of {finite.size} runs are drawn." if drawn.size < finite.size else ""
     caption = f"{name} against each varied parameter, one point per run.{subset}"
-    return Plot(f"scatter-{file_stem(name)}", caption, partial(_scatter_figure, study, name, values, drawn))
+    return Plot(
+        f"scatter-{file_stem(name)}", caption, partial(_scatter_figure, study, name, values, drawn)
+    )
 
 
 def _scatter_figure(study: Study, name: str, values: Array, drawn: Any) -> Any:
     figure, panels = _panels(len(study.parameters), sharey=True)
     factor, label = _shown(name, study.units[name])
     few = drawn.size <= FEW_POINTS
-    style = {"marker": "o", "linestyle": "none", "markersize": 5.0 if few else 2.4, "alpha": 0.9 if few else 0.5,
-             "markeredgewidth": 0, "color": BLUE}  # fmt: skip
+    style = {
+        "marker": "o",
+        "linestyle": "none",
+        "markersize": 5.0 if few else 2.4,
+        "alpha": 0.9 if few else 0.5,
+        "markeredgewidth": 0,
+        "color": BLUE,
+    }
     for i, (parameter, axis) in enumerate(zip(study.parameters, panels, strict=True)):
         parameter_factor, parameter_label = _shown(parameter.path, parameter.unit)
         axis.plot(study.values[drawn, i] * parameter_factor, values[drawn] * factor, **style)
@@ -96,9 +118,13 @@ def time_series_figure(study: Study, name: str, rows: Array) -> Any:
     available = np.isfinite(rows).any(axis=0)
     low, median, high = quantiles = np.full((3, available.size), np.nan)
     if available.any():
-        quantiles[:, available] = np.nanquantile(rows[:, available] * factor, [0.05, 0.5, 0.95], axis=0)
+        quantiles[:, available] = np.nanquantile(
+            rows[:, available] * factor, [0.05, 0.5, 0.95], axis=0
+        )
     figure, axis = new_figure()
-    axis.fill_between(series.times, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
+    axis.fill_between(
+        series.times, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs"
+    )
     axis.plot(series.times, median, color=BLUE, label="median")
     axis.set(xlabel="time [s]", ylabel=label)
     legend_below(figure, axis)

@@ -1,7 +1,8 @@
 """Parameter paths: the numbers of a scenario that a study may vary; docs/study.md.
 
-The unit of a field of designs, distributions and metrics is that of the varied parameter, or of the evaluated column:
-such a field is declared with `custom_field` and one of the readers, which receive that unit.
+The unit of a field of designs, distributions and metrics is that of the varied parameter, or of the
+evaluated column: such a field is declared with `custom_field` and one of the readers, which receive
+that unit.
 """
 
 import copy
@@ -20,7 +21,13 @@ from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
 from ...engine.loop.control_loop import ControlLoop
 from ...files.library import Location, model_class, read_finite_number
 from ...files.scenario.controller import controller_number_paths
-from ...files.scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units, scenario_tables
+from ...files.scenario.scenario import (
+    Scenario,
+    build_scenario,
+    initial_pressure,
+    run_column_units,
+    scenario_tables,
+)
 from ...physics.equilibrium import find_equilibrium_of_each
 
 Keys = tuple[str | int, ...]
@@ -29,7 +36,9 @@ Keys = tuple[str | int, ...]
 
 @dataclasses.dataclass(frozen=True)
 class ScenarioParameter:
-    """A number of a scenario: path, unit, bounds, and location: the index of a leaf of the plant, or nested keys."""
+    """A number of a scenario: path, unit, bounds, and location: the index of a leaf of the plant,
+    or nested keys.
+    """
 
     path: str
     unit: str
@@ -48,10 +57,15 @@ class ScenarioTemplate:
     def parameters(self) -> dict[str, ScenarioParameter]:
         """All parameters that may vary, by path."""
         declared = ((leaf.path, leaf.declared) for leaf in leaves(self.scenario.plant))
-        known = {path: ScenarioParameter(path, d.unit, d.bounds, i) for i, (path, d) in enumerate(declared)}
+        known = {
+            path: ScenarioParameter(path, d.unit, d.bounds, i)
+            for i, (path, d) in enumerate(declared)
+        }
         of_input = _input_parameters(self.tables.get("input", {}), self.scenario)
         for keys, unit in (*of_input, *_run_parameters(self.tables["run"], self.scenario)):
-            known[_format_path(keys)] = ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys)
+            known[_format_path(keys)] = ScenarioParameter(
+                _format_path(keys), unit, (-math.inf, math.inf), keys
+            )
         return known
 
     def parameter(self, path: str, where: str) -> ScenarioParameter:
@@ -60,30 +74,46 @@ class ScenarioTemplate:
         check_known(f"{where}: the scenario has no parameter", path, known, "its parameters are")
         return known[path]
 
-    def initial_states(self, varied: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
-        """The initial equilibria of several runs with other parameter values (R, d), computed together.
+    def initial_states(
+        self, varied: Sequence[ScenarioParameter], values: Array
+    ) -> list[dict[str, float] | None]:
+        """The initial equilibria of several runs with other parameter values (R, d), computed
+        together.
 
-        None for a run whose initial state must be computed individually. The values are not validated.
+        None for a run whose initial state must be computed individually. The values are not
+        validated.
         """
         plant = self.scenario.plant
         pressure = initial_pressure(self.tables, self.location, plant)
         if pressure is None or any(
-            p.location[:2] == ("run", "initial_state")
-            if not isinstance(p.location, int)
-            else p.unit == ABSOLUTE and isinstance(pressure, AbsolutePressure)
+            (
+                p.location[:2] == ("run", "initial_state")
+                if not isinstance(p.location, int)
+                else p.unit == ABSOLUTE and isinstance(pressure, AbsolutePressure)
+            )
             for p in varied
         ):
             return [None] * len(values)
         leaf_values = np.repeat(flatten(plant)[None, :], len(values), axis=0)
-        of_plant = {p.path: column for p, column in zip(varied, values.T, strict=True) if isinstance(p.location, int)}
+        of_plant = {
+            p.path: column
+            for p, column in zip(varied, values.T, strict=True)
+            if isinstance(p.location, int)
+        }
         of_plant |= absolute_pressures(plant, of_plant)
         for place, leaf in enumerate(leaves(plant)):
             if leaf.path in of_plant:
                 leaf_values[:, place] = of_plant[leaf.path]
-        pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
-        states = find_equilibrium_of_each(self.scenario.problem.compiled, leaf_values, pressures, inputs)
+        pressures = (pressure,) * len(plant.muscles)
+        inputs = np.zeros(len(plant.inputs))
+        states = find_equilibrium_of_each(
+            self.scenario.problem.compiled, leaf_values, pressures, inputs
+        )
         names = [s.name for s in plant.states]
-        return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in states.tolist()]
+        return [
+            dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None
+            for x in states.tolist()
+        ]
 
     def with_values(
         self,
@@ -93,22 +123,28 @@ class ScenarioTemplate:
     ) -> Scenario:
         """The scenario with other parameter values, validated as if they were in its file.
 
-        The initial state is computed, unless `initial_state` is given. Raises ParameterError or PhysicsError.
+        The initial state is computed, unless `initial_state` is given. Raises ParameterError or
+        PhysicsError.
         """
-        scenario, tables = self.scenario, self.tables
+        scenario = self.scenario
+        tables = self.tables
         leaf_values = [leaf.value for leaf in leaves(scenario.plant)]
         for parameter, value in zip(varied, values, strict=True):
             if isinstance(parameter.location, int):
                 leaf_values[parameter.location] = float(value)
             else:
                 tables = _replace_number(tables, parameter.location, float(value))
-        # the failure reason must be the same on every machine and therefore names the file without its folder
+        # the failure reason must be the same on every machine and therefore names the file without
+        # its folder
         location = dataclasses.replace(self.location, file=Path(self.location.file).name)
-        return build_scenario(tables, location, with_parameters(scenario.plant, leaf_values), initial_state)
+        return build_scenario(
+            tables, location, with_parameters(scenario.plant, leaf_values), initial_state
+        )
 
 
 def changed_scenario(path: str | Path, changes: Mapping[str, str]) -> Scenario:
-    """The scenario of a file or of a plant of the library with other numbers, by their paths: texts with a unit.
+    """The scenario of a file or of a plant of the library with other numbers, by their paths: texts
+    with a unit.
 
     Raises ParameterError for a path that the scenario does not have, and others as `load_scenario`.
     """
@@ -118,7 +154,9 @@ def changed_scenario(path: str | Path, changes: Mapping[str, str]) -> Scenario:
     with ambient_pressure(template.scenario.plant.ambient.pressure):
         values = [quantity(changes[each.path], each.unit, where=each.path) for each in varied]
     made = template.with_values(varied, values)
-    return dataclasses.replace(made, title=f"{made.title}; {', '.join(f'{k} = {v}' for k, v in changes.items())}")
+    return dataclasses.replace(
+        made, title=f"{made.title}; {', '.join(f'{k} = {v}' for k, v in changes.items())}"
+    )
 
 
 def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
@@ -140,7 +178,9 @@ def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[
 
 def _run_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
     """Keys and units of the numbers under [run]."""
-    yield from ((("run", name), "s") for name in ("duration", "start_time", "output_times") if name in table)
+    yield from (
+        (("run", name), "s") for name in ("duration", "start_time", "output_times") if name in table
+    )
     yield ("run", "initial_state", "pressure"), "Pa"
     for coordinate in scenario.plant.mechanism.coordinates:
         yield ("run", "initial_state", coordinate.name), coordinate.unit
@@ -180,7 +220,11 @@ _NUMBER = re.compile(r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 def read_difference(value: Any, unit: str, where: object) -> float:
     """A difference of two quantities, converted without the offset of its unit (degC, bara)."""
-    zero = read_finite_number(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else 0.0
+    zero = (
+        read_finite_number(_NUMBER.sub("0", value, count=1), unit, where)
+        if isinstance(value, str)
+        else 0.0
+    )
     return read_finite_number(value, unit, where) - zero
 
 

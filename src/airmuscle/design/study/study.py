@@ -1,4 +1,6 @@
-"""Study files: a scenario, its varied parameters, the design of experiments and the metrics; docs/study.md."""
+"""Study files: a scenario, its varied parameters, the design of experiments and the metrics;
+docs/study.md.
+"""
 
 import dataclasses
 import functools
@@ -58,7 +60,9 @@ class Study(ShortRepr):
     @property
     def time_series(self) -> dict[str, TimeSeries]:
         """The time series by name."""
-        return {name: metric for name, metric in self.metrics.items() if isinstance(metric, TimeSeries)}
+        return {
+            name: metric for name, metric in self.metrics.items() if isinstance(metric, TimeSeries)
+        }
 
     @property
     def units(self) -> dict[str, str]:
@@ -74,7 +78,10 @@ class Study(ShortRepr):
     def scalar_values(self, recording: Recording) -> dict[str, float]:
         """The scalar metrics of a run."""
         time = recording["time"]
-        return {name: metric.value(time, recording[metric.column]) for name, metric in self.scalars.items()}
+        return {
+            name: metric.value(time, recording[metric.column])
+            for name, metric in self.scalars.items()
+        }
 
     @functools.cached_property
     def chunks(self) -> list[range]:
@@ -82,13 +89,20 @@ class Study(ShortRepr):
         starts = range(0, len(self), self.chunk_size)
         return [range(start, min(start + self.chunk_size, len(self))) for start in starts]
 
-    def varying(self, runs: Sequence[int]) -> tuple[tuple[ScenarioParameter, ...], npt.NDArray[np.float64]]:
+    def varying(
+        self, runs: Sequence[int]
+    ) -> tuple[tuple[ScenarioParameter, ...], npt.NDArray[np.float64]]:
         """The D varied parameters and those that follow them, and their values (R, D) in R runs."""
-        values, followers = self.values[runs], [parameter for parameter, _ in self.follow]
-        return (*self.parameters, *followers), np.hstack([values, values[:, [i for _, i in self.follow]]])
+        values = self.values[runs]
+        followers = [parameter for parameter, _ in self.follow]
+        return (*self.parameters, *followers), np.hstack(
+            [values, values[:, [i for _, i in self.follow]]]
+        )
 
     def scenario(self, run: int, initial_state: dict[str, float] | None = None) -> Scenario:
-        """The scenario of one run. Raises ParameterError or PhysicsError if its parameter values are not valid."""
+        """The scenario of one run. Raises ParameterError or PhysicsError if its parameter values
+        are not valid.
+        """
         parameters, values = self.varying([run])
         return self.template.with_values(parameters, values[0].tolist(), initial_state)
 
@@ -100,9 +114,12 @@ class Study(ShortRepr):
 
 
 def load_study(path: str | Path) -> Study:
-    """Read a study file. Raises FileError, ParameterError, UnitError or UnknownNameError with the location."""
+    """Read a study file. Raises FileError, ParameterError, UnitError or UnknownNameError with the
+    location.
+    """
     file = Path(path)
-    tables, location = read_toml(file), Location.of_file(file)
+    tables = read_toml(file)
+    location = Location.of_file(file)
     check_keys(tables, TABLES, location)
     template = _read_scenario(tables.get("scenario"), location)
     with ambient_pressure(template.scenario.plant.ambient.pressure):  # that of the texts
@@ -110,18 +127,26 @@ def load_study(path: str | Path) -> Study:
         parameters = {name: template.parameter(name, str(location.inside("vary"))) for name in vary}
         variations = []
         for name, parameter in parameters.items():
-            entry, (low, high) = Location(f'{location}, [vary], "{name}"', "", location.folder), parameter.bounds
+            entry = Location(f'{location}, [vary], "{name}"', "", location.folder)
+            low, high = parameter.bounds
             variations.append(read_variation(vary[name], parameter.unit, entry))
-            if outside := [v for v in variations[-1].support if np.isfinite(v) and not low <= v <= high]:
+            if outside := [
+                v for v in variations[-1].support if np.isfinite(v) and not low <= v <= high
+            ]:
                 unit = "" if parameter.unit == "1" else f" {parameter.unit}"
                 allowed = f"{low:g} to {high:g}{unit}"
-                raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {allowed}.")
-        inside, table = location.inside("design"), _require_table(tables, "design", location)
+                raise ParameterError(
+                    f"{entry} includes {outside[0]:g}{unit}; allowed range: {allowed}."
+                )
+        inside = location.inside("design")
+        table = _require_table(tables, "design", location)
         design: Design = TableReader(classes=DESIGNS).build(table, inside)
         with located_errors(inside):
             values = design.values(variations)
         metrics = _require_table(tables, "metrics", location)
-        chunk_size = read_count(tables.get("chunk_size", CHUNK_SIZE), "1", f"{location}, chunk_size")
+        chunk_size = read_count(
+            tables.get("chunk_size", CHUNK_SIZE), "1", f"{location}, chunk_size"
+        )
         if not chunk_size:
             raise ParameterError(f"{location}, chunk_size is 0; it must be at least 1.")
         return Study(
@@ -130,7 +155,9 @@ def load_study(path: str | Path) -> Study:
             template=template,
             parameters=tuple(parameters.values()),
             variations=tuple(variations),
-            follow=_read_follow(tables.get("follow", {}), template, list(parameters), location.inside("follow")),
+            follow=_read_follow(
+                tables.get("follow", {}), template, list(parameters), location.inside("follow")
+            ),
             design=design,
             values=values,
             metrics=_read_metrics(metrics, template.scenario, location.inside("metrics")),
@@ -145,10 +172,12 @@ def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
             return ScenarioTemplate(read_toml(file), Location.of_file(file), load_scenario(file))
     if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{location}: scenario is {abridged(value)}; name a file, scenario = "fill.toml", or write the tables '
-            "[scenario.plant], [scenario.input] and [scenario.run]."
+            f'{location}: scenario is {abridged(value)}; name a file, scenario = "fill.toml", or'
+            " write the tables [scenario.plant], [scenario.input] and [scenario.run]."
         )
-    return ScenarioTemplate(value, location.inside("scenario"), build_scenario(value, location.inside("scenario")))
+    return ScenarioTemplate(
+        value, location.inside("scenario"), build_scenario(value, location.inside("scenario"))
+    )
 
 
 _EXAMPLES = {
@@ -162,8 +191,16 @@ _EXAMPLES = {
 def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
     table = tables.get(key)
     if not isinstance(table, Mapping) or not table:
-        problem = "is missing" if table is None else "is empty" if table == {} else f"is {abridged(table)}, not a table"
-        raise ParameterError(f"{location}: [{key}] {problem}; it must contain an entry, such as {_EXAMPLES[key]}.")
+        problem = (
+            "is missing"
+            if table is None
+            else "is empty"
+            if table == {}
+            else f"is {abridged(table)}, not a table"
+        )
+        raise ParameterError(
+            f"{location}: [{key}] {problem}; it must contain an entry, such as {_EXAMPLES[key]}."
+        )
     return table
 
 
@@ -171,25 +208,35 @@ def _read_follow(
     table: Any, template: ScenarioTemplate, varied: list[str], location: Location
 ) -> tuple[tuple[ScenarioParameter, int], ...]:
     if not isinstance(table, Mapping):
-        raise ParameterError(f'{location} is {abridged(table)}; write "path" = "path of a varied parameter".')
+        raise ParameterError(
+            f'{location} is {abridged(table)}; write "path" = "path of a varied parameter".'
+        )
     followers = []
     for path, leader in table.items():
         parameter = template.parameter(path, str(location))
         if path in varied:
-            raise ParameterError(f"{location}: '{path}' is also under [vary]; remove it from [vary] or from [follow].")
+            raise ParameterError(
+                f"{location}: '{path}' is also under [vary]; remove it from [vary] or from"
+                " [follow]."
+            )
         if leader not in varied:
             near = suggestion(str(leader), varied)
-            raise ParameterError(f"{location}: '{path}' follows {abridged(leader)}, which is not under [vary].{near}")
+            raise ParameterError(
+                f"{location}: '{path}' follows {abridged(leader)}, which is not under [vary].{near}"
+            )
         unit = template.parameter(leader, str(location)).unit
         if unit != parameter.unit:
             raise ParameterError(
-                f"{location}: '{path}' [{parameter.unit}] cannot follow '{leader}' [{unit}]; their units must be equal."
+                f"{location}: '{path}' [{parameter.unit}] cannot follow '{leader}' [{unit}]; their"
+                " units must be equal."
             )
         followers.append((parameter, varied.index(leader)))
     return tuple(followers)
 
 
-def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Location) -> dict[str, Metric]:
+def _read_metrics(
+    tables: Mapping[str, Any], scenario: Scenario, location: Location
+) -> dict[str, Metric]:
     known = run_column_units(scenario.problem)
     metrics: dict[str, Metric] = {}
     for name, table in tables.items():
@@ -197,7 +244,11 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
         column = table.get("column") if isinstance(table, Mapping) else None
         if isinstance(column, str):
             check_known(f"{inner}: a run has no column", column, known, "its columns are")
-        metric = TableReader(classes=METRICS, known=known.get(str(column), "1") or "1").build(table, inner)
+        metric = TableReader(classes=METRICS, known=known.get(str(column), "1") or "1").build(
+            table, inner
+        )
         with located_errors(inner):
-            metrics[name] = metric.clip_to_run(scenario.problem.start_time, scenario.problem.duration)
+            metrics[name] = metric.clip_to_run(
+                scenario.problem.start_time, scenario.problem.duration
+            )
     return metrics

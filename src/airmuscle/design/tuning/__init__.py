@@ -1,4 +1,6 @@
-"""Tuning: gains of a controller for a family of plants, by one optimiser with one budget, in the batch engine."""
+"""Tuning: gains of a controller for a family of plants, by one optimiser with one budget, in the
+batch engine.
+"""
 
 from ...core.stubs import attach_stub
 

@@ -7,19 +7,31 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ShortRepr, abridged, check_field_types, leaves, structure, with_parameters
+from ...core import (
+    Array,
+    ShortRepr,
+    abridged,
+    check_field_types,
+    leaves,
+    structure,
+    with_parameters,
+)
 from ...core.errors import ParameterError, PhysicsError, check_known
 from ...engine.loop import Controller, ControlLoop
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 
 DIGITS = 5
-"""Significant digits of a gain, so that a file contains exactly the gains that were simulated (chosen)."""
+"""Significant digits of a gain, so that a file contains exactly the gains that were simulated
+(chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class GainRange:
-    """The range of one gain [SI]: logarithmic where both bounds have the same sign, otherwise linear."""
+    """The range of one gain [SI]: logarithmic where both bounds have the same sign, otherwise
+    linear.
+    """
 
     path: str
     low: float
@@ -27,7 +39,9 @@ class GainRange:
 
     @property
     def logarithmic(self) -> bool:
-        """Whether the optimiser varies the logarithm of the gain: neither bound is 0 and their signs are equal."""
+        """Whether the optimiser varies the logarithm of the gain: neither bound is 0 and their
+        signs are equal.
+        """
         return self.low * self.high > 0
 
     def to_unit(self, values: Array) -> Array:
@@ -49,18 +63,21 @@ class GainRange:
 def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
     """The ranges of the tuned gains from bounds [SI] by path.
 
-    Raises ParameterError for an unknown path, for bounds that are not a pair, not finite, not in order or outside the
-    declared range of the parameter.
+    Raises ParameterError for an unknown path, for bounds that are not a pair, not finite, not in
+    order or outside the declared range of the parameter.
     """
     if not isinstance(bounds, Mapping) or not bounds:
         what = "empty" if isinstance(bounds, Mapping) else abridged(bounds)
-        raise ParameterError(f'bounds: they are {what}; give a range for each gain, {{"gain": (0.1, 10.0)}}.')
+        raise ParameterError(
+            f'bounds: they are {what}; give a range for each gain, {{"gain": (0.1, 10.0)}}.'
+        )
     known = {leaf.path: leaf for leaf in leaves(controller)}
     check_known(f"bounds: {type(controller).__name__} has no parameter", bounds, known)
     ranges = []
     for path, pair in bounds.items():
         declared = known[path].declared
-        where, (smallest, greatest) = f"bounds: '{path}' ({declared.symbol}, {declared.meaning})", declared.bounds
+        where = f"bounds: '{path}' ({declared.symbol}, {declared.meaning})"
+        smallest, greatest = declared.bounds
         try:
             low, high = (float(bound) for bound in pair)
         except (TypeError, ValueError):
@@ -68,9 +85,14 @@ def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
                 f"{where} is {abridged(pair)}; give two numbers, (minimum, maximum), in SI units."
             ) from None
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(f"{where} is {low:g} to {high:g}; the minimum must be below the maximum, both finite.")
+            raise ParameterError(
+                f"{where} is {low:g} to {high:g}; the minimum must be below the maximum, both"
+                " finite."
+            )
         if low < smallest or high > greatest:
-            raise ParameterError(f"{where} is {low:g} to {high:g}; allowed range: {smallest:g} to {greatest:g}.")
+            raise ParameterError(
+                f"{where} is {low:g} to {high:g}; allowed range: {smallest:g} to {greatest:g}."
+            )
         ranges.append(GainRange(path, low, high))
     return tuple(ranges)
 
@@ -85,7 +107,9 @@ def to_coordinates(ranges: Sequence[GainRange], gains: Mapping[str, float]) -> A
     values = [gains[each.path] for each in ranges]
     if not all(each.low <= value <= each.high for each, value in zip(ranges, values, strict=True)):
         return None
-    return np.array([float(each.to_unit(np.array(v))) for each, v in zip(ranges, values, strict=True)])
+    return np.array(
+        [float(each.to_unit(np.array(v))) for each, v in zip(ranges, values, strict=True)]
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -95,7 +119,8 @@ class LoopCase(ShortRepr):
     name             for tables and messages: "nominal", "load x 2"
     plant, loop      any plant, and the loop that closes it
     initial_state    a value for each state [SI]; the equilibrium at ambient pressure unless given
-    controller_path  place of the tuned controller within `loop.controller`, such as `law` for a WithSensors around it;
+    controller_path  place of the tuned controller within `loop.controller`, such as `law` for a
+    WithSensors around it;
                      empty if it is the controller itself
 
     Cases with the same loop object and plants of one structure are simulated in one batch.
@@ -118,8 +143,9 @@ class LoopCase(ShortRepr):
             part = getattr(part, name, None)
         if not isinstance(part, Controller):
             raise ParameterError(
-                f"case '{self.name}': the controller {type(self.loop.controller).__name__} has no controller at "
-                f"'{self.controller_path}'; give the field that contains the tuned one, such as law."
+                f"case '{self.name}': the controller {type(self.loop.controller).__name__} has no"
+                f" controller at '{self.controller_path}'; give the field that contains the tuned"
+                " one, such as law."
             )
         return part
 
@@ -138,7 +164,9 @@ class LoopCase(ShortRepr):
 
 
 def check_cases(cases: Sequence[LoopCase]) -> tuple[LoopCase, ...]:
-    """The cases as a tuple. Raises ParameterError if there are none, or their tuned controllers differ."""
+    """The cases as a tuple. Raises ParameterError if there are none, or their tuned controllers
+    differ.
+    """
     given = tuple(cases) if isinstance(cases, Sequence) else (cases,)
     wrong = [case for case in given if not isinstance(case, LoopCase)]
     if wrong or not given:
@@ -149,29 +177,37 @@ def check_cases(cases: Sequence[LoopCase]) -> tuple[LoopCase, ...]:
     for case in given[1:]:
         if structure(case.controller) is not structure(first):
             raise ParameterError(
-                f"case '{case.name}': its controller is {type(case.controller).__name__}, which is not that of case "
-                f"'{given[0].name}', {type(first).__name__}; all cases need the same controller. If it is enclosed by "
-                "another law, state controller_path."
+                f"case '{case.name}': its controller is {type(case.controller).__name__}, which is"
+                f" not that of case '{given[0].name}', {type(first).__name__}; all cases need the"
+                " same controller. If it is enclosed by another law, state controller_path."
             )
     return given
 
 
 def check_names(where: str, kind: str, names: Sequence[str]) -> None:
-    """Raise ParameterError, which begins with `where`, for no name, and for a name that two things have."""
+    """Raise ParameterError, which begins with `where`, for no name, and for a name that two things
+    have.
+    """
     if not names:
         raise ParameterError(f"{where}: there is no {kind}; give at least one.")
     if twice := [name for name in names if names.count(name) > 1]:
-        raise ParameterError(f"{where}: two {kind}s are named '{twice[0]}'; give each its own name.")
+        raise ParameterError(
+            f"{where}: two {kind}s are named '{twice[0]}'; give each its own name."
+        )
 
 
 def with_gains(controller: Any, gains: Mapping[str, float]) -> Any:
-    """A controller with other values of some parameters, validated like a new one. Raises ParameterError."""
+    """A controller with other values of some parameters, validated like a new one. Raises
+    ParameterError.
+    """
     present = {leaf.path: leaf.value for leaf in leaves(controller)}
     check_known(f"{type(controller).__name__} has no parameter", gains, present)
     return with_parameters(controller, list({**present, **gains}.values()))
 
 
 def loop_with_gains(case: LoopCase, gains: Mapping[str, float]) -> ControlLoop:
-    """The loop of a case with other gains of the tuned controller, validated. Raises ParameterError."""
+    """The loop of a case with other gains of the tuned controller, validated. Raises
+    ParameterError.
+    """
     within = {case.full_path(path): value for path, value in gains.items()}
     return dataclasses.replace(case.loop, controller=with_gains(case.loop.controller, within))

@@ -16,7 +16,9 @@ from . import CaseMetrics, TrackingIndex
 from .case import LoopCase, loop_with_gains, with_gains
 
 MAX_VALUES = 20_000_000
-"""Values of all columns of one batch, which is 160 MB; more sets of gains are simulated in several batches (chosen)."""
+"""Values of all columns of one batch, which is 160 MB; more sets of gains are simulated in several
+batches (chosen).
+"""
 AIR_MASS = "air_mass"
 """Last part of the name of the states that hold the air of a muscle."""
 
@@ -43,16 +45,24 @@ class CaseGroup:
 
 
 def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGroup, ...]:
-    """The cases in groups that can be simulated together. Raises what an impossible loop or initial state raises."""
+    """The cases in groups that can be simulated together. Raises what an impossible loop or initial
+    state raises.
+    """
     members: dict[Any, list[int]] = {}
     for i, case in enumerate(cases):
-        members.setdefault((id(structure(case.plant)), id(case.loop), case.controller_path), []).append(i)
+        members.setdefault(
+            (id(structure(case.plant)), id(case.loop), case.controller_path), []
+        ).append(i)
     groups = []
     for places in members.values():
         together = tuple(cases[i] for i in places)
-        first, starts = together[0], [case.start() for case in together]
-        table, paths = np.array([flatten(case.plant) for case in together]), [leaf.path for leaf in leaves(first.plant)]
-        varied = {paths[i]: table[:, i] for i in np.flatnonzero((table != table[0]).any(axis=0)).tolist()}
+        first = together[0]
+        starts = [case.start() for case in together]
+        table = np.array([flatten(case.plant) for case in together])
+        paths = [leaf.path for leaf in leaves(first.plant)]
+        varied = {
+            paths[i]: table[:, i] for i in np.flatnonzero((table != table[0]).any(axis=0)).tolist()
+        }
         states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
         outputs = first.plant.outputs(starts[0], dict.fromkeys(first.plant.inputs, 0.0))
         columns = (*(s.name for s in first.plant.states), *outputs)
@@ -63,7 +73,11 @@ def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGr
             raise error.located(f"case '{first.name}'") from None
         air = tuple(s.name for s in first.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
         commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
-        kept = (*(column for name in scales for column in (name, f"{SETPOINT}{name}")), *commands, *air)
+        kept = (
+            *(column for name in scales for column in (name, f"{SETPOINT}{name}")),
+            *commands,
+            *air,
+        )
         groups.append(CaseGroup(np.array(places), together, varied, states, scales, air, kept))
     return tuple(groups)
 
@@ -81,14 +95,16 @@ class Evaluator:
     start_time: float = 0.0
 
     def metrics(self, gains: Array) -> tuple[CaseMetrics, Counter[str]]:
-        """The metrics (E, M) of gains (E, D), and why sets of gains were refused or runs failed, with their numbers.
+        """The metrics (E, M) of gains (E, D), and why sets of gains were refused or runs failed,
+        with their numbers.
 
         Raises KeyboardInterrupt if the user stops the simulation.
         """
         shape = len(gains), len(self.cases)
         air, travel = np.full((2, *shape), np.nan)
         metrics = CaseMetrics(np.full(shape, np.inf), air, travel, np.zeros(shape, bool))
-        possible, reasons = list[int](), Counter[str]()
+        possible = list[int]()
+        reasons = Counter[str]()
         for i, row in enumerate(gains.tolist()):
             try:
                 with_gains(self.cases[0].controller, dict(zip(self.paths, row, strict=True)))
@@ -107,11 +123,15 @@ class Evaluator:
     def _evaluate(
         self, group: CaseGroup, gains: Array, rows: npt.NDArray[np.intp], metrics: CaseMetrics
     ) -> Iterable[str]:
-        """Write the metrics of some sets of gains in the cases of a group; the reasons of failed runs."""
+        """Write the metrics of some sets of gains in the cases of a group; the reasons of failed
+        runs.
+        """
         batch = self._simulate(group, gains[rows])
         if batch.interrupted:
             raise KeyboardInterrupt
-        first, shape, at = group.cases[0], (rows.size, len(group.cases)), np.ix_(rows, group.places)
+        first = group.cases[0]
+        shape = (rows.size, len(group.cases))
+        at = np.ix_(rows, group.places)
         with np.errstate(invalid="ignore", over="ignore"):
             index = self.index.values(batch.time - batch.time[0], batch.columns, group.scales)
         completed = (batch.status == 0) & np.isfinite(index)
@@ -129,8 +149,11 @@ class Evaluator:
         return batch.reasons.values()
 
     def _simulate(self, group: CaseGroup, gains: Array) -> BatchSolution:
-        """The loops of sets of gains (E, D) and m cases as a batch of E m rows, the cases of one set together."""
-        sets, m = len(gains), len(group.cases)
+        """The loops of sets of gains (E, D) and m cases as a batch of E m rows, the cases of one
+        set together.
+        """
+        sets = len(gains)
+        m = len(group.cases)
         first = group.cases[0]
         variations = {path: np.tile(values, sets) for path, values in group.varied.items()}
         loop: ControlLoop | list[ControlLoop] = first.loop
@@ -139,17 +162,30 @@ class Evaluator:
             for i, path in enumerate(self.paths):
                 variations[f"{CONTROLLER}{first.full_path(path)}"] = np.repeat(gains[:, i], m)
         else:
-            of_set = (loop_with_gains(first, dict(zip(self.paths, row, strict=True))) for row in gains.tolist())
+            of_set = (
+                loop_with_gains(first, dict(zip(self.paths, row, strict=True)))
+                for row in gains.tolist()
+            )
             loop = [each for each in of_set for _ in range(m)]
         with hidden_progress():
             return simulate_batch(
-                first.plant, variations, loop, duration=self.duration, output_times=first.loop.sample_time,
-                initial_states={name: np.tile(values, sets) for name, values in group.initial_states.items()},
-                integrator=self.integrator, keep=group.kept, start_time=self.start_time,
-            )  # fmt: skip
+                first.plant,
+                variations,
+                loop,
+                duration=self.duration,
+                output_times=first.loop.sample_time,
+                initial_states={
+                    name: np.tile(values, sets) for name, values in group.initial_states.items()
+                },
+                integrator=self.integrator,
+                keep=group.kept,
+                start_time=self.start_time,
+            )
 
 
 def joined_metrics(parts: Sequence[CaseMetrics]) -> CaseMetrics:
     """The metrics of several groups of sets of gains as those of one."""
     fields = ("index", "air", "travel", "completed")
-    return CaseMetrics(*(np.concatenate([getattr(each, name) for each in parts]) for name in fields))
+    return CaseMetrics(
+        *(np.concatenate([getattr(each, name) for each in parts]) for name in fields)
+    )

@@ -14,7 +14,14 @@ from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
 from .case import GainRange, LoopCase, check_cases, gain_ranges, to_coordinates, to_gains
 from .evaluation import Evaluator, group_cases, joined_metrics
-from .objective import CaseMetrics, Objective, RobustObjective, RootMeanSquareError, TrackingIndex, TuningHistory
+from .objective import (
+    CaseMetrics,
+    Objective,
+    RobustObjective,
+    RootMeanSquareError,
+    TrackingIndex,
+    TuningHistory,
+)
 from .result import Tuning
 
 FIRST_WIDTH = 0.25
@@ -22,17 +29,23 @@ FIRST_WIDTH = 0.25
 
 
 class EvolutionStrategy:
-    """Covariance matrix adaptation from a first mean (D,); points outside the unit cube are moved to its surface.
+    """Covariance matrix adaptation from a first mean (D,); points outside the unit cube are moved
+    to its surface.
 
-    A generation x_i = m + s N(0, C) is ranked. The mean m is the weighted mean of its better half; the covariance C
-    follows the steps that led to them (rank mu) and the path of the mean (rank one), the step size s the length of that
-    path. Only ranks count, so that a discontinuous objective, or one with failed runs, is permitted. Reference: Hansen
-    (2016).
+    A generation x_i = m + s N(0, C) is ranked. The mean m is the weighted mean of its better half;
+    the covariance C follows the steps that led to them (rank mu) and the path of the mean (rank
+    one), the step size s the length of that path. Only ranks count, so that a discontinuous
+    objective, or one with failed runs, is permitted. Reference: Hansen (2016).
     """
 
     def __init__(self, mean: Array, random: np.random.Generator) -> None:
         d = mean.size
-        self.mean, self._random, self._step, self._covariance = mean.copy(), random, FIRST_WIDTH, np.eye(d)
+        self.mean, self._random, self._step, self._covariance = (
+            mean.copy(),
+            random,
+            FIRST_WIDTH,
+            np.eye(d),
+        )
         self.size = max(8, 4 + int(3 * math.log(d)))
         parents = self.size // 2
         weights = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
@@ -60,20 +73,26 @@ class EvolutionStrategy:
 
     def tell(self, points: Array, values: Array) -> None:
         """Adapt the distribution to the values (S,) of a generation (S, D); smaller is better."""
-        d, mass = self.mean.size, self._mass
+        d = self.mean.size
+        mass = self._mass
         steps = (points[np.argsort(values)[: self._weights.size]] - self.mean) / self._step
         move = self._weights @ steps
-        self.mean, self._generations = self.mean + self._step * move, self._generations + 1
+        self.mean = self.mean + self._step * move
+        self._generations = self._generations + 1
         eigenvalues, axes = np.linalg.eigh(self._covariance)
         whitened = axes @ ((axes.T @ move) / np.sqrt(eigenvalues))
         rate = self._step_rate
-        self._step_path = (1 - rate) * self._step_path + math.sqrt(rate * (2 - rate) * mass) * whitened
+        self._step_path = (1 - rate) * self._step_path + math.sqrt(
+            rate * (2 - rate) * mass
+        ) * whitened
         length = float(np.linalg.norm(self._step_path))
         settled = math.sqrt(1 - (1 - rate) ** (2 * self._generations))
         short = 1.0 if length / settled < (1.4 + 2 / (d + 1)) * self._usual else 0.0
         rate = self._path_rate
         self._path = (1 - rate) * self._path + short * math.sqrt(rate * (2 - rate) * mass) * move
-        old = (1 - self._rank_one - self._rank_mu + (1 - short) * self._rank_one * rate * (2 - rate)) * self._covariance
+        old = (
+            1 - self._rank_one - self._rank_mu + (1 - short) * self._rank_one * rate * (2 - rate)
+        ) * self._covariance
         self._covariance = (
             old
             + self._rank_one * np.outer(self._path, self._path)
@@ -87,8 +106,11 @@ SETS_OF_A_TASK = 4
 """Sets of gains of one task of an executor (chosen: a generation has eight or more)."""
 MIN_SETS = 8
 """Smallest first generation, and smallest number of sets of gains of a budget (chosen)."""
-PATIENCE, TOLERANCE = 8, 0.005
-"""A descent ends where so many generations lower the objective by less than this part of it (chosen)."""
+PATIENCE = 8
+TOLERANCE = 0.005
+"""A descent ends where so many generations lower the objective by less than this part of it
+(chosen).
+"""
 AGREEMENT = 0.02
 """Relative difference of the objectives within which two descents agree (chosen)."""
 APART = 0.25
@@ -97,74 +119,118 @@ Progress = Callable[[int, int], None]
 
 
 def tune(
-    cases: Sequence[LoopCase], bounds: Mapping[str, tuple[float, float]], *, duration: float,
-    index: TrackingIndex = RootMeanSquareError(), objective: Objective = RobustObjective(), budget: int = 4000,
-    seed: int = 0, start: Sequence[Mapping[str, float]] = (), start_time: float = 0.0,
-    integrator: Integrator | None = None, progress: Progress | None = None, workers: Workers = 1,
-) -> Tuning:  # fmt: skip
+    cases: Sequence[LoopCase],
+    bounds: Mapping[str, tuple[float, float]],
+    *,
+    duration: float,
+    index: TrackingIndex = RootMeanSquareError(),
+    objective: Objective = RobustObjective(),
+    budget: int = 4000,
+    seed: int = 0,
+    start: Sequence[Mapping[str, float]] = (),
+    start_time: float = 0.0,
+    integrator: Integrator | None = None,
+    progress: Progress | None = None,
+    workers: Workers = 1,
+) -> Tuning:
     """Find the gains of a controller that minimise an objective over a family of cases.
 
     cases       the family: LoopCase with the same controller; the first one is the nominal case
-    bounds      minimum and maximum [SI] of each gain by its path in the controller; see `GainRange` for the scale
-    duration    of each run [s]
-    index       tracking index of a run, evaluated at the sampling instants
-    objective   from the metrics (E, M) of E sets of gains in M cases to values (E,); smaller is better
-    budget      maximum number of simulated loops: sets of gains times cases
-    seed        of the optimiser; the same seed gives the same result on any number of cores
-    start       sets of gains for the first generation, such as those of tuning rules; the present gains of the
-                controller are always among them if they are within the bounds, so that the result is never worse
+    bounds      minimum and maximum [SI] of each gain by its path in the controller; see `GainRange`
+    for the scale duration    of each run [s] index       tracking index of a run, evaluated at the
+    sampling instants objective   from the metrics (E, M) of E sets of gains in M cases to values
+    (E,); smaller is better budget      maximum number of simulated loops: sets of gains times cases
+    seed        of the optimiser; the same seed gives the same result on any number of cores start
+    sets of gains for the first generation, such as those of tuning rules; the present gains of the
+                controller are always among them if they are within the bounds, so that the result
+                is never worse
     start_time, integrator  as in simulate_batch
     progress    called with the number of loops simulated so far, and the budget
-    workers     number of processes, for several of which a script needs `if __name__ == "__main__":`, or an executor;
+    workers     number of processes, for several of which a script needs `if __name__ ==
+    "__main__":`, or an executor;
                 by default this process, which uses all cores. The result does not depend on it
 
-    The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every controller. The first
-    generation are Sobol points, from whose best one a descent begins; further descents begin at other points of it. The
-    search ends as converged where the two best descents agree (`Tuning.converged`), otherwise with the budget. It
-    requires bounds alone, accepts a discontinuous objective (saturation, switchings, failed runs), and evaluates a
-    generation at once, which is one batch on all cores. A set of gains that fails in a share p of the cases ranks
+    The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every
+    controller. The first generation are Sobol points, from whose best one a descent begins; further
+    descents begin at other points of it. The search ends as converged where the two best descents
+    agree (`Tuning.converged`), otherwise with the budget. It requires bounds alone, accepts a
+    discontinuous objective (saturation, switchings, failed runs), and evaluates a generation at
+    once, which is one batch on all cores. A set of gains that fails in a share p of the cases ranks
     behind all that do not, in the order of p; its objective is infinite.
 
-    If the user interrupts, the best gains so far are returned (`Tuning.interrupted`), unless there are none. Raises
-    ParameterError for impossible cases, bounds or options, SimulationError if every set of gains fails.
+    If the user interrupts, the best gains so far are returned (`Tuning.interrupted`), unless there
+    are none. Raises ParameterError for impossible cases, bounds or options, SimulationError if
+    every set of gains fails.
     """
     family = check_cases(cases)
     duration = _check_options(duration, index, objective, budget, seed, len(family))
     ranges = gain_ranges(family[0].controller, bounds)
     paths = tuple(each.path for each in ranges)
-    evaluator = Evaluator(family, group_cases(family, index), paths, duration, index, integrator, start_time)
+    evaluator = Evaluator(
+        family, group_cases(family, index), paths, duration, index, integrator, start_time
+    )
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
     given = search.given(start)
     with process_pool(workers) as executor:
         interrupted = search.run(given, seed, executor)
     if not search.values:
         raise KeyboardInterrupt
-    gains, values = np.concatenate(search.gains), np.concatenate(search.values)
+    gains = np.concatenate(search.gains)
+    values = np.concatenate(search.values)
     history = TuningHistory(paths, gains, values, joined_metrics(search.metrics))
     result = Tuning(
-        family, ranges, index, evaluator.groups[0].scales, objective, duration, start_time, seed, budget, history,
-        search.present_count, search.converged, interrupted,
-    )  # fmt: skip
+        family,
+        ranges,
+        index,
+        evaluator.groups[0].scales,
+        objective,
+        duration,
+        start_time,
+        seed,
+        budget,
+        history,
+        search.present_count,
+        search.converged,
+        interrupted,
+    )
     if not math.isfinite(result.objective):
-        reason = next((each for each, _ in search.reasons.most_common(1)), "the index is not finite")
+        reason = next(
+            (each for each, _ in search.reasons.most_common(1)), "the index is not finite"
+        )
         raise SimulationError(
-            f"tune: each of {len(result.history)} sets of gains fails in at least one case; most frequent reason: "
-            f"{reason}. Narrow the bounds, check the set point, or leave out the cases that no controller can hold."
+            f"tune: each of {len(result.history)} sets of gains fails in at least one case; most"
+            f" frequent reason: {reason}. Narrow the bounds, check the set point, or leave out the"
+            " cases that no controller can hold."
         )
     return result
 
 
-def _check_options(duration: Any, index: Any, objective: Any, budget: Any, seed: Any, count: int) -> float:
-    if isinstance(duration, bool) or not isinstance(duration, int | float) or not 0 < duration < math.inf:
+def _check_options(
+    duration: Any, index: Any, objective: Any, budget: Any, seed: Any, count: int
+) -> float:
+    if (
+        isinstance(duration, bool)
+        or not isinstance(duration, int | float)
+        or not 0 < duration < math.inf
+    ):
         raise ParameterError(f"tune: duration is {duration!r} s; it must be positive and finite.")
     if not isinstance(index, TrackingIndex):
-        raise ParameterError(f"tune: index is {index!r}; give a TrackingIndex, such as RootMeanSquareError().")
+        raise ParameterError(
+            f"tune: index is {index!r}; give a TrackingIndex, such as RootMeanSquareError()."
+        )
     if not callable(objective):
-        raise ParameterError(f"tune: objective is {objective!r}; give RobustObjective() or a function of CaseMetrics.")
+        raise ParameterError(
+            f"tune: objective is {objective!r}; give RobustObjective() or a function of"
+            " CaseMetrics."
+        )
     for name, value, least in (("budget", budget, MIN_SETS * count), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            why = f", {MIN_SETS} sets of gains for each of {count} cases" if name == "budget" else ""
-            raise ParameterError(f"tune: {name} is {value!r}; it must be a whole number of at least {least}{why}.")
+            why = (
+                f", {MIN_SETS} sets of gains for each of {count} cases" if name == "budget" else ""
+            )
+            raise ParameterError(
+                f"tune: {name} is {value!r}; it must be a whole number of at least {least}{why}."
+            )
     return float(duration)
 
 
@@ -172,24 +238,37 @@ class _Search:
     """One search: it evaluates populations and records them."""
 
     def __init__(
-        self, evaluator: Evaluator, ranges: tuple[GainRange, ...], objective: Objective, budget: int, progress: Progress
+        self,
+        evaluator: Evaluator,
+        ranges: tuple[GainRange, ...],
+        objective: Objective,
+        budget: int,
+        progress: Progress,
     ) -> None:
-        self.evaluator, self.ranges, self.objective, self.progress = evaluator, ranges, objective, progress
+        self.evaluator = evaluator
+        self.ranges = ranges
+        self.objective = objective
+        self.progress = progress
         self.budget, self.sets = budget, budget // len(evaluator.cases)
         self.present_count, self.converged, self.reasons = 0, False, Counter[str]()
         self.gains, self.metrics, self.values = list[Array](), list[CaseMetrics](), list[Array]()
-        self._calls, self._sets_of_a_task = DistributedCalls(None, Evaluator.metrics, evaluator), self.sets
+        self._calls = DistributedCalls(None, Evaluator.metrics, evaluator)
+        self._sets_of_a_task = self.sets
 
     @property
     def population(self) -> int:
-        """The number of points of the first generation: the power of two from 8 D on, at most half the budget."""
+        """The number of points of the first generation: the power of two from 8 D on, at most half
+        the budget.
+        """
         size = max(MIN_SETS, 1 << math.ceil(math.log2(8 * len(self.ranges))))
         while size > MIN_SETS and 2 * size > self.sets:
             size //= 2
         return size
 
     def given(self, start: Sequence[Mapping[str, float]]) -> list[Array]:
-        """The coordinates (D,) of the present gains, if they are within the ranges, and of those given."""
+        """The coordinates (D,) of the present gains, if they are within the ranges, and of those
+        given.
+        """
         present = {leaf.path: leaf.value for leaf in leaves(self.evaluator.cases[0].controller)}
         own = to_coordinates(self.ranges, present)
         self.present_count = 0 if own is None else 1
@@ -198,10 +277,15 @@ class _Search:
             check_known(f"tune: start {number} names", gains, self.evaluator.paths, "bounds names")
             point = to_coordinates(self.ranges, {**present, **gains})
             if point is None:
-                raise ParameterError(f"tune: start {number} is outside the bounds: {dict(gains)}. Extend the bounds.")
+                raise ParameterError(
+                    f"tune: start {number} is outside the bounds: {dict(gains)}. Extend the bounds."
+                )
             points.append(point)
         if len(points) > self.population:
-            raise ParameterError(f"tune: {len(start)} starts; at most {self.population - 1} fit the first generation.")
+            raise ParameterError(
+                f"tune: {len(start)} starts; at most {self.population - 1} fit the first"
+                " generation."
+            )
         return points
 
     def run(self, given: list[Array], seed: int, executor: Executor | None) -> bool:
@@ -211,12 +295,19 @@ class _Search:
         if executor is not None:
             self._calls = DistributedCalls(executor, Evaluator.metrics, self.evaluator)
             self._sets_of_a_task = SETS_OF_A_TASK
-        first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
+        first = qmc.Sobol(
+            d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)
+        ).random(self.population)
         first[: len(given)] = given if given else first[:0]
-        random, ends, used = np.random.default_rng([seed, 1]), list[float](), list[Array]()
+        random = np.random.default_rng([seed, 1])
+        ends = list[float]()
+        used = list[Array]()
         try:
             for start in first[np.argsort(self._energies(first), kind="stable")]:
-                if any(float(np.linalg.norm(start - other)) < APART * math.sqrt(start.size) for other in used):
+                if any(
+                    float(np.linalg.norm(start - other)) < APART * math.sqrt(start.size)
+                    for other in used
+                ):
                     continue
                 used.append(start)
                 strategy = EvolutionStrategy(start, random)
@@ -246,7 +337,9 @@ class _Search:
         return math.inf
 
     def _energies(self, coordinates: Array) -> Array:
-        """The energies (S,) of points (S, D): the objective, or a large number by the share of failed runs."""
+        """The energies (S,) of points (S, D): the objective, or a large number by the share of
+        failed runs.
+        """
         gains = to_gains(self.ranges, np.clip(coordinates, 0.0, 1.0))
         size = self._sets_of_a_task
         parts = self._calls.results([gains[i : i + size] for i in range(0, len(gains), size)])
@@ -255,10 +348,15 @@ class _Search:
             self.reasons.update(reasons)
         values = np.asarray(self.objective(metrics), dtype=float)
         if values.shape != (len(gains),):
-            raise ParameterError(f"tune: the objective returned {values.shape}; it must return ({len(gains)},) values.")
+            raise ParameterError(
+                f"tune: the objective returned {values.shape}; it must return ({len(gains)},)"
+                " values."
+            )
         values = np.where(np.isnan(values), np.inf, values)
         self.gains.append(gains)
         self.metrics.append(metrics)
         self.values.append(values)
         self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.budget)
-        return np.where(np.isfinite(values), values, 1e30 * (1.0 + (1.0 - metrics.completed.mean(axis=1))))
+        return np.where(
+            np.isfinite(values), values, 1e30 * (1.0 + (1.0 - metrics.completed.mean(axis=1)))
+        )

@@ -1,4 +1,6 @@
-"""Scenario of a control loop: its cases, the default ranges of its gains, and the same file with other gains."""
+"""Scenario of a control loop: its cases, the default ranges of its gains, and the same file with
+other gains.
+"""
 
 import dataclasses
 import math
@@ -21,14 +23,18 @@ from .perturbations import Perturbations, PerturbedFamily, muscle_paths, perturb
 SPAN = 10.0
 """Factor of the default range of a gain, below and above its present value (chosen)."""
 ROUNDING = 1e-15
-"""Relative difference by the conversion of a unit, within which a written gain is that which was simulated."""
+"""Relative difference by the conversion of a unit, within which a written gain is that which was
+simulated.
+"""
 CONTROLLER_KEYS = ("input", "controller")
 """Keys of the controller in a scenario."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ScenarioLoop(ShortRepr):
-    """A scenario file with a control loop whose gains are tuned: its path, text, tables and scenario."""
+    """A scenario file with a control loop whose gains are tuned: its path, text, tables and
+    scenario.
+    """
 
     path: Path
     text: str
@@ -47,42 +53,65 @@ class ScenarioLoop(ShortRepr):
         return Location.of_file(self.path)
 
     def family(self, perturbations: Perturbations, seed: int = 0) -> PerturbedFamily:
-        """The cases of the perturbed plants, each with the initial state that the scenario gives it."""
+        """The cases of the perturbed plants, each with the initial state that the scenario gives
+        it.
+        """
         return perturbed_family(
-            self.scenario.plant, self.loop, perturbations, initial_state=self._initial_state,
-            uncertainties=self._uncertainties(), fitted=self.scenario.uncertainty, seed=seed,
-        )  # fmt: skip
+            self.scenario.plant,
+            self.loop,
+            perturbations,
+            initial_state=self._initial_state,
+            uncertainties=self._uncertainties(),
+            fitted=self.scenario.uncertainty,
+            seed=seed,
+        )
 
     def _initial_state(self, plant: Plant) -> Mapping[str, float]:
         if plant is self.scenario.plant:
             return self.scenario.initial_state
-        tables = {name: table for name, table in self.tables.items() if name != "uncertainty"}  # of the plant as fitted
+        tables = {
+            name: table for name, table in self.tables.items() if name != "uncertainty"
+        }  # of the plant as fitted
         return build_scenario(tables, self.location, plant).initial_state
 
     def _uncertainties(self) -> list[ParameterUncertainty | None]:
-        """The uncertainty of each muscle, of the parameters that the scenario takes from the muscle file unchanged."""
+        """The uncertainty of each muscle, of the parameters that the scenario takes from the muscle
+        file unchanged.
+        """
         tables = self.tables["plant"].get("muscle", [])
-        named, muscles = tables if isinstance(tables, list) else [tables], self.scenario.plant.muscles
+        named = tables if isinstance(tables, list) else [tables]
+        muscles = self.scenario.plant.muscles
         found: list[ParameterUncertainty | None] = [None] * len(muscles)
-        for i, value in enumerate(named if len(named) == len(muscles) else []):  # otherwise of a plant of the library
+        for i, value in enumerate(
+            named if len(named) == len(muscles) else []
+        ):  # otherwise of a plant of the library
             name = value.get("library") if isinstance(value, Mapping) else value
             if not isinstance(name, str):
                 continue
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", AirmuscleWarning)  # it was issued when the scenario was loaded
+                warnings.simplefilter(
+                    "ignore", AirmuscleWarning
+                )  # it was issued when the scenario was loaded
                 entry = load_law(self.path.parent / name if name.endswith(".toml") else name)
             if entry.uncertainty is not None:
-                of_file, of_plant = ({leaf.path: leaf.value for leaf in leaves(m)} for m in (entry.muscle, muscles[i]))
+                of_file, of_plant = (
+                    {leaf.path: leaf.value for leaf in leaves(m)}
+                    for m in (entry.muscle, muscles[i])
+                )
                 paths = muscle_paths(entry.uncertainty, "")
-                found[i] = entry.uncertainty.part(p in of_plant and of_file.get(p) == of_plant[p] for p in paths)
+                found[i] = entry.uncertainty.part(
+                    p in of_plant and of_file.get(p) == of_plant[p] for p in paths
+                )
         return found
 
     def bounds(self, given: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
-        """The ranges [SI] of the tuned gains: those given as `gain=5 1/m:500 1/m`, or the default ranges.
+        """The ranges [SI] of the tuned gains: those given as `gain=5 1/m:500 1/m`, or the default
+        ranges.
 
-        By default every gain (unit u/y) that is not 0 and every time (unit s) next to it that is not 0 and no filter is
-        tuned, from a tenth of its present value to ten times it, within the declared range. Of a controller without
-        such a gain, every parameter in the unit of the command or of the measured column that is not 0.
+        By default every gain (unit u/y) that is not 0 and every time (unit s) next to it that is
+        not 0 and no filter is tuned, from a tenth of its present value to ten times it, within the
+        declared range. Of a controller without such a gain, every parameter in the unit of the
+        command or of the measured column that is not 0.
         """
         if given:
             return dict(self._read_bounds(text) for text in given)
@@ -90,8 +119,8 @@ class ScenarioLoop(ShortRepr):
         if not ranges:
             name = type(self.loop.controller).__name__
             raise ParameterError(
-                f"{self.location.inside('input').inside('controller')}: no parameter of {name} with the unit u/y, u or "
-                "y differs from 0; state the ranges of the gains as bounds."
+                f"{self.location.inside('input').inside('controller')}: no parameter of {name} with"
+                " the unit u/y, u or y differs from 0; state the ranges of the gains as bounds."
             )
         return ranges
 
@@ -99,11 +128,18 @@ class ScenarioLoop(ShortRepr):
         path, equals, values = text.partition("=")
         low, colon, high = values.partition(":")
         if not (equals and colon):
-            raise ParameterError(f"bounds '{text}' must be a gain, its minimum and its maximum: 'gain=5 1/m:500 1/m'.")
+            raise ParameterError(
+                f"bounds '{text}' must be a gain, its minimum and its maximum: 'gain=5 1/m:500"
+                " 1/m'."
+            )
         known = {leaf.path: leaf for leaf in leaves(self.loop.controller)}
         path = path.strip()
-        check_known(f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter", path, known)
-        unit, ambient, read = self.unit(known[path]), self.scenario.plant.ambient.pressure, list[float]()
+        check_known(
+            f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter", path, known
+        )
+        unit = self.unit(known[path])
+        ambient = self.scenario.plant.ambient.pressure
+        read = list[float]()
         for value in (low, high):
             try:
                 read.append(float(value))
@@ -117,9 +153,11 @@ class ScenarioLoop(ShortRepr):
         return parameter_units(self.loop.controller, known)[leaf.path]
 
     def with_gains(self, gains: Mapping[str, float]) -> str:
-        """The text of the file with other gains [SI]; all else, comments and units included, is unchanged.
+        """The text of the file with other gains [SI]; all else, comments and units included, is
+        unchanged.
 
-        Raises ParameterError for a gain that the controller does not have, or a value that it does not accept.
+        Raises ParameterError for a gain that the controller does not have, or a value that it does
+        not accept.
         """
         import tomlkit
 
@@ -132,21 +170,25 @@ class ScenarioLoop(ShortRepr):
             for key in keys:
                 table = table[key]
             present = table[last] if isinstance(last, int) or last in table else None
-            table[last] = _written(value, present, self.unit(known[path]), self.scenario.plant.ambient.pressure)
+            table[last] = _written(
+                value, present, self.unit(known[path]), self.scenario.plant.ambient.pressure
+            )
         return tomlkit.dumps(document)
 
     def save(self, gains: Mapping[str, float], path: Path) -> Path:
         """Write the file with other gains [SI]; the file is complete or unchanged.
 
-        Files that the scenario names are relative to the new file. Raises FileError or, if these are not found there,
-        what `load_scenario` raises.
+        Files that the scenario names are relative to the new file. Raises FileError or, if these
+        are not found there, what `load_scenario` raises.
         """
         text = self.with_gains(gains)
         self.check_target(path, text)
         return write_text(path, text)
 
     def check_target(self, path: Path, text: str = "") -> None:
-        """Raise what `save` raises for a path that is a folder, or from which files of the scenario are not found."""
+        """Raise what `save` raises for a path that is a folder, or from which files of the scenario
+        are not found.
+        """
         if path.is_dir():
             raise FileError(f"{path}: is a folder; name a file in it.")
         with located_errors(f"{path} cannot take the place of {self.path}"):
@@ -156,15 +198,17 @@ class ScenarioLoop(ShortRepr):
 def load_scenario_loop(path: str | Path) -> ScenarioLoop:
     """The scenario file of a control loop.
 
-    Raises FileError, ParameterError, UnitError or UnknownNameError with the location; ParameterError for a plant of the
-    library, which is no file, and for a scenario without a controller.
+    Raises FileError, ParameterError, UnitError or UnknownNameError with the location;
+    ParameterError for a plant of the library, which is no file, and for a scenario without a
+    controller.
     """
     tables, location = scenario_tables(path)
     scenario = build_scenario(tables, location)
     if not isinstance(scenario.problem.input, ControlLoop):
         raise ParameterError(
-            f"{location}: there is no [input.controller]; tune needs a controller with its gains, sample_time and "
-            "setpoint. Of a plant of the library write a scenario file with [plant] library and [input.controller]."
+            f"{location}: there is no [input.controller]; tune needs a controller with its gains,"
+            " sample_time and setpoint. Of a plant of the library write a scenario file with"
+            " [plant] library and [input.controller]."
         )
     return ScenarioLoop(Path(path), Path(path).read_bytes().decode("utf-8-sig"), tables, scenario)
 
@@ -176,9 +220,12 @@ def _default_ranges(known: Sequence[Leaf]) -> dict[str, tuple[float, float]]:
     gains = gains or [leaf for leaf in nonzero if leaf.declared.unit in ("u", "y")]
     laws = {leaf.path.rpartition(".")[0] for leaf in gains}
     times = [
-        leaf for leaf in nonzero
-        if leaf.declared.unit == "s" and "filter" not in leaf.path and leaf.path.rpartition(".")[0] in laws
-    ]  # fmt: skip
+        leaf
+        for leaf in nonzero
+        if leaf.declared.unit == "s"
+        and "filter" not in leaf.path
+        and leaf.path.rpartition(".")[0] in laws
+    ]
     ranges = {}
     for leaf in (*gains, *times):
         low, high = sorted((leaf.value / SPAN, leaf.value * SPAN))

@@ -1,6 +1,8 @@
-"""From a system over `ops` to machine code: trace, differentiate, print, compile. Nothing here solves anything.
+"""From a system over `ops` to machine code: trace, differentiate, print, compile. Nothing here
+solves anything.
 
-Its names are imported on use, because compiling brings CasADi, which a description of a system does not need.
+Its names are imported on use, because compiling brings CasADi, which a description of a system does
+not need.
 """
 
 from ...core.stubs import attach_stub

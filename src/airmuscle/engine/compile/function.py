@@ -1,4 +1,6 @@
-"""Expressions as compiled functions of arrays, rates with disturbances, partial derivatives, and event indicators."""
+"""Expressions as compiled functions of arrays, rates with disturbances, partial derivatives, and
+event indicators.
+"""
 
 import dataclasses
 import functools
@@ -24,21 +26,26 @@ LANES = 8
 
 
 class Function:
-    """CasADi expressions of vectors, compiled: `address` is that of a function of the inputs' and outputs' arrays.
+    """CasADi expressions of vectors, compiled: `address` is that of a function of the inputs' and
+    outputs' arrays.
 
-    A matrix is written row by row. With `lanes` above 1 the function computes so many points at once: each element of
-    an input or output is a row of so many numbers, in arrays that are aligned as vectors must be (`aligned_array`).
-    The machine code lives as long as this object.
+    A matrix is written row by row. With `lanes` above 1 the function computes so many points at
+    once: each element of an input or output is a row of so many numbers, in arrays that are aligned
+    as vectors must be (`aligned_array`). The machine code lives as long as this object.
     """
 
     def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any], lanes: int = 1) -> None:
         import casadi
 
         number = LlvmType(lanes=lanes)
-        rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
+        rows = {
+            name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()
+        }
         printer = Printer(LlvmLanguage(number))
         printer.add("function", inputs, rows)
-        parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]
+        parts = [
+            vector_math.definition(name, count, number) for name, count in printer.needed.items()
+        ]
         if lanes > 1:
             parts.insert(0, vector_math.declarations({number}))
         self._module = Module("\n".join([*parts, printer.module()]))
@@ -47,13 +54,15 @@ class Function:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AugmentedRates:
-    """Compiled functions of z = (x, theta, d): states (n,), parameters that are estimated, and disturbances of rates.
+    """Compiled functions of z = (x, theta, d): states (n,), parameters that are estimated, and
+    disturbances of rates.
 
-    rates(z, u, c, f, A)      f (n,) rates with f_i + d_i where there is a disturbance, A = df/dz (n, N)
-    measured(z, u, c, y, C)   measured columns (p,) and dy/dz (p, N)
-    outputs(z, u, c, o)       all outputs (k,)
+    rates(z, u, c, f, A)      f (n,) rates with f_i + d_i where there is a disturbance, A = df/dz
+    (n, N) measured(z, u, c, y, C)   measured columns (p,) and dy/dz (p, N) outputs(z, u, c, o)
+    all outputs (k,)
 
-    `constants` is the array c. Parameters and disturbances have no rates: they are constant but for noise.
+    `constants` is the array c. Parameters and disturbances have no rates: they are constant but for
+    noise.
     """
 
     module: Module
@@ -64,10 +73,13 @@ class AugmentedRates:
 
 
 def augmented_rates(
-    ready: CompiledSystem, measured: Sequence[int], parameters: Sequence[int], disturbed: Sequence[int]
+    ready: CompiledSystem,
+    measured: Sequence[int],
+    parameters: Sequence[int],
+    disturbed: Sequence[int],
 ) -> AugmentedRates:
-    """The functions of a system; `measured` are columns among states and outputs, `parameters` indices of leaves and
-    `disturbed` indices of states."""
+    """The functions of a system; `measured` are columns among states and outputs, `parameters`
+    indices of leaves and `disturbed` indices of states."""
     import casadi
 
     t = ready.program.traced
@@ -76,12 +88,15 @@ def augmented_rates(
     values = [t.p[i] for i in range(t.p.numel())]
     for k, index in enumerate(parameters, n):
         values[index] = z[k]
-    f, o = casadi.Function("system", [t.x, t.u, t.p], [t.f, t.o])(z[:n], t.u, casadi.vertcat(*values))
+    f, o = casadi.Function("system", [t.x, t.u, t.p], [t.f, t.o])(
+        z[:n], t.u, casadi.vertcat(*values)
+    )
     for k, index in enumerate(disturbed, n + len(parameters)):
         f[index] += z[k]
     columns = casadi.vertcat(z[:n], o)
     y = casadi.vertcat(*(columns[i] for i in measured))
-    printer, point = Printer(), {"z": z, "u": t.u, PARAMETERS: t.p}
+    printer = Printer()
+    point = {"z": z, "u": t.u, PARAMETERS: t.p}
     printer.add("rates", point, {"f": casadi.densify(f), "A": _by_row(casadi.jacobian(f, z))})
     printer.add("measured", point, {"y": casadi.densify(y), "C": _by_row(casadi.jacobian(y, z))})
     printer.add("outputs", point, {"o": casadi.densify(o)})
@@ -96,10 +111,20 @@ def _by_row(matrix: Any) -> Any:
     return casadi.densify(casadi.vec(matrix.T))
 
 
-def states_and_outputs(functions: AugmentedRates, count: int, states: Array, inputs: Array, outputs: int) -> Array:
-    """States and outputs (M, n + k) at augmented states (M, N) under inputs (M, m); `count` is n, `outputs` is k."""
+def states_and_outputs(
+    functions: AugmentedRates, count: int, states: Array, inputs: Array, outputs: int
+) -> Array:
+    """States and outputs (M, n + k) at augmented states (M, N) under inputs (M, m); `count` is n,
+    `outputs` is k.
+    """
     values = np.empty((len(states), outputs))
-    evaluate(functions.outputs, functions.constants, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
+    evaluate(
+        functions.outputs,
+        functions.constants,
+        np.ascontiguousarray(states),
+        np.ascontiguousarray(inputs),
+        values,
+    )
     return np.hstack([states[:, :count], values])
 
 
@@ -115,9 +140,15 @@ class Derivatives:
     outputs_by_input: Array
 
 
-def derivatives(ready: CompiledSystem, state: Sequence[float], inputs: Sequence[float]) -> Derivatives:
-    """The derivatives at a state vector (n,) under inputs (m,). At a kink they are those of one of its sides."""
-    results = _function(ready.program)(np.asarray(state, float), np.asarray(inputs, float), ready.parameters)
+def derivatives(
+    ready: CompiledSystem, state: Sequence[float], inputs: Sequence[float]
+) -> Derivatives:
+    """The derivatives at a state vector (n,) under inputs (m,). At a kink they are those of one of
+    its sides.
+    """
+    results = _function(ready.program)(
+        np.asarray(state, float), np.asarray(inputs, float), ready.parameters
+    )
     f, o, *slopes = (np.asarray(part, dtype=float) for part in results)
     return Derivatives(f[:, 0], o.reshape(-1), *slopes)
 
@@ -133,12 +164,16 @@ def _function(program: Program) -> Any:
 
 
 Place = tuple[int, int]
-"""Row among the rates followed by the outputs, and column among the states followed by the inputs."""
+"""Row among the rates followed by the outputs, and column among the states followed by the
+inputs.
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Partials:
-    """The non-zeros of d(f, o)/d(x, u): instructions for their values, and the places where they stand."""
+    """The non-zeros of d(f, o)/d(x, u): instructions for their values, and the places where they
+    stand.
+    """
 
     code: Code
     places: tuple[Place, ...]
@@ -151,25 +186,38 @@ class Partials:
 def partials(t: TracedSystem) -> Partials:
     """The partial derivatives of a traced system."""
     code = recorded([t.x, t.u, t.p], [t.f, t.o])
-    n, m = t.x.numel(), t.u.numel()
-    tape, results = Tape(code.body), code.results(0, n) + code.results(1, t.o.numel())
-    values = jacobian.nonzeros(tape, results, [*(("in", 0, j) for j in range(n)), *(("in", 1, j) for j in range(m))])
+    n = t.x.numel()
+    m = t.u.numel()
+    tape = Tape(code.body)
+    results = code.results(0, n) + code.results(1, t.o.numel())
+    values = jacobian.nonzeros(
+        tape, results, [*(("in", 0, j) for j in range(n)), *(("in", 1, j) for j in range(m))]
+    )
     outputs = tuple((0, k, operand) for k, operand in enumerate(values.values()))
     return Partials(finished(Code(tuple(tape.body), outputs)), tuple(values))
 
 
-_COMPARISONS = frozenset({
-    Operation.LESS, Operation.LESS_EQUAL, Operation.FMIN, Operation.FMAX, Operation.MINIMUM, Operation.MAXIMUM,
-})  # fmt: skip
+_COMPARISONS = frozenset(
+    {
+        Operation.LESS,
+        Operation.LESS_EQUAL,
+        Operation.FMIN,
+        Operation.FMAX,
+        Operation.MINIMUM,
+        Operation.MAXIMUM,
+    }
+)
 _OF_ZERO = frozenset({Operation.ABS, Operation.SIGN})
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class EventIndicators:
-    """The instructions that compute `count` event indicators: differences of values that the rates compare.
+    """The instructions that compute `count` event indicators: differences of values that the rates
+    compare.
 
-    They change sign where the rates are continuous but their slopes are not, for instance where a stop is touched, a
-    flow chokes or reverses, or a friction element begins to slip. An integrator of variable order restarts there.
+    They change sign where the rates are continuous but their slopes are not, for instance where a
+    stop is touched, a flow chokes or reverses, or a friction element begins to slip. An integrator
+    of variable order restarts there.
     """
 
     code: Code
@@ -187,13 +235,17 @@ class EventIndicators:
         return [block.stored["z", i] for i in range(self.count)]
 
     def scales(self, x: Array, u: Array, p: Array, sizes: Array) -> list[float]:
-        """The magnitude of each indicator: its largest change if one state changes by its nominal size, else 1."""
+        """The magnitude of each indicator: its largest change if one state changes by its nominal
+        size, else 1.
+        """
         at = self.values(x, u, p)
         greatest = [0.0] * self.count
         for i, size in enumerate(sizes):
             moved = self.values(x + size * (np.arange(x.size) == i), u, p)
             changes = [abs(b - a) for a, b in zip(at, moved, strict=True)]
-            greatest = [max(g, c) if math.isfinite(c) else g for g, c in zip(greatest, changes, strict=True)]
+            greatest = [
+                max(g, c) if math.isfinite(c) else g for g, c in zip(greatest, changes, strict=True)
+            ]
         return [value or 1.0 for value in greatest]
 
 
@@ -213,6 +265,9 @@ def event_indicators(t: TracedSystem) -> EventIndicators:
                 pairs.setdefault(frozenset(line.arguments), (line.arguments[0], line.arguments[1]))
             elif line.operation in _OF_ZERO:
                 pairs.setdefault(frozenset({line.arguments[0], ZERO}), (line.arguments[0], ZERO))
-    body += [Instruction(Operation.SUBTRACT, ("t", "z", i), pair) for i, pair in enumerate(pairs.values())]
+    body += [
+        Instruction(Operation.SUBTRACT, ("t", "z", i), pair)
+        for i, pair in enumerate(pairs.values())
+    ]
     outputs = tuple((0, i, ("t", "z", i)) for i in range(len(pairs)))
     return EventIndicators(finished(Code(tuple(body), outputs)), len(pairs))

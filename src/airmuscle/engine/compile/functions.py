@@ -18,14 +18,18 @@ from .text.body import NO_LABEL
 
 LLVM = LlvmLanguage()
 PARAMETERS = "p"
-"""The argument of a traced function that holds parameters; it is replaced by what `prepare` left in `c`."""
+"""The argument of a traced function that holds parameters; it is replaced by what `prepare` left in
+`c`.
+"""
 POINT = ("x", "u", PARAMETERS)
 """The arguments that rates and outputs depend on."""
 
 
 @dataclasses.dataclass(frozen=True)
 class TracedSystem:
-    """A system as CasADi expressions: states x, inputs u, their slopes w, parameters p, rates f, outputs o."""
+    """A system as CasADi expressions: states x, inputs u, their slopes w, parameters p, rates f,
+    outputs o.
+    """
 
     x: Any
     u: Any
@@ -42,23 +46,30 @@ class TracedSystem:
 
 
 def trace_system(system: System) -> TracedSystem:
-    """Call a system once with symbols; raises TraceError where that does not give finite expressions."""
+    """Call a system once with symbols; raises TraceError where that does not give finite
+    expressions.
+    """
     import casadi
 
     model, p = autodiff.symbolic(system)
     names = [s.name for s in system.states]
-    x, u = casadi.SX.sym("x", len(names)), casadi.SX.sym("u", len(system.inputs))
+    x = casadi.SX.sym("x", len(names))
+    u = casadi.SX.sym("u", len(system.inputs))
     w = casadi.SX.sym("w", len(system.inputs))
     state = {name: x[i] for i, name in enumerate(names)}
     inputs = {name: u[i] for i, name in enumerate(system.inputs)}
     rates, outputs = model.rates_and_outputs(state, inputs)
     if set(rates) != set(names):
-        raise TraceError(f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}.")
+        raise TraceError(
+            f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}."
+        )
     # Dense, because a printed function writes non-zeros one after the other.
     f = casadi.densify(casadi.vertcat(*(rates[name] for name in names)))
     o = casadi.densify(casadi.vertcat(*outputs.values())) if outputs else casadi.SX(0, 1)
     autodiff.check_finite(casadi.vertcat(f, o), type(system).__name__)
-    f, o = casadi.cse([f, o])  # once, so that the same need not be found again for every printed function
+    f, o = casadi.cse(
+        [f, o]
+    )  # once, so that the same need not be found again for every printed function
     return TracedSystem(x, u, w, p, f, o, tuple(outputs))
 
 
@@ -76,7 +87,8 @@ class ArraySizes:
 
 
 class Printer:
-    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`.
+    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p,
+    c)`.
 
     The text is in LLVM unless another language is given.
     """
@@ -88,20 +100,33 @@ class Printer:
         self._prepare = language.body()
         self._places: dict[str, int] = {}
         self.quantities: tuple[Mapping[str, Any], Any] | None = None
-        """Arguments and values of the quantities of the array "o", which have names in functions of these arguments."""
+        """Arguments and values of the quantities of the array "o", which have names in functions of
+        these arguments.
+        """
 
     @property
     def held(self) -> int:
         """How long `c` must be."""
         return len(self._places)
 
-    def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
+    def add(
+        self,
+        name: str,
+        inputs: dict[str, Any],
+        outputs: dict[str, Any],
+        scalars: Sequence[str] = (),
+    ) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
         code = instructions(list(inputs.values()), list(outputs.values()))
         self.add_code(name, list(inputs), code, list(outputs), scalars)
 
     def add_code(
-        self, name: str, inputs: Sequence[str], code: Code, outputs: Sequence[str], scalars: Sequence[str] = ()
+        self,
+        name: str,
+        inputs: Sequence[str],
+        code: Code,
+        outputs: Sequence[str],
+        scalars: Sequence[str] = (),
     ) -> None:
         """The same of instructions."""
         block = self._language.body(scalars)
@@ -109,13 +134,17 @@ class Printer:
             block.store(outputs[output], index, value)
         self.end(name, inputs, outputs, block)
 
-    def compute(self, block: FunctionBlock, code: Code, names: Sequence[str]) -> dict[tuple[int, int], str]:
-        """Append code to a function with arguments `names`; the names of its results, which are not stored, by output
-        and index."""
+    def compute(
+        self, block: FunctionBlock, code: Code, names: Sequence[str]
+    ) -> dict[tuple[int, int], str]:
+        """Append code to a function with arguments `names`; the names of its results, which are not
+        stored, by output and index."""
         code, held = self.set_apart(code, names)
         return emission.computed(block, code, names, held)
 
-    def end(self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock) -> None:
+    def end(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock
+    ) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""
         inputs = list(map(self._argument, inputs))
         if self._language.labels:
@@ -125,10 +154,13 @@ class Printer:
 
     def _name(self, block: Any, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Give the values of a function the names of the quantities that they are."""
-        labels, parameters = self._language.labels, self._prepare.loaded  # type: ignore[attr-defined]
+        labels = self._language.labels
+        parameters = self._prepare.loaded  # type: ignore[attr-defined]
         named: dict[str, tuple[str, int]] = {}
         if self.quantities and set(map(self._argument, self.quantities[0])) <= set(inputs):
-            trial = copy.copy(block)  # it prints the quantities, too: those that have values already have their names
+            trial = copy.copy(
+                block
+            )  # it prints the quantities, too: those that have values already have their names
             trial.lines, trial.known, trial.read, trial.loaded = [], dict(block.known), set(), {}
             code, held, items = self._quantity_code
             values = emission.Emission(trial, list(self.quantities[0]), held, {})
@@ -136,14 +168,21 @@ class Printer:
             computed = set(block.known.values())
             results = ((values.value_of(operand), index) for _, index, operand in code.outputs)
             named = {value: ("o", index) for value, index in results if value in computed}
-        of_c = [labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL for v in self._places]
+        of_c = [
+            labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL
+            for v in self._places
+        ]
         block.name_values({**labels, "c": of_c}, named, {*inputs, *outputs})
 
     @functools.cached_property
     def _quantity_code(self) -> tuple[Code, dict[Operand, int], list[Item]]:
-        """Code of the quantities, which is the same in all functions: where `c` holds operands, its instructions."""
+        """Code of the quantities, which is the same in all functions: where `c` holds operands, its
+        instructions.
+        """
         arguments, values = self.quantities  # type: ignore[misc]
-        code, held = self.set_apart(instructions(list(arguments.values()), [values]), list(arguments))
+        code, held = self.set_apart(
+            instructions(list(arguments.values()), [values]), list(arguments)
+        )
         return code, held, emission.with_gates(code, list(arguments), held)
 
     @staticmethod
@@ -151,11 +190,14 @@ class Printer:
         return "c" if name == PARAMETERS else name
 
     def set_apart(self, code: Code, names: Sequence[str]) -> tuple[Code, dict[Operand, int]]:
-        """Code less what depends on parameters alone, which goes to `prepare`, and where in `c` that stands."""
+        """Code less what depends on parameters alone, which goes to `prepare`, and where in `c`
+        that stands.
+        """
         if PARAMETERS not in names:
             return code, {}
         code, once, handed = hoisted(code, names.index(PARAMETERS))
-        prepared, held = emission.Emission(self._prepare, names, {}, {}), {}
+        prepared = emission.Emission(self._prepare, names, {}, {})
+        held = {}
         prepared.run(once)
         for operand in handed:
             value = prepared.value_of(operand)
@@ -169,7 +211,9 @@ class Printer:
         """`prepare` and all functions, as one text."""
         if self._language.labels:
             self._prepare.name_values(self._language.labels, {}, {PARAMETERS, "c"})  # type: ignore[attr-defined]
-        return "\n".join([self._language.preparation("prepare", [PARAMETERS], ["c"], self._prepare), *self.text])
+        return "\n".join(
+            [self._language.preparation("prepare", [PARAMETERS], ["c"], self._prepare), *self.text]
+        )
 
 
 Extension = Callable[[Printer], None]
@@ -177,9 +221,14 @@ Extension = Callable[[Printer], None]
 
 
 def system_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension | None = None, *, implicit: bool = True
+    t: TracedSystem,
+    language: TargetLanguage = LLVM,
+    extend: Extension | None = None,
+    *,
+    implicit: bool = True,
 ) -> tuple[str, ArraySizes]:
-    """The functions of a system: rhs and outputs, and what an implicit method needs unless the caller has another.
+    """The functions of a system: rhs and outputs, and what an implicit method needs unless the
+    caller has another.
 
     rhs(x, u, c, f)              f = rates
     jac(x, u, c, f, J)           rates, and the non-zeros of df/dx, equal ones once
@@ -189,7 +238,8 @@ def system_module(
     df_dt(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
     outputs(x, u, c, o)
     """
-    printer, code = Printer(language), recorded([t.x, t.u, t.p], [t.f])
+    printer = Printer(language)
+    code = recorded([t.x, t.u, t.p], [t.f])
     printer.quantities = t.point, t.o
     printer.add_code("rhs", POINT, finished(code), ["f"])
     jacobian, factors = _add_implicit(printer, t, code) if implicit else (0, 0)
@@ -204,14 +254,21 @@ def _add_implicit(printer: Printer, t: TracedSystem, code: Code) -> tuple[int, i
     """Print jac to df_dt for recorded rates; how many numbers J and A have."""
     import casadi
 
-    size, tape, point = t.x.numel(), Tape(code.body), t.point
+    size = t.x.numel()
+    tape = Tape(code.body)
+    point = t.point
     rates = code.results(0, size)
     slopes = nonzeros(tape, rates, [("in", 0, j) for j in range(size)])
     distinct = list(dict.fromkeys(slopes.values()))
-    outputs = [(k, i, operand) for k, operands in enumerate((rates, distinct)) for i, operand in enumerate(operands)]
+    outputs = [
+        (k, i, operand)
+        for k, operands in enumerate((rates, distinct))
+        for i, operand in enumerate(operands)
+    ]
     lu = Factors(tuple(slopes), tuple(distinct.index(operand) for operand in slopes.values()), size)
     a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
-    stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
+    stage = lu.solved(a, [t.f[i] + g[i] for i in range(size)])
+    solve = lu.solved(a, [b[i] for i in range(size)])
     printer.add_code("jac", POINT, finished(Code(tuple(tape.body), tuple(outputs))), ["f", "J"])
     printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
@@ -221,10 +278,14 @@ def _add_implicit(printer: Printer, t: TracedSystem, code: Code) -> tuple[int, i
     return lu.j.numel(), lu.values.numel()
 
 
-def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
-    """One whole step of an explicit Runge-Kutta method: step(x, u, c, w, h, y), and how long `c` must be.
+def explicit_module(
+    t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float]
+) -> tuple[str, int]:
+    """One whole step of an explicit Runge-Kutta method: step(x, u, c, w, h, y), and how long `c`
+    must be.
 
-    `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs move at w.
+    `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs
+    move at w.
     """
     import casadi
 
@@ -232,9 +293,13 @@ def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[f
     h = casadi.SX.sym("h")
     slopes: list[Any] = []
     for row in ([], *a):
-        increment = sum((weight * k for weight, k in zip(row, slopes, strict=True) if weight), casadi.SX(0))
+        increment = sum(
+            (weight * k for weight, k in zip(row, slopes, strict=True) if weight), casadi.SX(0)
+        )
         slopes.append(rates(t.x + h * increment if row else t.x, t.u + sum(row) * h * t.w, t.p))
-    step = t.x + h * sum((weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0))
+    step = t.x + h * sum(
+        (weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0)
+    )
     printer = Printer()
     printer.add("step", {**t.point, "w": t.w, "h": h}, {"y": step}, ["h"])
     return printer.module(), printer.held

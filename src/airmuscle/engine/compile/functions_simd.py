@@ -1,4 +1,6 @@
-"""The functions of a system over vectors: for many plants side by side, and for many rows of one plant."""
+"""The functions of a system over vectors: for many plants side by side, and for many rows of one
+plant.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -9,16 +11,24 @@ from .llvm import emit, vector_math
 from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage, LlvmType
 
 AT_ONCE = 64
-"""Bytes of one value in the step: the widest register (measured; values of two do not fit the registers)."""
+"""Bytes of one value in the step: the widest register (measured; values of two do not fit the
+registers).
+"""
 
 ROWS = LlvmType(lanes=4)
-"""A value of several rows of one plant. Vectors of eight slow down what the processor does next (measured)."""
+"""A value of several rows of one plant. Vectors of eight slow down what the processor does next
+(measured).
+"""
 MAX_OPERATIONS = 2000
-"""Outputs of more operations are computed row by row: compiling them twice takes longer than runs save (measured)."""
+"""Outputs of more operations are computed row by row: compiling them twice takes longer than runs
+save (measured).
+"""
 
 
 def rows_at_once(t: TracedSystem) -> int:
-    """The number of rows whose outputs one call computes; 1 where that is `outputs`, otherwise it is `row_outputs`."""
+    """The number of rows whose outputs one call computes; 1 where that is `outputs`, otherwise it
+    is `row_outputs`.
+    """
     import casadi
 
     count = casadi.Function("outputs", [t.x, t.u, t.p], [t.o]).n_instructions()
@@ -33,7 +43,9 @@ def row_outputs(t: TracedSystem) -> Extension:
 
     def add(printer: Printer) -> None:
         block = _RowsBody({"x": t.x.numel(), "u": t.u.numel(), "o": t.o.numel()})
-        for (_, index), value in printer.compute(block, instructions([t.x, t.u, t.p], [t.o]), POINT).items():
+        for (_, index), value in printer.compute(
+            block, instructions([t.x, t.u, t.p], [t.o]), POINT
+        ).items():
             block.store("o", index, value)
         text = emit.function("row_outputs", ["x", "u", "c", "o"], block)
         printer.text.append(vector_math.declarations({ROWS}) + text)
@@ -42,7 +54,9 @@ def row_outputs(t: TracedSystem) -> Extension:
 
 
 class _RowsBody(FunctionBody):
-    """A function at several rows of one plant: its arguments are tables of these rows, `c` is the same for all."""
+    """A function at several rows of one plant: its arguments are tables of these rows, `c` is the
+    same for all.
+    """
 
     def __init__(self, widths: Mapping[str, int]) -> None:
         super().__init__((), ROWS)
@@ -55,7 +69,9 @@ class _RowsBody(FunctionBody):
         result = "poison"
         for row in range(ROWS.lanes):
             element = self._element(array, index + row * self._widths[array])
-            result = self.put(f"insertelement {ROWS.text} {result}, {ROWS.element} {element}, i32 {row}")
+            result = self.put(
+                f"insertelement {ROWS.text} {result}, {ROWS.element} {element}, i32 {row}"
+            )
         return result
 
     def store(self, array: str, index: int, value: str) -> None:
@@ -66,13 +82,17 @@ class _RowsBody(FunctionBody):
             self.lines.append(f"  store {ROWS.element} {element}, ptr {place}, align 8")
 
     def call_library(self, function: str, x: Sequence[str]) -> str:
-        """A call of the C library for each row; vectorised functions would take longer to compile than they save."""
+        """A call of the C library for each row; vectorised functions would take longer to compile
+        than they save.
+        """
         result = "poison"
         for row in range(ROWS.lanes):
             given = [self.put(f"extractelement {ROWS.text} {a}, i32 {row}") for a in x]
             arguments = ", ".join(f"{ROWS.element} {a}" for a in given)
             value = self.put(f"call {FLAGS} {ROWS.element} @{function}({arguments})")
-            result = self.put(f"insertelement {ROWS.text} {result}, {ROWS.element} {value}, i32 {row}")
+            result = self.put(
+                f"insertelement {ROWS.text} {result}, {ROWS.element} {value}, i32 {row}"
+            )
         return result
 
     def power_by_call(self, base: str, exponent: str) -> str:
@@ -88,7 +108,8 @@ class _RowsBody(FunctionBody):
 def lanes_module(
     t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float], number: LlvmType
 ) -> tuple[str, int]:
-    """One whole step of an explicit Runge-Kutta method, and the outputs, for one plant a lane; how long `c` must be.
+    """One whole step of an explicit Runge-Kutta method, and the outputs, for one plant a lane; how
+    long `c` must be.
 
     step(x, u, c, w, h, y)   as the step of one plant; h is an array too, as each plant has its own
     outputs(x, u, c, o)      what a row of each plant shows
@@ -110,17 +131,23 @@ def lanes_module(
 class _Step:
     """The step of as many lanes as a register holds, called for one group of lanes after the other.
 
-    All groups run the same code, so that a plant's result does not depend on its lane; while one waits for a root or
-    a quotient, the processor is at the next. Every stage reads `c` through an argument of its own: LLVM, which cannot
-    know that they are equal, reads what it needs where it needs it, instead of keeping all of `c` from the first stage
-    on, for which there are no registers.
+    All groups run the same code, so that a plant's result does not depend on its lane; while one
+    waits for a root or a quotient, the processor is at the next. Every stage reads `c` through an
+    argument of its own: LLVM, which cannot know that they are equal, reads what it needs where it
+    needs it, instead of keeping all of `c` from the first stage on, for which there are no
+    registers.
     """
 
-    def __init__(self, t: TracedSystem, code: Code, held: dict[Operand, int], number: LlvmType) -> None:
+    def __init__(
+        self, t: TracedSystem, code: Code, held: dict[Operand, int], number: LlvmType
+    ) -> None:
         self.number = LlvmType(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
         self.groups = number.lanes // self.number.lanes
-        self.states, self.inputs = t.x.shape[0], t.u.shape[0]
-        self.items, self.outputs, self.held = emission.with_gates(code, POINT, held), code.outputs, held
+        self.states = t.x.shape[0]
+        self.inputs = t.u.shape[0]
+        self.items = emission.with_gates(code, POINT, held)
+        self.outputs = code.outputs
+        self.held = held
         self.block = FunctionBody((), self.number)
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
@@ -135,15 +162,25 @@ class _Step:
         stages = emit.function("stages", names, self.block, f"{emit.ALIGNED} noinline")
         outer = FunctionBody((), self.number)
         for group in range(self.groups):
-            arrays = {n: outer.put(f"getelementptr inbounds i8, ptr %{n}, i64 {group * AT_ONCE}") for n in "xucwhy"}
+            arrays = {
+                n: outer.put(f"getelementptr inbounds i8, ptr %{n}, i64 {group * AT_ONCE}")
+                for n in "xucwhy"
+            }
             given = ", ".join(f"ptr {arrays['c' if name in copies else name]}" for name in names)
             outer.lines.append(f"  call void @stages({given})")
-        return stages.replace("define", "define internal", 1) + emit.function("step", list("xucwhy"), outer)
+        return stages.replace("define", "define internal", 1) + emit.function(
+            "step", list("xucwhy"), outer
+        )
 
-    def _rates(self, stage: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> list[str]:
+    def _rates(
+        self, stage: int, row: Sequence[float], slopes: Sequence[Sequence[str]]
+    ) -> list[str]:
         """The rates of one stage."""
-        given: dict[Operand, str] = {("in", 0, i): self._moved(i, row, slopes) for i in range(self.states)}
-        node, combined = sum(row), self.block.arithmetic
+        given: dict[Operand, str] = {
+            ("in", 0, i): self._moved(i, row, slopes) for i in range(self.states)
+        }
+        node = sum(row)
+        combined = self.block.arithmetic
         for i in range(self.inputs):
             u = self._load("u", i)
             if node:  # u + node h w
@@ -162,7 +199,9 @@ class _Step:
 
     def _moved(self, i: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> str:
         """x + h (a1 k1 + a2 k2 + ...)."""
-        x, total, combined = self._load("x", i), "", self.block.arithmetic
+        x = self._load("x", i)
+        total = ""
+        combined = self.block.arithmetic
         for weight, k in zip(row, slopes, strict=True):
             if weight:
                 term = combined("*", self.block.constant(weight), k[i])

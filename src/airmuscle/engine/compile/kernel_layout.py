@@ -42,6 +42,8 @@ class Waiting(enum.IntEnum):
     COMMANDS = 1
     """The commands of a controller that is called."""
     DRIVERS = 2
-    """The signals of the inputs behind drivers that are called; the first of `kinds` is then negative."""
+    """The signals of the inputs behind drivers that are called; the first of `kinds` is then
+    negative.
+    """
     INTEGRATION = 3
     """The end of an interval, where the integrator has no machine code; its address is then 0."""

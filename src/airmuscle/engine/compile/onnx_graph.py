@@ -1,12 +1,21 @@
-"""ONNX graph of printed functions: each instruction is a node, each array a tensor (elements, count)."""
+"""ONNX graph of printed functions: each instruction is a node, each array a tensor (elements,
+count).
+"""
 
 from collections.abc import Mapping, Sequence
 
 from .ir.emission import FunctionBlock
 
 _NODES = {
-    "+": "Add", "-": "Sub", "*": "Mul", "/": "Div", "<": "Less", "<=": "LessOrEqual", ">": "Greater", "==": "Equal",
-}  # fmt: skip
+    "+": "Add",
+    "-": "Sub",
+    "*": "Mul",
+    "/": "Div",
+    "<": "Less",
+    "<=": "LessOrEqual",
+    ">": "Greater",
+    "==": "Equal",
+}
 
 
 class GraphBody(FunctionBlock):
@@ -46,7 +55,9 @@ class GraphBody(FunctionBlock):
             return self.results[array][index]
         if array in self.scalars:
             return array
-        return self.node("Gather", self.arrays.get(array, array), self._constant(f"i{index}", index))
+        return self.node(
+            "Gather", self.arrays.get(array, array), self._constant(f"i{index}", index)
+        )
 
     def store(self, array: str, index: int, value: str) -> None:
         self.results.setdefault(array, {})[index] = value
@@ -67,7 +78,8 @@ class GraphBody(FunctionBlock):
 
     def call(self, function: str, x: Sequence[str]) -> str:
         """A node, or several for a function that has none."""
-        node, number = self.node, x[0]
+        node = self.node
+        number = x[0]
         match function:
             case "tan":
                 return node("Div", node("Sin", number), node("Cos", number))
@@ -77,9 +89,15 @@ class GraphBody(FunctionBlock):
                 less = self._expm1(number)
                 return self._half(less, node("Div", less, node("Add", less, self.constant(1.0))))
             case "asinh":
-                one, size, square = self.constant(1.0), node("Abs", number), node("Mul", number, number)
+                one = self.constant(1.0)
+                size = node("Abs", number)
+                square = node("Mul", number, number)
                 root = node("Add", one, node("Sqrt", node("Add", one, square)))
-                return node("Mul", node("Sign", number), self._log1p(node("Add", size, node("Div", square, root))))
+                return node(
+                    "Mul",
+                    node("Sign", number),
+                    self._log1p(node("Add", size, node("Div", square, root))),
+                )
             case "log1p":
                 return self._log1p(number)
             case "expm1":
@@ -90,16 +108,22 @@ class GraphBody(FunctionBlock):
         return self.node("Mul", self.constant(0.5), self.node("Add", a, b))
 
     def _log1p(self, x: str) -> str:
-        """log(1 + x), accurate for small x, by W. Kahan's quotient log(u) x/(u - 1) with u = 1 + x."""
-        node, one = self.node, self.constant(1.0)
+        """log(1 + x), accurate for small x, by W. Kahan's quotient log(u) x/(u - 1) with u = 1 +
+        x.
+        """
+        node = self.node
+        one = self.constant(1.0)
         u = node("Add", one, x)
         quotient = node("Div", node("Mul", node("Log", u), x), node("Sub", u, one))
         return node("Where", node("Equal", u, one), x, quotient)
 
     def _expm1(self, x: str) -> str:
         """exp(x) - 1, accurate for small x, by (u - 1) x/log(u) with u = exp(x)."""
-        node, one = self.node, self.constant(1.0)
+        node = self.node
+        one = self.constant(1.0)
         u = node("Exp", x)
         less = node("Sub", u, one)
-        small = node("Where", node("Equal", u, one), x, node("Div", node("Mul", less, x), node("Log", u)))
+        small = node(
+            "Where", node("Equal", u, one), x, node("Div", node("Mul", less, x), node("Log", u))
+        )
         return node("Where", node("Equal", less, self.constant(-1.0)), less, small)

@@ -1,4 +1,6 @@
-"""Compiled systems: machine code shared by all systems of one structure, and the data of one system."""
+"""Compiled systems: machine code shared by all systems of one structure, and the data of one
+system.
+"""
 
 import ctypes
 import dataclasses
@@ -21,7 +23,9 @@ from .llvm.emit import LlvmType
 
 
 class Pool:
-    """Objects that one run at a time may use, by a key; with more keys than `max_keys` all of them are dropped."""
+    """Objects that one run at a time may use, by a key; with more keys than `max_keys` all of them
+    are dropped.
+    """
 
     def __init__(self, max_keys: int = 1_000) -> None:
         self._idle: dict[Hashable, list[Any]] = {}
@@ -49,11 +53,13 @@ class Pool:
 class RunCache:
     """What runs of one system leave for the next one; it belongs to the system's description.
 
-    A run takes over what the last one checked or computed if its arguments are the same, and borrows bound kernels.
+    A run takes over what the last one checked or computed if its arguments are the same, and
+    borrows bound kernels.
 
     default_state  the default initial state (n,), once it has been found
     checked_state  the last initial state that was checked and found possible
-    checked_input  the last segments of inputs that were found within their ranges, what output times a run with them
+    checked_input  the last segments of inputs that were found within their ranges, what output
+    times a run with them
                    asked for, and these times, if nobody can write to the arrays
     sources        sources of the models and of an integrator, by the integrator
     integrators    integrators bound to the system, by their integrator
@@ -80,7 +86,9 @@ _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
 class Module:
-    """Machine code of printed functions; their addresses are valid as long as it lives. It cannot be pickled."""
+    """Machine code of printed functions; their addresses are valid as long as it lives. It cannot
+    be pickled.
+    """
 
     def __init__(self, text: str, held: int = 0) -> None:
         self._engine, self._addresses = load_module(text), dict[str, int]()
@@ -123,22 +131,32 @@ class Program:
         self._module = Module(text, self.sizes.held)
         self.address = {name: self._module.address(name) for name in _FUNCTIONS}
         self.outputs_at_rows = self._module.address("row_outputs" if rows > 1 else "outputs"), rows
-        """The address of the function that computes the outputs at rows, and at how many at once."""
+        """The address of the function that computes the outputs at rows, and at how many at
+        once.
+        """
         self._steps: dict[Tableau, Module] = {}
         self._lane_modules: dict[Any, Module] = {}
-        self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
+        self._compiling = (
+            threading.Lock()
+        )  # of two threads that need a step, one compiles it: an engine must stay
 
     @functools.cached_property
     def traced(self) -> TracedSystem:
         """The system's own rates and outputs as expressions, also of a differentiated one."""
-        return self._form if isinstance(self._form, TracedSystem) else functions.trace_system(self._system)
+        return (
+            self._form
+            if isinstance(self._form, TracedSystem)
+            else functions.trace_system(self._system)
+        )
 
     def precompute(self, parameters: Array) -> Array:
         """Values that the functions need of a set of parameters, computed once."""
         return self._module.prepare(parameters)
 
     def step(self, tableau: Tableau, parameters: Array) -> tuple[int, Array]:
-        """The address of an explicit step with this tableau, and the values that it needs of the parameters."""
+        """The address of an explicit step with this tableau, and the values that it needs of the
+        parameters.
+        """
         with self._compiling:
             if tableau not in self._steps:
                 if isinstance(self._form, TracedSystem):
@@ -150,12 +168,20 @@ class Program:
         return module.address("step"), module.prepare(parameters)
 
     def lanes(self, tableau: Tableau, number: LlvmType) -> tuple[tuple[int, int, int], int]:
-        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of `c`."""
+        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of
+        `c`.
+        """
         with self._compiling:
             if (tableau, number) not in self._lane_modules:
-                self._lane_modules[tableau, number] = Module(*lanes_module(self.traced, *tableau, number))
+                self._lane_modules[tableau, number] = Module(
+                    *lanes_module(self.traced, *tableau, number)
+                )
         module = self._lane_modules[tableau, number]
-        return (module.address("prepare"), module.address("step"), module.address("outputs")), module.held
+        return (
+            module.address("prepare"),
+            module.address("step"),
+            module.address("outputs"),
+        ), module.held
 
 
 class Description:
@@ -165,7 +191,8 @@ class Description:
         self.program = _program(system)
         self.parameters = tree.flatten(system)
         self.precomputed = self.program.precompute(self.parameters)
-        states, inputs = system.states, system.input_variables
+        states = system.states
+        inputs = system.input_variables
         self.state_names = tuple(s.name for s in states)
         self.input_names = tuple(i.name for i in inputs)
         self.output_names = self.program.output_names
@@ -174,10 +201,15 @@ class Description:
         self.input_minimum = np.array([i.minimum for i in inputs])
         self.input_maximum = np.array([i.maximum for i in inputs])
         with np.errstate(invalid="ignore"):
-            slack = np.nan_to_num(INPUT_TOLERANCE * (self.input_maximum - self.input_minimum), posinf=0.0)
-        self.input_lower_limits, self.input_upper_limits = self.input_minimum - slack, self.input_maximum + slack
+            slack = np.nan_to_num(
+                INPUT_TOLERANCE * (self.input_maximum - self.input_minimum), posinf=0.0
+            )
+        self.input_lower_limits = self.input_minimum - slack
+        self.input_upper_limits = self.input_maximum + slack
         positive = set(system.positive_outputs)
-        self.positive_outputs = np.array([i for i, n in enumerate(self.output_names) if n in positive], dtype=np.intp)
+        self.positive_outputs = np.array(
+            [i for i, n in enumerate(self.output_names) if n in positive], dtype=np.intp
+        )
         self.constants = dict(system.constants)
         self.remarks = system.describe()
         self.cache = RunCache()
@@ -192,23 +224,32 @@ class Description:
         self.remark_texts = tuple(remark.message for remark in self.remarks)
         self.state_limits = dict(zip(self.state_names, self.lower_bounds.tolist(), strict=True))
         """The lower bound of each state by its name."""
-        limits = zip(self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True)
+        limits = zip(
+            self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True
+        )
         self.input_limits = dict(zip(self.input_names, enumerate(limits), strict=True))
         """The index and the limits, with their tolerance, of each input by its name."""
 
     def _name_ranges(self, system: System) -> None:
         """The states and outputs that have a limit, with which their range in a run is compared."""
-        names, bounds = (*self.state_names, *self.output_names), self.lower_bounds.tolist()
-        bounded = {name: low for name, low in zip(self.state_names, bounds, strict=True) if low > -math.inf}
+        names = (*self.state_names, *self.output_names)
+        bounds = self.lower_bounds.tolist()
+        bounded = {
+            name: low for name, low in zip(self.state_names, bounds, strict=True) if low > -math.inf
+        }
         positive = [self.output_names[i] for i in self.positive_outputs.tolist()]
         limited = [limit.column for limit in system.column_limits if limit.column in names]
         self.ranged_names = tuple(dict.fromkeys((*bounded, *positive, *limited)))
         self.range_places = {name: i for i, name in enumerate(self.ranged_names)}
         """The place of each of them among the ranges of a run."""
-        self.ranged_columns = np.array([names.index(name) for name in self.ranged_names], dtype=np.int64)
+        self.ranged_columns = np.array(
+            [names.index(name) for name in self.ranged_names], dtype=np.int64
+        )
         """Their places among the states and, after these, the outputs."""
         self.range_floors = [*bounded.values(), *(math.ulp(0.0) for _ in positive)]
-        """The smallest possible values of the first of them: those of states, then of outputs that must be positive."""
+        """The smallest possible values of the first of them: those of states, then of outputs that
+        must be positive.
+        """
 
 
 _programs: dict[tree.Structure, Program] = {}
@@ -261,9 +302,13 @@ class CompiledSystem:
         return self.program.output_names
 
     def at(self, parameters: Array, nominal: Array) -> "CompiledSystem":
-        """The same system with other parameters and nominal sizes, for callers that change them often."""
+        """The same system with other parameters and nominal sizes, for callers that change them
+        often.
+        """
         precomputed = self.program.precompute(parameters)
-        return dataclasses.replace(self, parameters=parameters, precomputed=precomputed, nominal=nominal)
+        return dataclasses.replace(
+            self, parameters=parameters, precomputed=precomputed, nominal=nominal
+        )
 
     def call(self, name: str, *arrays: Array | float) -> None:
         """Call one compiled function; arrays are passed by address, floats by value."""
@@ -273,7 +318,8 @@ class CompiledSystem:
 
     def rates(self, state: Sequence[float], inputs: Sequence[float]) -> Array:
         """The compiled rates at a state vector (n,) under inputs (m,)."""
-        x, u = np.array(state, dtype=float), np.array(inputs, dtype=float)
+        x = np.array(state, dtype=float)
+        u = np.array(inputs, dtype=float)
         f = np.empty(self.sizes.states)
         self._rhs(*map(address_of, (x, u, self.precomputed, f)))
         return f
@@ -284,6 +330,10 @@ class CompiledSystem:
 
 
 def compile_system(system: System) -> CompiledSystem:
-    """The system with compiled functions, at no cost where one of the same structure was compiled before."""
+    """The system with compiled functions, at no cost where one of the same structure was compiled
+    before.
+    """
     known = describe(system)
-    return CompiledSystem(system, known.program, known.parameters, known.precomputed, known.nominal, known)
+    return CompiledSystem(
+        system, known.program, known.parameters, known.precomputed, known.nominal, known
+    )

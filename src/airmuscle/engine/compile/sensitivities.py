@@ -1,9 +1,11 @@
-"""A system with the derivatives of its states along columns, and the functions of an implicit step of both.
+"""A system with the derivatives of its states along columns, and the functions of an implicit step
+of both.
 
-The state is x (n,) followed by S = dx/dtheta (n, K), row by row. All columns share the rates, their Jacobian J and
-the LU factors of d I - J; what differs from column to column is one vector operation. A Rosenbrock step also needs
-dJ = (dJ/dx) S + dJ/dtheta: without it the derivatives converge with order one. Inputs that depend on the columns have
-derivatives V = du/dtheta, further inputs (M, K), row by row; all of the above then has a term of V too.
+The state is x (n,) followed by S = dx/dtheta (n, K), row by row. All columns share the rates, their
+Jacobian J and the LU factors of d I - J; what differs from column to column is one vector
+operation. A Rosenbrock step also needs dJ = (dJ/dx) S + dJ/dtheta: without it the derivatives
+converge with order one. Inputs that depend on the columns have derivatives V = du/dtheta, further
+inputs (M, K), row by row; all of the above then has a term of V too.
 """
 
 import dataclasses
@@ -23,7 +25,9 @@ from .llvm.exact import LlvmValue, loaded, packed
 
 @dataclasses.dataclass(frozen=True)
 class TangentSystem:
-    """A traced system, and for every column the places in its parameters that move together; none moves nothing."""
+    """A traced system, and for every column the places in its parameters that move together; none
+    moves nothing.
+    """
 
     inner: TracedSystem
     groups: tuple[tuple[int, ...], ...]
@@ -42,26 +46,38 @@ class TangentSystem:
 
     def rows(self, block: FunctionBody, array: str) -> list[LlvmValue]:
         """The rows of S, which follow the states in an array."""
-        return [loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)]
+        return [
+            loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)
+        ]
 
     def input_rows(self, block: FunctionBody, array: str = "u") -> list[LlvmValue]:
         """The rows of V, which follow the inputs in an array, or those of its slope in time."""
         first = int(self.inner.u.numel())
-        return [loaded(block, array, first + j * self.lanes, self.lanes) for j in range(len(self.inputs))]
+        return [
+            loaded(block, array, first + j * self.lanes, self.lanes)
+            for j in range(len(self.inputs))
+        ]
 
 
 def tangent_system(system: SensitivitySystem) -> TangentSystem:
-    """The traced inner system of a differentiated one, with the observed quantities as its outputs."""
+    """The traced inner system of a differentiated one, with the observed quantities as its
+    outputs.
+    """
     import casadi
 
-    inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
+    inner = trace_system(system.inner)
+    names = [s.name for s in system.inner.states]
     outputs = {
         **{n: inner.x[i] for i, n in enumerate(names)},
         **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
     }
-    observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(outputs[n] for n in system.observed_names)))
+    observed = casadi.densify(
+        casadi.vertcat(casadi.SX(0, 1), *(outputs[n] for n in system.observed_names))
+    )
     traced = dataclasses.replace(inner, o=observed)
-    return TangentSystem(traced, system.parameter_indices, system.output_names, system.input_indices)
+    return TangentSystem(
+        traced, system.parameter_indices, system.output_names, system.input_indices
+    )
 
 
 class Values:
@@ -76,7 +92,11 @@ class Values:
         """The derivatives of some operands of the tape."""
         states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
         inputs = [("in", POINT.index("u"), i) for i in self.t.inputs]
-        leaves = {place: ("in", POINT.index(PARAMETERS), place) for group in self.t.groups for place in group}
+        leaves = {
+            place: ("in", POINT.index(PARAMETERS), place)
+            for group in self.t.groups
+            for place in group
+        }
         changes = []
         for row in derivatives(self.tape, results, [*states, *inputs, *leaves.values()]):
             sums = [ZERO] * self.t.lanes
@@ -84,21 +104,35 @@ class Values:
                 for place in group:
                     sums[k] = self.tape.add(sums[k], row.get(leaves[place], ZERO))
             all_parts = [row.get(x, ZERO) for x in states], [row.get(u, ZERO) for u in inputs], sums
-            changes.append(Change(*({j: p for j, p in enumerate(parts) if p != ZERO} for parts in all_parts)))
+            changes.append(
+                Change(*({j: p for j, p in enumerate(parts) if p != ZERO} for parts in all_parts))
+            )
         return DirectionalDerivative(tuple(changes))
 
     def compute(
-        self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT
+        self,
+        printer: Printer,
+        block: FunctionBody,
+        wanted: Sequence[Operand],
+        names: Sequence[str] = POINT,
     ) -> dict[Operand, LlvmValue]:
-        """Append the instructions that some operands need to a function; the values of the operands."""
+        """Append the instructions that some operands need to a function; the values of the
+        operands.
+        """
         distinct = tuple(dict.fromkeys(wanted))
-        code = finished(Code(tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))))
+        code = finished(
+            Code(
+                tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))
+            )
+        )
         results = printer.compute(block, code, names)
         return {operand: LlvmValue(block, results[0, i]) for i, operand in enumerate(distinct)}
 
 
 class Change(NamedTuple):
-    """The non-zero derivatives of an operand, by state, by input with derivatives, and by column."""
+    """The non-zero derivatives of an operand, by state, by input with derivatives, and by
+    column.
+    """
 
     states: dict[int, Operand]
     inputs: dict[int, Operand]
@@ -114,12 +148,19 @@ class DirectionalDerivative:
     @property
     def parts(self) -> list[Operand]:
         """All derivatives: those by states, then those by inputs, then those by columns."""
-        return [part for kind in zip(*self.changes, strict=True) for row in kind for part in row.values()]
+        return [
+            part
+            for kind in zip(*self.changes, strict=True)
+            for row in kind
+            for part in row.values()
+        ]
 
     def rows(
         self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue], v: Sequence[LlvmValue]
     ) -> list[LlvmValue]:
-        """The change of each operand, a column, from the values of the parts and the rows of S and V."""
+        """The change of each operand, a column, from the values of the parts and the rows of S and
+        V.
+        """
         rows_along = []
         for states, inputs, columns in self.changes:
             direct = {k: values[part].name for k, part in columns.items()}
@@ -143,22 +184,33 @@ def stored(values: Sequence[LlvmValue], array: str) -> None:
 def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
     """The functions of `functions.system_module` for the states and their derivatives.
 
-    J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each; A the factors of
-    the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I - J) dk = db + dJ k.
+    J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each;
+    A the factors of the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I
+    - J) dk = db + dJ k.
     """
     import casadi
 
-    inner, printer, step = t.inner, Printer(), _Step(t)
+    inner = t.inner
+    printer = Printer()
+    step = _Step(t)
     step.print_rates(printer)
     step.print_factor(printer)
     step.print_solve(printer)
     step.print_stage(printer)
     df_dt = casadi.jtimes(inner.f, inner.u, inner.w) if inner.u.numel() else casadi.SX(t.size, 1)
-    _print_along(printer, "df_dt", Values(t, casadi.densify(df_dt), [inner.w]), [*POINT, "w"], "f", moving=step.rates)
+    _print_along(
+        printer,
+        "df_dt",
+        Values(t, casadi.densify(df_dt), [inner.w]),
+        [*POINT, "w"],
+        "f",
+        moving=step.rates,
+    )
     outputs = Values(t, inner.o)
     slope = Values(t, casadi.densify(casadi.jtimes(inner.o, inner.x, inner.f)))
     _print_along(printer, "outputs", outputs, POINT, "o", slope)
-    further, count = len(step.moving) * t.lanes, inner.o.numel()
+    further = len(step.moving) * t.lanes
+    count = inner.o.numel()
     return printer.module(), ArraySizes(
         states=t.size * (1 + t.lanes),
         inputs=inner.u.numel() + len(t.inputs) * t.lanes,
@@ -171,20 +223,33 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
 
 
 def _print_along(
-    printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None,
+    printer: Printer,
+    name: str,
+    values: Values,
+    arguments: Sequence[str],
+    target: str,
+    last: Values | None = None,
     moving: Values | None = None,
-) -> None:  # fmt: skip
-    """A function that writes values, their derivatives along columns plus those of `moving` by W, and final values."""
-    t, block, along = values.t, FunctionBody(), values.along(values.results)
+) -> None:
+    """A function that writes values, their derivatives along columns plus those of `moving` by W,
+    and final values.
+    """
+    t = values.t
+    block = FunctionBody()
+    along = values.along(values.results)
     computed = values.compute(printer, block, [*values.results, *along.parts], arguments)
     columns = along.rows(computed, t.rows(block, "x"), t.input_rows(block))
     if moving is not None and t.inputs:
         further = moving.along(moving.results)
-        parts = moving.compute(printer, block, [p for each in further.changes for p in each.inputs.values()], arguments)
+        parts = moving.compute(
+            printer, block, [p for each in further.changes for p in each.inputs.values()], arguments
+        )
         w = t.input_rows(block, "w")
         for i, change in enumerate(further.changes):
             if change.inputs:
-                moved = functools.reduce(operator.add, (w[j] * parts[part] for j, part in change.inputs.items()))
+                moved = functools.reduce(
+                    operator.add, (w[j] * parts[part] for j, part in change.inputs.items())
+                )
                 columns[i] = columns[i] + moved
     rows = [computed[v] for v in values.results] + columns
     if last is not None:
@@ -200,7 +265,11 @@ class _Step:
     def __init__(self, t: TangentSystem) -> None:
         self.t, self.rates = t, Values(t, t.inner.f)
         self.slopes = self.rates.along(self.rates.results)
-        places = [((i, j), part) for i, row in enumerate(self.slopes.changes) for j, part in row.states.items()]
+        places = [
+            ((i, j), part)
+            for i, row in enumerate(self.slopes.changes)
+            for j, part in row.states.items()
+        ]
         self.places = tuple(place for place, _ in places)
         self.jacobian = list(dict.fromkeys(part for _, part in places))
         self.slots = tuple(self.jacobian.index(part) for _, part in places)
@@ -212,18 +281,24 @@ class _Step:
     def _bends(self, block: FunctionBody, array: str, first: int) -> dict[int, LlvmValue]:
         """dJ by number of the distinct non-zero, from an array where they stand from `first` on."""
         lanes = self.t.lanes
-        return {q: loaded(block, array, first + m * lanes, lanes) for m, q in enumerate(self.moving)}
+        return {
+            q: loaded(block, array, first + m * lanes, lanes) for m, q in enumerate(self.moving)
+        }
 
     def print_rates(self, printer: Printer) -> None:
         """rhs(x, u, c, f) and jac(x, u, c, f, J)."""
-        block, s, t = FunctionBody(), self.slopes, self.t
+        block = FunctionBody()
+        s = self.slopes
+        t = self.t
         rates = self.rates.compute(printer, block, [*self.rates.results, *s.parts])
         columns = s.rows(rates, t.rows(block, "x"), t.input_rows(block))
         stored([rates[f] for f in self.rates.results] + columns, "f")
         printer.end("rhs", POINT, ["f"], block)
         block = FunctionBody()
         wanted = [*self.rates.results, *s.parts, *self.bends.parts]
-        computed, rows, v = self.rates.compute(printer, block, wanted), t.rows(block, "x"), t.input_rows(block)
+        computed = self.rates.compute(printer, block, wanted)
+        rows = t.rows(block, "x")
+        v = t.input_rows(block)
         stored([computed[f] for f in self.rates.results] + s.rows(computed, rows, v), "f")
         bends = self.bends.rows(computed, rows, v)
         stored([computed[part] for part in self.jacobian] + [bends[q] for q in self.moving], "J")
@@ -231,10 +306,15 @@ class _Step:
 
     def print_factor(self, printer: Printer) -> None:
         """factor(J, d, A)."""
-        code, block = finished(recorded([self.lu.j, self.lu.d], [self.lu.values])), FunctionBody(["d"])
+        code = finished(recorded([self.lu.j, self.lu.d], [self.lu.values]))
+        block = FunctionBody(["d"])
         computed = printer.compute(block, code, ["J", "d"])
         bends = self._bends(block, "J", len(self.jacobian))
-        stored([LlvmValue(block, computed[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
+        stored(
+            [LlvmValue(block, computed[0, i]) for i in range(self.lu.values.numel())]
+            + list(bends.values()),
+            "A",
+        )
         printer.end("factor", ["J", "d"], ["A"], block)
 
     def print_solve(self, printer: Printer) -> None:
@@ -246,7 +326,8 @@ class _Step:
 
     def print_stage(self, printer: Printer) -> None:
         """stage(x, u, c, A, g, k)."""
-        t, block = self.t, FunctionBody()
+        t = self.t
+        block = FunctionBody()
         computed = self.rates.compute(printer, block, [*self.rates.results, *self.slopes.parts])
         right = [computed[f] + loaded(block, "g", i) for i, f in enumerate(self.rates.results)]
         slopes = self.slopes.rows(computed, t.rows(block, "x"), t.input_rows(block))
@@ -254,11 +335,16 @@ class _Step:
         stored(self._solved(block, right, columns), "k")
         printer.end("stage", [*POINT, "A", "g"], ["k"], block)
 
-    def _solved(self, block: FunctionBody, right: list[LlvmValue], columns: list[LlvmValue]) -> list[LlvmValue]:
-        """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that stand in A."""
+    def _solved(
+        self, block: FunctionBody, right: list[LlvmValue], columns: list[LlvmValue]
+    ) -> list[LlvmValue]:
+        """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that
+        stand in A.
+        """
         count = self.lu.values.numel()
         factors = [loaded(block, "A", q) for q in range(count)]
-        k, bends = self.lu.solved(factors, right), self._bends(block, "A", count)
+        k = self.lu.solved(factors, right)
+        bends = self._bends(block, "A", count)
         for (i, j), slot in zip(self.places, self.slots, strict=True):
             if slot in bends:
                 columns[i] = columns[i] + bends[slot] * k[j]

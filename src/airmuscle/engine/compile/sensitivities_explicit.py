@@ -14,15 +14,24 @@ from .sensitivities import DirectionalDerivative, TangentSystem, Values, stored
 class _Stage:
     """One stage: the rates, then their derivatives, printed instruction by instruction.
 
-    The rates of a stage are one long chain of operations that wait for each other. A processor sees some hundred
-    instructions at a time, so that the derivatives of the stage before are mixed in, which wait for nothing.
+    The rates of a stage are one long chain of operations that wait for each other. A processor sees
+    some hundred instructions at a time, so that the derivatives of the stage before are mixed in,
+    which wait for nothing.
     """
 
     def __init__(
-        self, rates: Values, along: DirectionalDerivative, printer: Printer, block: FunctionBody,
-        given: dict[Operand, str], v: Sequence[LlvmValue],
-    ) -> None:  # fmt: skip
-        self.rates, self.along, self.block, self.v = rates, along, block, v
+        self,
+        rates: Values,
+        along: DirectionalDerivative,
+        printer: Printer,
+        block: FunctionBody,
+        given: dict[Operand, str],
+        v: Sequence[LlvmValue],
+    ) -> None:
+        self.rates = rates
+        self.along = along
+        self.block = block
+        self.v = v
         wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
         code, held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
         self.at = emission.Emission(block, POINT, held, given)
@@ -38,7 +47,8 @@ class _Stage:
 
     def print_rates(self, before: "_Stage | None") -> None:
         """The rates of this stage, and in between the derivatives of the one before."""
-        done, ahead = 0, 0 if before is None else len(before.second)
+        done = 0
+        ahead = 0 if before is None else len(before.second)
         for number, line in enumerate(self.first, 1):
             self.at.run([line])
             if before is not None:
@@ -57,17 +67,24 @@ class _Stage:
 
     def columns(self, s: Sequence[LlvmValue]) -> list[LlvmValue]:
         """The derivatives of the rates along the columns, from the rows of S."""
-        return self.along.rows({operand: self._value(operand) for operand in self.along.parts}, s, self.v)
+        return self.along.rows(
+            {operand: self._value(operand) for operand in self.along.parts}, s, self.v
+        )
 
 
 def _after(
-    row: Sequence[float], begin: Sequence[LlvmValue], slopes: Sequence[Sequence[LlvmValue]], h: LlvmValue
+    row: Sequence[float],
+    begin: Sequence[LlvmValue],
+    slopes: Sequence[Sequence[LlvmValue]],
+    h: LlvmValue,
 ) -> list[LlvmValue]:
     """States, or S, after the stages so far, each with its weight."""
     advanced = list(begin)
     for weight, slope in zip(row, slopes, strict=True):
         if weight:
-            advanced = [value + d * _times(h, weight) for value, d in zip(advanced, slope, strict=True)]
+            advanced = [
+                value + d * _times(h, weight) for value, d in zip(advanced, slope, strict=True)
+            ]
     return advanced
 
 
@@ -75,22 +92,35 @@ def _times(h: LlvmValue, weight: float) -> LlvmValue:
     return h * LlvmValue(h.block, h.block.constant(weight))
 
 
-def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
-    """One whole step, as in `functions.explicit_module`: step(x, u, c, w, h, y), and how long `c` must be."""
+def explicit_module(
+    t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[float]
+) -> tuple[str, int]:
+    """One whole step, as in `functions.explicit_module`: step(x, u, c, w, h, y), and how long `c`
+    must be.
+    """
     rates = Values(t, t.inner.f)
     along = rates.along(rates.results)
-    printer, block = Printer(), FunctionBody(["h"])
-    h, states, s = LlvmValue(block, "%h"), [loaded(block, "x", i) for i in range(t.size)], t.rows(block, "x")
+    printer = Printer()
+    block = FunctionBody(["h"])
+    h = LlvmValue(block, "%h")
+    states = [loaded(block, "x", i) for i in range(t.size)]
+    s = t.rows(block, "x")
     slopes: list[list[LlvmValue]] = []
     columns: list[list[LlvmValue]] = []
-    rows, before = [(), *a], None
+    rows = [(), *a]
+    before = None
     for number, row in enumerate(rows):
-        given = {("in", POINT.index("x"), i): x.name for i, x in enumerate(_after(row, states, slopes, h))}
+        given = {
+            ("in", POINT.index("x"), i): x.name
+            for i, x in enumerate(_after(row, states, slopes, h))
+        }
         for i in range(t.inner.u.numel()):
             u = loaded(block, "u", i) + loaded(block, "w", i) * _times(h, sum(row))
             given["in", POINT.index("u"), i] = u.name
         moving = zip(t.input_rows(block), t.input_rows(block, "w"), strict=True)
-        stage = _Stage(rates, along, printer, block, given, [v + w * _times(h, sum(row)) for v, w in moving])
+        stage = _Stage(
+            rates, along, printer, block, given, [v + w * _times(h, sum(row)) for v, w in moving]
+        )
         stage.print_rates(before)
         slopes.append(stage.slopes())
         if before is not None:

@@ -1,4 +1,6 @@
-"""Sampled loops: input signals in time, drivers between command and valve, interface of controllers, sensors."""
+"""Sampled loops: input signals in time, drivers between command and valve, interface of
+controllers, sensors.
+"""
 
 from ...core.stubs import attach_stub
 

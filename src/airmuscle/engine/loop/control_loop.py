@@ -1,4 +1,5 @@
-"""ControlLoop: a sampled controller at a plant, with its sample time, set points, other inputs and drivers.
+"""ControlLoop: a sampled controller at a plant, with its sample time, set points, other inputs and
+drivers.
 
 A control law that is designed from weights (LawDesign) is designed before the loop runs.
 """
@@ -13,16 +14,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import ParameterError, ShortRepr, System, Value, abridged, alternatives, describe_model, quantity
+from ...core import (
+    ParameterError,
+    ShortRepr,
+    System,
+    Value,
+    abridged,
+    alternatives,
+    describe_model,
+    quantity,
+)
 from ...core.tree import Structure, structure, with_ambient
 from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
 from .controller import Controller, Measurement, named_signal_units
-from .inputs import ZERO_INPUT, CombinedSignal, InputSignal, Schedule, check_input_names, check_input_signal
+from .inputs import (
+    ZERO_INPUT,
+    CombinedSignal,
+    InputSignal,
+    Schedule,
+    check_input_names,
+    check_input_signal,
+)
 from .pwm_and_solenoid import Driver, WithDrivers
 
-COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
-"""Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""
+COMMAND = "command."
+SETPOINT = "setpoint."
+MEASURED = "measured."
+"""Prefixes of the columns of a recording that hold commands, set points and measurements of a
+controller.
+"""
 _without_design: set[Structure] = set()
 """Structures of control laws that contain no design."""
 
@@ -50,15 +71,18 @@ class ControlLoopState(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ControlLoop(ShortRepr):
-    """A sampled control loop: every `sample_time` [s], from the start of a run, the controller measures and commands.
+    """A sampled control loop: every `sample_time` [s], from the start of a run, the controller
+    measures and commands.
 
     sample_time   a number [s], or a text with its unit, "5 ms"
     setpoint      an InputSignal whose names are the controller's set points,
                   `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
-    other_inputs  an InputSignal for the inputs that the controller does not command; zero by default
-    drivers       between commands and openings, as in WithDrivers; the command of a driver is within 0 and 1
+    other_inputs  an InputSignal for the inputs that the controller does not command; zero by
+    default drivers       between commands and openings, as in WithDrivers; the command of a driver
+    is within 0 and 1
 
-    Between two samples a command is held. It is limited to the range that the plant declares for its input.
+    Between two samples a command is held. It is limited to the range that the plant declares for
+    its input.
     """
 
     controller: Controller
@@ -70,7 +94,8 @@ class ControlLoop(ShortRepr):
     def __post_init__(self) -> None:
         if not isinstance(self.controller, Controller):
             raise ParameterError(
-                f"ControlLoop.controller is {abridged(self.controller)}; give a PID or another Controller."
+                f"ControlLoop.controller is {abridged(self.controller)}; give a PID or another"
+                " Controller."
             )
         sample_time: Any = self.sample_time
         if isinstance(sample_time, str):
@@ -84,11 +109,13 @@ class ControlLoop(ShortRepr):
             or not 0 < sample_time <= sys.float_info.max
         ):
             raise ParameterError(
-                f"ControlLoop.sample_time is {abridged(sample_time)} s; it must be positive and finite."
+                f"ControlLoop.sample_time is {abridged(sample_time)} s; it must be positive and"
+                " finite."
             )
         check_input_signal(self.setpoint)
         check_input_signal(self.other_inputs)
-        named, expected = self.setpoint.names, self.controller.setpoints
+        named = self.setpoint.names
+        expected = self.controller.setpoints
         if named is not None and set(named) != set(expected):
             raise ParameterError(
                 f"ControlLoop.setpoint names {', '.join(named) or 'nothing'}; the set points of "
@@ -96,12 +123,16 @@ class ControlLoop(ShortRepr):
             )
         twice = [name for name in self.other_inputs.names or () if name in self.controller.inputs]
         if twice:
-            raise ParameterError(f"the input '{twice[0]}' is commanded by the controller and by other_inputs.")
+            raise ParameterError(
+                f"the input '{twice[0]}' is commanded by the controller and by other_inputs."
+            )
         _ = self.driven_inputs
 
     @property
     def driven_inputs(self) -> WithDrivers:
-        """The inputs that the controller does not command behind their drivers, and the drivers of all."""
+        """The inputs that the controller does not command behind their drivers, and the drivers of
+        all.
+        """
         return WithDrivers(self.other_inputs, self.drivers)
 
     def init(self, start: float) -> ControlLoopState:
@@ -119,27 +150,48 @@ class ControlLoop(ShortRepr):
         )
 
     def check_columns(self, columns: Sequence[str], inputs: Sequence[str]) -> None:
-        """Raise ParameterError, with the nearest name, for a column or input that the plant does not have."""
+        """Raise ParameterError, with the nearest name, for a column or input that the plant does
+        not have.
+        """
         check_present(self.controller, columns, inputs)
         check_input_names((*(self.other_inputs.names or ()), *self.drivers), inputs)
 
     def command_ranges(self, plant: System) -> dict[str, tuple[float, float]]:
-        """Minimum and maximum of every commanded input of a plant, in its order; of one with a driver 0 and 1."""
-        declared = {variable.name: (variable.minimum, variable.maximum) for variable in plant.input_variables}
+        """Minimum and maximum of every commanded input of a plant, in its order; of one with a
+        driver 0 and 1.
+        """
+        declared = {
+            variable.name: (variable.minimum, variable.maximum)
+            for variable in plant.input_variables
+        }
         known = {**declared, **dict.fromkeys(self.drivers, (0.0, 1.0))}
         return {name: known[name] for name in self.controller.inputs}
 
     def units(self, known: Mapping[str, str]) -> dict[str, str]:
-        """The units of the columns that the loop adds to a recording, from those of the plant's columns."""
-        known = {**named_signal_units(self.controller), **{name: unit for name, unit in known.items() if unit}}
+        """The units of the columns that the loop adds to a recording, from those of the plant's
+        columns.
+        """
+        known = {
+            **named_signal_units(self.controller),
+            **{name: unit for name, unit in known.items() if unit},
+        }
         names = [name for each in self.signals.values() for name in each]
-        return {column: known.get(name, "") for column, name in zip(self.column_names, names, strict=True)}
+        return {
+            column: known.get(name, "")
+            for column, name in zip(self.column_names, names, strict=True)
+        }
 
     @property
     def signals(self) -> dict[str, tuple[str, ...]]:
-        """Names of set points, measured columns and commanded inputs, by the prefixes of their columns."""
+        """Names of set points, measured columns and commanded inputs, by the prefixes of their
+        columns.
+        """
         controller = self.controller
-        return {SETPOINT: controller.setpoints, MEASURED: controller.measured_columns, COMMAND: controller.inputs}
+        return {
+            SETPOINT: controller.setpoints,
+            MEASURED: controller.measured_columns,
+            COMMAND: controller.inputs,
+        }
 
     @property
     def column_names(self) -> tuple[str, ...]:
@@ -147,14 +199,22 @@ class ControlLoop(ShortRepr):
         return tuple(f"{prefix}{name}" for prefix, names in self.signals.items() for name in names)
 
     def describe(self, units: Mapping[str, str]) -> str:
-        """Controller, sample time, controlled and manipulated variables; `units` by the names of columns and inputs."""
+        """Controller, sample time, controlled and manipulated variables; `units` by the names of
+        columns and inputs.
+        """
         measured, commanded = (
-            ", ".join(f"{name} [{units[name]}]" if units.get(name, "1") not in ("", "1") else name for name in names)
+            ", ".join(
+                f"{name} [{units[name]}]" if units.get(name, "1") not in ("", "1") else name
+                for name in names
+            )
             for names in (self.controller.measured_columns, self.controller.inputs)
         )
         seconds = self.sample_time
         period = f"{seconds * 1e3:.4g} ms" if seconds < 1 else f"{seconds:.4g} s"
-        return f"{self._controller_text}, sample time {period}, measured {measured}, commanded {commanded}"
+        return (
+            f"{self._controller_text}, sample time {period}, measured {measured}, commanded"
+            f" {commanded}"
+        )
 
     @functools.cached_property
     def _controller_text(self) -> str:
@@ -164,7 +224,8 @@ class ControlLoop(ShortRepr):
     def as_open_loop(self, recording: Recording) -> InputSignal:
         """The commands of a complete recorded run as an input signal without a controller.
 
-        It gives the same run: to plot the outputs of the drivers, or to simulate another plant with the same commands.
+        It gives the same run: to plot the outputs of the drivers, or to simulate another plant with
+        the same commands.
         """
         time = recording["time"].tolist()
         commands = {name: recording[f"{COMMAND}{name}"].tolist() for name in self.controller.inputs}
@@ -177,7 +238,9 @@ class ControlLoop(ShortRepr):
 
 
 def check_present(controller: Controller, columns: Sequence[str], inputs: Sequence[str]) -> None:
-    """Raise ParameterError, with the nearest name, for a column or input that the plant does not have."""
+    """Raise ParameterError, with the nearest name, for a column or input that the plant does not
+    have.
+    """
     for name in controller.measured_columns:
         if name not in columns:
             raise ParameterError(
@@ -188,10 +251,12 @@ def check_present(controller: Controller, columns: Sequence[str], inputs: Sequen
 
 
 class LawDesign(EnclosingLaw):
-    """A control law whose numbers follow from declared weights by a design, such as Riccati equations.
+    """A control law whose numbers follow from declared weights by a design, such as Riccati
+    equations.
 
-    A design cannot be traced; its result can. A run therefore compiles the designed `law`, and a search for the weights
-    designs it anew for each set. Everything else is that of the designed law.
+    A design cannot be traced; its result can. A run therefore compiles the designed `law`, and a
+    search for the weights designs it anew for each set. Everything else is that of the designed
+    law.
     """
 
     @property
@@ -204,13 +269,16 @@ class LawDesign(EnclosingLaw):
 
 
 def with_designed_laws(law: Controller) -> Controller:
-    """A controller with the designed law in place of every LawDesign in it; the same object where there is none.
+    """A controller with the designed law in place of every LawDesign in it; the same object where
+    there is none.
 
     A controller that is no ControlLaw remains as it is.
     """
     if not isinstance(law, ControlLaw) or structure(law) in _without_design:
         return law
-    designed: Controller = rebuilt(law, lambda part: part.law if isinstance(part, LawDesign) else part)
+    designed: Controller = rebuilt(
+        law, lambda part: part.law if isinstance(part, LawDesign) else part
+    )
     if designed is law:
         _without_design.add(structure(law))
     return designed
@@ -219,9 +287,13 @@ def with_designed_laws(law: Controller) -> Controller:
 def designed_loop(loop: ControlLoop, system: System) -> ControlLoop:
     """A loop with the designed laws in its controller; the same object where there is no design.
 
-    Pressures that the controller states as absolute are converted with the ambient pressure of the system.
+    Pressures that the controller states as absolute are converted with the ambient pressure of the
+    system.
     """
-    controller, ambient = with_designed_laws(loop.controller), system.constants.get("ambient")
+    controller = with_designed_laws(loop.controller)
+    ambient = system.constants.get("ambient")
     if isinstance(controller, ControlLaw) and isinstance(ambient, float):
         controller = with_ambient(controller, ambient)
-    return loop if controller is loop.controller else dataclasses.replace(loop, controller=controller)
+    return (
+        loop if controller is loop.controller else dataclasses.replace(loop, controller=controller)
+    )

@@ -1,4 +1,6 @@
-"""Input signals: inputs of a plant as functions of time, linear between two instants, and their segments in a run."""
+"""Input signals: inputs of a plant as functions of time, linear between two instants, and their
+segments in a run.
+"""
 
 import abc
 import bisect
@@ -9,7 +11,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError, ShortRepr, abridged, all_finite, as_float, check_known, one_line
+from ...core import (
+    Array,
+    ParameterError,
+    ShortRepr,
+    abridged,
+    all_finite,
+    as_float,
+    check_known,
+    one_line,
+)
 from ...core.declaration import forwarded
 
 FEW_SEGMENTS = 16
@@ -23,7 +34,9 @@ NO_INPUT = "the plant has no input"
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class PiecewiseLinear(ShortRepr):
-    """Inputs in time: ends (S,) of the segments, inputs at the start of each (S, m), and their slopes [1/s] (S, m)."""
+    """Inputs in time: ends (S,) of the segments, inputs at the start of each (S, m), and their
+    slopes [1/s] (S, m).
+    """
 
     ends: Array
     values: Array
@@ -33,15 +46,20 @@ class PiecewiseLinear(ShortRepr):
         """The inputs (N, m) at times (N,); where two segments meet, those of the later one."""
         starts = self.starts(start)
         index = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
-        return np.asarray(self.values[index] + (times - starts[index])[:, None] * self.slopes[index])
+        return np.asarray(
+            self.values[index] + (times - starts[index])[:, None] * self.slopes[index]
+        )
 
     def at_rising(self, times: Array, start: float) -> tuple[Array, Array]:
-        """The inputs (N, m) and their slopes (N, m) at rising times (N,), as `inputs_at` at any times."""
+        """The inputs (N, m) and their slopes (N, m) at rising times (N,), as `inputs_at` at any
+        times.
+        """
         if self.ends.size > FEW_SEGMENTS:
             index = np.maximum(np.searchsorted(self.starts(start), times, side="right") - 1, 0)
             return self.inputs_at(times, start), self.slopes[index]
         shape = (times.size, self.values.shape[1])
-        values, slopes = np.empty(shape), np.empty(shape)
+        values = np.empty(shape)
+        slopes = np.empty(shape)
         begins = [start, *self.ends[:-1].tolist()]
         rows = [0, *times.searchsorted(self.ends[:-1]).tolist(), times.size]
         for i, (first, last) in enumerate(itertools.pairwise(rows)):
@@ -57,25 +75,35 @@ class PiecewiseLinear(ShortRepr):
 
     def column(self, i: int) -> list[Segment]:
         """The segments of one input."""
-        values, slopes = self.values[:, i].tolist(), self.slopes[:, i].tolist()
+        values = self.values[:, i].tolist()
+        slopes = self.slopes[:, i].tolist()
         return list(zip(self.ends.tolist(), values, slopes, strict=True))
 
     def check_shape(self, inputs: int, start: float, duration: float) -> None:
-        """Raise ParameterError unless ends rise from `start` [s] for `duration` [s], and every segment has all inputs,
-        all finite. Kernels rely on it; a run ends with its segments."""
-        ends, values, slopes, end = self.ends, self.values, self.slopes, start + duration
+        """Raise ParameterError unless ends rise from `start` [s] for `duration` [s], and every
+        segment has all inputs, all finite. Kernels rely on it; a run ends with its segments."""
+        ends = self.ends
+        values = self.values
+        slopes = self.slopes
+        end = start + duration
         shape = (ends.size, inputs)
         if ends.ndim != 1 or not ends.size or values.shape != shape or slopes.shape != shape:
             raise ParameterError(
-                f"segments have ends {ends.shape}, values {values.shape} and slopes {slopes.shape}; for {inputs} "
-                f"inputs they must be (S,), (S, {inputs}) and (S, {inputs}), with at least one segment."
+                f"segments have ends {ends.shape}, values {values.shape} and slopes {slopes.shape};"
+                f" for {inputs} inputs they must be (S,), (S, {inputs}) and (S, {inputs}), with at"
+                " least one segment."
             )
         if not (all_finite(ends) and all_finite(values) and all_finite(slopes)):
             raise ParameterError("segments hold a number that is not finite.")
         if ends[0] <= start or not (ends[1:] > ends[:-1]).all():
-            raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
+            raise ParameterError(
+                f"segments must end in rising order after {start:g} s; they end at"
+                f" {ends.tolist()} s."
+            )
         if abs(ends[-1] - end) > max(1e-9 * duration, 4 * np.spacing(abs(end))):
-            raise ParameterError(f"segments end at {ends[-1]:g} s; they must end with the run, at {end:g} s.")
+            raise ParameterError(
+                f"segments end at {ends[-1]:g} s; they must end with the run, at {end:g} s."
+            )
 
     def as_floats(self) -> "PiecewiseLinear":
         """The same inputs as arrays that a kernel can read: contiguous, writeable, of float64."""
@@ -85,8 +113,8 @@ class PiecewiseLinear(ShortRepr):
         return PiecewiseLinear(*(np.array(t, dtype=float, order="C") for t in tables))
 
     def split_at(self, starts: Array, start: float) -> "PiecewiseLinear":
-        """The same inputs with segments that start at other instants (R,), in rising order, the first not before
-        `start`; no segment may end within one of them."""
+        """The same inputs with segments that start at other instants (R,), in rising order, the
+        first not before `start`; no segment may end within one of them."""
         ends = np.append(starts[1:], self.ends[-1])
         return PiecewiseLinear(ends, *self.at_rising(starts, start))
 
@@ -99,9 +127,12 @@ def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> Piecewi
         values = [value + 0.0 * slope for value, slope in zip(levels, rates, strict=True)]
         return PiecewiseLinear(np.array(ends[:1]), np.array([values]), np.array([rates]))
     starts = sorted({start, *(end for column in columns for end, _, _ in column[:-1])})
-    values, slopes = [0.0] * (len(starts) * width), [0.0] * (len(starts) * width)
+    values = [0.0] * (len(starts) * width)
+    slopes = [0.0] * (len(starts) * width)
     for i, column in enumerate(columns):
-        begin, k, last = start, 0, len(column) - 1
+        begin = start
+        k = 0
+        last = len(column) - 1
         for row, time in enumerate(starts):
             while k < last and column[k][0] <= time:
                 begin = column[k][0]
@@ -110,7 +141,8 @@ def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> Piecewi
             values[row * width + i] = value + (time - begin) * slope
             slopes[row * width + i] = slope
     shape = len(starts), width
-    table, rising = np.array(values).reshape(shape), np.array(slopes).reshape(shape)
+    table = np.array(values).reshape(shape)
+    rising = np.array(slopes).reshape(shape)
     return PiecewiseLinear(np.array([*starts[1:], columns[0][-1][0]]), table, rising)
 
 
@@ -119,14 +151,17 @@ class InputSignal(abc.ABC):
 
     @abc.abstractmethod
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """These inputs from `start` [s] on for `duration` [s], in segments in which every input is linear.
+        """These inputs from `start` [s] on for `duration` [s], in segments in which every input is
+        linear.
 
         Raises ParameterError for an input that the plant does not have.
         """
 
-    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """The same as arrays that a kernel can read. Raises ParameterError also for segments that do not rise in time,
-        lack an input or hold a number that is not finite."""
+    def checked_segments(
+        self, inputs: Sequence[str], start: float, duration: float
+    ) -> PiecewiseLinear:
+        """The same as arrays that a kernel can read. Raises ParameterError also for segments that
+        do not rise in time, lack an input or hold a number that is not finite."""
         segments = self.segments(inputs, start, duration)
         segments.check_shape(len(inputs), start, duration)
         return segments.as_floats()
@@ -142,9 +177,12 @@ def check_input_signal(given: object) -> None:
     if not isinstance(given, InputSignal):
         remedy = ""
         if isinstance(given, Mapping) and given:
-            remedy = f" Schedule({{{next(iter(given))!r}: ((0, 1.0),)}}) is an input of 1 from 0 s on."
+            remedy = (
+                f" Schedule({{{next(iter(given))!r}: ((0, 1.0),)}}) is an input of 1 from 0 s on."
+            )
         raise ParameterError(
-            f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another InputSignal.{remedy}"
+            f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another"
+            f" InputSignal.{remedy}"
         )
 
 
@@ -156,31 +194,41 @@ def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str =
 def check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
     """Raise ParameterError for anything that does not name inputs."""
     if not isinstance(given, Mapping):
-        raise ParameterError(f"a {kind} is {abridged(given)}; name the inputs: {{'fill': {example}}}.")
+        raise ParameterError(
+            f"a {kind} is {abridged(given)}; name the inputs: {{'fill': {example}}}."
+        )
 
 
-def as_pairs(kind: str, noun: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Pairs of time and value as finite numbers, the times rising. Raises ParameterError for anything else."""
+def as_pairs(
+    kind: str, noun: str, name: str, given: Sequence[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Pairs of time and value as finite numbers, the times rising. Raises ParameterError for
+    anything else.
+    """
     try:
         points = [(as_float("a time", time), as_float("a value", value)) for time, value in given]
     except (TypeError, ValueError, ParameterError):
         raise ParameterError(
-            f"the {kind} of '{name}' is {one_line(given)}; write pairs of time [s] and value, ((5, 1), (15, 0))."
+            f"the {kind} of '{name}' is {one_line(given)}; write pairs of time [s] and value, ((5,"
+            " 1), (15, 0))."
         ) from None
     if points and not np.isfinite(points).all():
-        raise ParameterError(f"the {kind} of '{name}' holds a number that is not finite: {one_line(points)}.")
+        raise ParameterError(
+            f"the {kind} of '{name}' holds a number that is not finite: {one_line(points)}."
+        )
     for i, (a, b) in enumerate(itertools.pairwise(time for time, _ in points)):
         if b <= a:
             raise ParameterError(
-                f"the {kind} of '{name}' must list its {noun} in rising order; number {i + 2}, {b:g} s, follows "
-                f"{a:g} s."
+                f"the {kind} of '{name}' must list its {noun} in rising order; number {i + 2},"
+                f" {b:g} s, follows {a:g} s."
             )
     return points
 
 
 @dataclasses.dataclass(frozen=True)
 class Schedule(InputSignal):
-    """Piecewise constant inputs, each a sequence of (instant [s], value from then on); 0 before the first instant.
+    """Piecewise constant inputs, each a sequence of (instant [s], value from then on); 0 before the
+    first instant.
 
     `Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)})`
     """
@@ -202,8 +250,12 @@ class Schedule(InputSignal):
     def names(self) -> tuple[str, ...]:
         return tuple(self.changes)
 
-    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """As of any signal, in arrays that cannot be written to; those of the last call are kept for the next one."""
+    def checked_segments(
+        self, inputs: Sequence[str], start: float, duration: float
+    ) -> PiecewiseLinear:
+        """As of any signal, in arrays that cannot be written to; those of the last call are kept
+        for the next one.
+        """
         *asked, segments = self._last  # type: ignore[attr-defined]
         if segments is None or asked != [inputs, start, duration]:
             segments = super().checked_segments(inputs, start, duration)
@@ -216,7 +268,10 @@ class Schedule(InputSignal):
         changes: dict[str, tuple[list[float], list[float]]] = self._changes  # type: ignore[attr-defined]
         check_input_names(changes, inputs)
         end = start + duration
-        starts = [start, *sorted({t for times, _ in changes.values() for t in times if start < t < end})]
+        starts = [
+            start,
+            *sorted({t for times, _ in changes.values() for t in times if start < t < end}),
+        ]
         values = np.zeros((len(starts), len(inputs)))
         for i, name in enumerate(inputs):
             if name in changes:
@@ -229,7 +284,8 @@ class Schedule(InputSignal):
 class Periodic(InputSignal):
     """The first `period` [s] of another input signal, from its time 0 on, repeated for all times.
 
-    Drivers are wrapped around it, `WithDrivers(Periodic(...), ...)`: inside they would start anew in every period.
+    Drivers are wrapped around it, `WithDrivers(Periodic(...), ...)`: inside they would start anew
+    in every period.
     """
 
     inner: InputSignal
@@ -240,21 +296,30 @@ class Periodic(InputSignal):
     def __post_init__(self) -> None:
         check_input_signal(self.inner)
         if not 0 < as_float("Periodic.period", self.period) < np.inf:
-            raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
+            raise ParameterError(
+                f"Periodic.period is {self.period!r} s; it must be positive and finite."
+            )
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        once, end = self.inner.segments(inputs, 0.0, self.period), start + duration
-        first, last = np.floor(start / self.period), np.ceil(end / self.period)
+        once = self.inner.segments(inputs, 0.0, self.period)
+        end = start + duration
+        first = np.floor(start / self.period)
+        last = np.ceil(end / self.period)
         if (last - first) * once.ends.size > MAX_INSTANTS:
             raise ParameterError(
-                f"an input of {once.ends.size} segments every {self.period:g} s makes more than {MAX_INSTANTS} "
-                f"instants in {duration:g} s. Simulate a shorter time."
+                f"an input of {once.ends.size} segments every {self.period:g} s makes more than"
+                f" {MAX_INSTANTS} instants in {duration:g} s. Simulate a shorter time."
             )
-        begins, size = self.period * np.arange(first, last), (int(last - first), 1)
+        begins = self.period * np.arange(first, last)
+        size = (int(last - first), 1)
         starts = (begins[:, None] + once.starts(0.0)).ravel()
         rounding = 4 * np.spacing(max(abs(start), self.period))
-        starts[np.abs(starts - start) <= rounding] = start  # 3 * 0.1 is more than 0.3: no segment of 1e-17 s
-        whole = PiecewiseLinear(np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size))
+        starts[np.abs(starts - start) <= rounding] = (
+            start  # 3 * 0.1 is more than 0.3: no segment of 1e-17 s
+        )
+        whole = PiecewiseLinear(
+            np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size)
+        )
         within = starts[(starts > start) & (starts < end)]
         return whole.split_at(np.append(start, within), float(starts[0]))
 
@@ -272,7 +337,9 @@ class CombinedSignal(InputSignal):
         return None if other is None else (*(self.inner.names or ()), *other)
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        inner, other = (signal.segments(inputs, start, duration) for signal in (self.inner, self.other))
+        inner, other = (
+            signal.segments(inputs, start, duration) for signal in (self.inner, self.other)
+        )
         own = self.inner.names or ()
         columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
         return merge_columns(columns, start) if columns else other

@@ -1,7 +1,9 @@
-"""Drivers between the command of an input and the opening of its valve: solenoids and pulse width modulation.
+"""Drivers between the command of an input and the opening of its valve: solenoids and pulse width
+modulation.
 
-A driver has a state, a named tuple of numbers, because what was switched may still be pending: carried along, a run in
-many steps equals the run in one. A run starts at rest: no current, valve closed, carrier at the start of a period.
+A driver has a state, a named tuple of numbers, because what was switched may still be pending:
+carried along, a run in many steps equals the run in one. A run starts at rest: no current, valve
+closed, carrier at the start of a period.
 """
 
 import abc
@@ -14,7 +16,14 @@ from typing import Any, NamedTuple
 from ...core import INFINITY, ParameterError, ShortRepr, abridged, model, parameter
 from ...core.declaration import forwarded
 from ..compile.kernel_text.source import plain_kernels
-from .inputs import InputSignal, PiecewiseLinear, Segment, check_input_names, check_input_signal, merge_columns
+from .inputs import (
+    InputSignal,
+    PiecewiseLinear,
+    Segment,
+    check_input_names,
+    check_input_signal,
+    merge_columns,
+)
 
 MAX_PERIODS = 10_000_000
 """Periods of a carrier in one run."""
@@ -31,16 +40,20 @@ class Driver(abc.ABC):
         """The state of a driver at rest at `start` [s]."""
 
     @abc.abstractmethod
-    def step(self, state: Any, command: Sequence[Segment], start: float) -> tuple[list[Segment], Any]:
+    def step(
+        self, state: Any, command: Sequence[Segment], start: float
+    ) -> tuple[list[Segment], Any]:
         """The opening for a command from `start` [s] to its end, and the state there.
 
-        The opening at an instant does not depend on later commands: split at any instant, the result is the same.
+        The opening at an instant does not depend on later commands: split at any instant, the
+        result is the same.
         """
 
 
 class SolenoidState(NamedTuple):
-    """A solenoid valve at one instant: current in the coil 0 or 1, the instant [s] at which the plunger will respond
-    (infinite when nothing is pending), the target of the plunger, 0 or 1, and the opening."""
+    """A solenoid valve at one instant: current in the coil 0 or 1, the instant [s] at which the
+    plunger will respond (infinite when nothing is pending), the target of the plunger, 0 or 1, and
+    the opening."""
 
     coil: float
     pending: float
@@ -52,22 +65,33 @@ class SolenoidState(NamedTuple):
 class SolenoidDriver(Driver):
     """A solenoid valve with dead times and a finite speed of the plunger.
 
-    The coil carries current while the command is at least 0.5 (chosen). The plunger follows the coil after the delay of
-    the new direction, if the coil is still in that state: a pulse no longer than the opening delay never opens the
-    valve, a gap no longer than the closing delay never closes it. It then moves at constant speed, 1/ramp, until it
-    arrives or is reversed, which again takes the delay: a pulse a little longer than the opening delay opens partly.
-    The magnetic field is assumed to decay at once, so that a pulse that was too short has no effect.
+    The coil carries current while the command is at least 0.5 (chosen). The plunger follows the
+    coil after the delay of the new direction, if the coil is still in that state: a pulse no longer
+    than the opening delay never opens the valve, a gap no longer than the closing delay never
+    closes it. It then moves at constant speed, 1/ramp, until it arrives or is reversed, which again
+    takes the delay: a pulse a little longer than the opening delay opens partly. The magnetic field
+    is assumed to decay at once, so that a pulse that was too short has no effect.
     """
 
-    opening_delay: float = parameter("s", "t_on", "from current to the first motion", bounds=(0.0, 10.0), default=0.0)
-    closing_delay: float = parameter("s", "t_off", "from no current to motion", bounds=(0.0, 10.0), default=0.0)
-    opening_ramp: float = parameter("s", "T_on", "from closed to open, in motion", bounds=(0.0, 10.0), default=0.0)
-    closing_ramp: float = parameter("s", "T_off", "from open to closed, in motion", bounds=(0.0, 10.0), default=0.0)
+    opening_delay: float = parameter(
+        "s", "t_on", "from current to the first motion", bounds=(0.0, 10.0), default=0.0
+    )
+    closing_delay: float = parameter(
+        "s", "t_off", "from no current to motion", bounds=(0.0, 10.0), default=0.0
+    )
+    opening_ramp: float = parameter(
+        "s", "T_on", "from closed to open, in motion", bounds=(0.0, 10.0), default=0.0
+    )
+    closing_ramp: float = parameter(
+        "s", "T_off", "from open to closed, in motion", bounds=(0.0, 10.0), default=0.0
+    )
 
     def init(self, start: float) -> SolenoidState:
         return SolenoidState(coil=0.0, pending=INFINITY, target=0.0, opening=0.0)
 
-    settings = property(operator.attrgetter("opening_delay", "closing_delay", "opening_ramp", "closing_ramp"))
+    settings = property(
+        operator.attrgetter("opening_delay", "closing_delay", "opening_ramp", "closing_ramp")
+    )
     """The parameters, in the order of the kernel."""
 
     def step(
@@ -78,8 +102,10 @@ class SolenoidDriver(Driver):
 
 
 class PwmState(NamedTuple):
-    """A pulse width modulator at one instant: start of its carrier [s], number of periods that have begun, and the end
-    of the pulse of the last of them [s] (infinite when it fills its period, minus infinite when there is none)."""
+    """A pulse width modulator at one instant: start of its carrier [s], number of periods that have
+    begun, and the end of the pulse of the last of them [s] (infinite when it fills its period,
+    minus infinite when there is none).
+    """
 
     origin: float
     begun: float
@@ -88,20 +114,24 @@ class PwmState(NamedTuple):
 
 @model
 class PWM(Driver):
-    """Pulse width modulation: the command at the start of a period is the part of the period that is on.
+    """Pulse width modulation: the command at the start of a period is the part of the period that
+    is on.
 
-    A pulse shorter than the smallest pulse is omitted, and a gap shorter than it is filled, so that the mean of a
-    period differs from the command by at most the smallest pulse times the frequency.
+    A pulse shorter than the smallest pulse is omitted, and a gap shorter than it is filled, so that
+    the mean of a period differs from the command by at most the smallest pulse times the frequency.
     """
 
     frequency: float = parameter("Hz", "f_c", "frequency of the carrier", bounds=(1e-3, 1e6))
-    smallest_pulse: float = parameter("s", "t_min", "shortest pulse and gap", bounds=(0.0, 1e3), default=0.0)
+    smallest_pulse: float = parameter(
+        "s", "t_min", "shortest pulse and gap", bounds=(0.0, 1e3), default=0.0
+    )
 
     def check(self) -> None:
         if self.smallest_pulse * self.frequency > 0.5:
             raise ParameterError(
-                f"PWM.smallest_pulse is {self.smallest_pulse:g} s, more than half of the carrier's period of "
-                f"{1 / self.frequency:g} s: no pulse would leave time for a gap. Lower the frequency."
+                f"PWM.smallest_pulse is {self.smallest_pulse:g} s, more than half of the carrier's"
+                f" period of {1 / self.frequency:g} s: no pulse would leave time for a gap. Lower"
+                " the frequency."
             )
 
     def init(self, start: float) -> PwmState:
@@ -110,39 +140,54 @@ class PWM(Driver):
     settings = property(operator.attrgetter("frequency", "smallest_pulse"))
     """The parameters, in the order of the kernel."""
 
-    def step(self, state: PwmState, command: Sequence[Segment], start: float) -> tuple[list[Segment], PwmState]:
+    def step(
+        self, state: PwmState, command: Sequence[Segment], start: float
+    ) -> tuple[list[Segment], PwmState]:
         end = command[-1][0]
         count = (end - state.origin) * self.frequency - state.begun
         if count > MAX_PERIODS:
             raise ParameterError(
-                f"a carrier of {self.frequency:g} Hz has {count:.3g} periods in {end - start:g} s; {MAX_PERIODS} are "
-                "allowed. Simulate a shorter time, or the mean of the pulses."
+                f"a carrier of {self.frequency:g} Hz has {count:.3g} periods in {end - start:g} s;"
+                f" {MAX_PERIODS} are allowed. Simulate a shorter time, or the mean of the pulses."
             )
         ulp = math.ulp(end)
-        openings, later = _driven("pulse_width_modulation", self.settings, state, command, start, ulp)
+        openings, later = _driven(
+            "pulse_width_modulation", self.settings, state, command, start, ulp
+        )
         return openings, PwmState(*later)
 
 
 def _driven(
-    kernel: str, settings: tuple[float, ...], state: tuple[float, ...], command: Sequence[Segment], start: float,
+    kernel: str,
+    settings: tuple[float, ...],
+    state: tuple[float, ...],
+    command: Sequence[Segment],
+    start: float,
     last: Any,
-) -> tuple[list[Segment], list[float]]:  # fmt: skip
-    """The opening and the state that a kernel makes of a command, with its `last` argument before the result."""
+) -> tuple[list[Segment], list[float]]:
+    """The opening and the state that a kernel makes of a command, with its `last` argument before
+    the result.
+    """
     ends: dict[int, float] = {}
     values: dict[int, float] = {}
     slopes: dict[int, float] = {}
-    later, signal = [*state], list(zip(*command, strict=True))
+    later = [*state]
+    signal = list(zip(*command, strict=True))
     function = plain_kernels("drivers")[kernel]
-    count = function(settings, state, later, signal, len(signal[0]), start, last, (ends, values, slopes))
+    count = function(
+        settings, state, later, signal, len(signal[0]), start, last, (ends, values, slopes)
+    )
     return [(ends[i], values[i], slopes[i]) for i in range(count)], later
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class WithDrivers(ShortRepr, InputSignal):
-    """An input signal whose inputs, some or all, pass through drivers: one each, or several in the order of the signal.
+    """An input signal whose inputs, some or all, pass through drivers: one each, or several in the
+    order of the signal.
 
-    `WithDrivers(SampledSignal({"fill": ...}), {"fill": (PWM(50), SolenoidDriver(opening_delay=5e-3))})`. Inputs without
-    a driver are applied without delay. Raises ParameterError where the command of a driver leaves 0 to 1.
+    `WithDrivers(SampledSignal({"fill": ...}), {"fill": (PWM(50),
+    SolenoidDriver(opening_delay=5e-3))})`. Inputs without a driver are applied without delay.
+    Raises ParameterError where the command of a driver leaves 0 to 1.
     """
 
     inner: InputSignal
@@ -154,32 +199,48 @@ class WithDrivers(ShortRepr, InputSignal):
         check_input_signal(self.inner)
         if not isinstance(self.drivers, Mapping):
             raise ParameterError(
-                f"the drivers are {abridged(self.drivers)}; name the inputs: {{'fill': SolenoidDriver(...)}}."
+                f"the drivers are {abridged(self.drivers)}; name the inputs: {{'fill':"
+                " SolenoidDriver(...)}."
             )
         for name, chain in self.chains.items():
             for driver in chain:
                 if not isinstance(driver, Driver):
                     raise ParameterError(
-                        f"the driver of '{name}' is {abridged(driver)}; write SolenoidDriver(...), PWM(...) or several."
+                        f"the driver of '{name}' is {abridged(driver)}; write SolenoidDriver(...),"
+                        " PWM(...) or several."
                     )
 
     @property
     def chains(self) -> dict[str, tuple[Driver, ...]]:
         """The drivers of each input, in the order of the signal."""
-        return {name: given if isinstance(given, tuple) else (given,) for name, given in self.drivers.items()}
+        return {
+            name: given if isinstance(given, tuple) else (given,)
+            for name, given in self.drivers.items()
+        }
 
     def init(self, start: float) -> dict[str, tuple[Any, ...]]:
         """The states of the drivers of each input, at rest at `start` [s]."""
-        return {name: tuple(driver.init(start) for driver in chain) for name, chain in self.chains.items()}
+        return {
+            name: tuple(driver.init(start) for driver in chain)
+            for name, chain in self.chains.items()
+        }
 
     def step(
-        self, states: Mapping[str, tuple[Any, ...]], inputs: Sequence[str], start: float, duration: float
+        self,
+        states: Mapping[str, tuple[Any, ...]],
+        inputs: Sequence[str],
+        start: float,
+        duration: float,
     ) -> tuple[PiecewiseLinear, dict[str, tuple[Any, ...]]]:
-        """The inputs from `start` [s] on for `duration` [s], and the drivers' states then, for the next step."""
+        """The inputs from `start` [s] on for `duration` [s], and the drivers' states then, for the
+        next step.
+        """
         check_input_names(list(self.drivers), inputs)
         command = self.inner.segments(inputs, start, duration)
         columns = [command.column(i) for i in range(len(inputs))]
-        later = apply_drivers(self.chains, states, columns, {name: inputs.index(name) for name in self.drivers}, start)
+        later = apply_drivers(
+            self.chains, states, columns, {name: inputs.index(name) for name in self.drivers}, start
+        )
         return merge_columns(columns, start) if self.drivers else command, later
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
@@ -187,16 +248,22 @@ class WithDrivers(ShortRepr, InputSignal):
 
 
 def apply_drivers(
-    chains: Mapping[str, tuple[Driver, ...]], states: Mapping[str, tuple[Any, ...]], columns: list[list[Segment]],
-    indices: Mapping[str, int], start: float,
-) -> dict[str, tuple[Any, ...]]:  # fmt: skip
-    """Replace the commands of inputs by the openings that their drivers make of them; the drivers' states at the end.
+    chains: Mapping[str, tuple[Driver, ...]],
+    states: Mapping[str, tuple[Any, ...]],
+    columns: list[list[Segment]],
+    indices: Mapping[str, int],
+    start: float,
+) -> dict[str, tuple[Any, ...]]:
+    """Replace the commands of inputs by the openings that their drivers make of them; the drivers'
+    states at the end.
 
-    `columns` holds the segments of every input from `start` [s] on, `indices` says which input has which drivers.
+    `columns` holds the segments of every input from `start` [s] on, `indices` says which input has
+    which drivers.
     """
     later = {}
     for name, chain in chains.items():
-        column, before = indices[name], states[name]
+        column = indices[name]
+        before = states[name]
         signal = columns[column]
         check_command_range(name, signal, start)
         after = []
@@ -214,6 +281,7 @@ def check_command_range(name: str, command: Sequence[Segment], start: float) -> 
         for at in (value, value + slope * (end - begin)) if slope else (value,):
             if not -_ROUNDING <= at <= _FULL:
                 raise ParameterError(
-                    f"the command of the driver of '{name}' is {at:g} before {end:g} s; allowed range: 0 to 1."
+                    f"the command of the driver of '{name}' is {at:g} before {end:g} s; allowed"
+                    " range: 0 to 1."
                 )
         begin = end

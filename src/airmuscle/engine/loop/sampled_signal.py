@@ -1,4 +1,6 @@
-"""SampledSignal: inputs as connected straight lines, from points, recordings, functions of time or a trajectory."""
+"""SampledSignal: inputs as connected straight lines, from points, recordings, functions of time or
+a trajectory.
+"""
 
 import dataclasses
 import warnings
@@ -22,7 +24,9 @@ ACCELERATION = "prescribed_acceleration"
 
 @dataclasses.dataclass(frozen=True)
 class SampledSignal(InputSignal):
-    """Piecewise linear inputs, each a sequence of (time [s], value); constant before the first and after the last."""
+    """Piecewise linear inputs, each a sequence of (time [s], value); constant before the first and
+    after the last.
+    """
 
     from_file: ClassVar[bool] = True
 
@@ -33,7 +37,8 @@ class SampledSignal(InputSignal):
         for name, given in self.points.items():
             if not as_pairs("sampled signal", "times", name, given):
                 raise ParameterError(
-                    f"the sampled signal of '{name}' has no points; write pairs of time [s] and value."
+                    f"the sampled signal of '{name}' has no points; write pairs of time [s] and"
+                    " value."
                 )
 
     @property
@@ -48,33 +53,55 @@ class SampledSignal(InputSignal):
         """
         if not isinstance(recording, Recording):
             raise ParameterError(
-                f"SampledSignal.recorded: {one_line(recording)} is no Recording; give what read_csv or read returns."
+                f"SampledSignal.recorded: {one_line(recording)} is no Recording; give what read_csv"
+                " or read returns."
             )
         check_mapping("recorded signal", columns, "'column'")
         times = recording["time"].tolist()
-        return cls({name: tuple(zip(times, recording[c].tolist(), strict=True)) for name, c in columns.items()})
+        return cls(
+            {
+                name: tuple(zip(times, recording[c].tolist(), strict=True))
+                for name, c in columns.items()
+            }
+        )
 
     @classmethod
     def sampled(
-        cls, functions: Mapping[str, Callable[[float], float]], *, duration: float, start: float = 0.0,
+        cls,
+        functions: Mapping[str, Callable[[float], float]],
+        *,
+        duration: float,
+        start: float = 0.0,
         error: float = 1e-4,
-    ) -> "SampledSignal":  # fmt: skip
-        """Functions of time [s], approximated to within `error` by straight lines that are bisected until they are.
+    ) -> "SampledSignal":
+        """Functions of time [s], approximated to within `error` by straight lines that are bisected
+        until they are.
 
-        Each line is compared with its function at a quarter, a half and three quarters of it, and none is longer than
-        1/64 of the duration (chosen); what a function does between these points is not seen. Raises ParameterError for
-        a function that 100 000 points do not approximate, jumps (give a Schedule), or returns no finite number.
+        Each line is compared with its function at a quarter, a half and three quarters of it, and
+        none is longer than 1/64 of the duration (chosen); what a function does between these points
+        is not seen. Raises ParameterError for a function that 100 000 points do not approximate,
+        jumps (give a Schedule), or returns no finite number.
         """
         check_mapping("sampled signal", functions, "lambda t: 0.5")
         duration = as_float("SampledSignal.sampled: duration", duration)
         start = as_float("SampledSignal.sampled: start", start)
         error = as_float("SampledSignal.sampled: error", error)
-        return cls({name: approximate(name, f, start, start + duration, error) for name, f in functions.items()})
+        return cls(
+            {
+                name: approximate(name, f, start, start + duration, error)
+                for name, f in functions.items()
+            }
+        )
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         check_input_names(list(self.points), inputs)
         end = start + duration
-        corners = {float(time) for points in self.points.values() for time, _ in points if start < time < end}
+        corners = {
+            float(time)
+            for points in self.points.values()
+            for time, _ in points
+            if start < time < end
+        }
         ends = np.array([*sorted(corners), end])
         edges = np.concatenate([[start], ends])
         values = np.zeros((edges.size, len(inputs)))
@@ -84,14 +111,20 @@ class SampledSignal(InputSignal):
                 values[:, i] = np.interp(edges, times, levels)
         return PiecewiseLinear(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
 
-    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """As of any signal; an AirmuscleWarning for an input that varies after the end of the run only."""
+    def checked_segments(
+        self, inputs: Sequence[str], start: float, duration: float
+    ) -> PiecewiseLinear:
+        """As of any signal; an AirmuscleWarning for an input that varies after the end of the run
+        only.
+        """
         for name, points in self.points.items():
-            first, end = points[0][0], start + duration
+            first = points[0][0]
+            end = start + duration
             if first > end and any(value != points[0][1] for _, value in points):
                 warnings.warn(
-                    f"the points of the input '{name}' begin at {first:.6g} s, after the end of the run at {end:.6g} "
-                    "s: its first value is held. If its times have another zero, subtract it, or set start_time.",
+                    f"the points of the input '{name}' begin at {first:.6g} s, after the end of the"
+                    f" run at {end:.6g} s: its first value is held. If its times have another zero,"
+                    " subtract it, or set start_time.",
                     AirmuscleWarning,
                     stacklevel=7,
                 )
@@ -104,8 +137,8 @@ def approximate(
     """Points of a function whose connecting lines stay within `error` of it."""
     if not (0 < error < np.inf and -np.inf < start < end < np.inf):
         raise ParameterError(
-            f"the sampled signal of '{name}': from {start!r} to {end!r} s within {error!r}; the error and the duration "
-            "must be greater than 0."
+            f"the sampled signal of '{name}': from {start!r} to {end!r} s within {error!r}; the"
+            " error and the duration must be greater than 0."
         )
     times = np.linspace(start, end, INITIAL_LINES + 1)
     values = _evaluate(name, function, times)
@@ -119,46 +152,57 @@ def approximate(
             return tuple(zip(times.tolist(), values.tolist(), strict=True))
         if times.size + at.size > MAX_POINTS or lengths[at].min() < 1e-9 * (end - start):
             raise ParameterError(
-                f"the sampled signal of '{name}' is not approximated to {error:g} by {times.size} points: the error is "
-                f"{errors.max():g} at {times[np.argmax(errors)]:g} s. Allow a larger error; give a function that jumps "
-                "as a Schedule."
+                f"the sampled signal of '{name}' is not approximated to {error:g} by {times.size}"
+                f" points: the error is {errors.max():g} at {times[np.argmax(errors)]:g} s. Allow a"
+                " larger error; give a function that jumps as a Schedule."
             )
-        times, values = np.insert(times, at + 1, between[1, at]), np.insert(values, at + 1, exact[1, at])
+        times = np.insert(times, at + 1, between[1, at])
+        values = np.insert(values, at + 1, exact[1, at])
 
 
 def _evaluate(name: str, function: Callable[[float], float], times: Array) -> Array:
     """A function of time at times (N,). Raises ParameterError where it gives no finite number."""
     if not callable(function):
-        raise ParameterError(f"the sampled signal of '{name}' is {function!r}; give a function of time [s].")
+        raise ParameterError(
+            f"the sampled signal of '{name}' is {function!r}; give a function of time [s]."
+        )
     values = np.empty(times.size)
     for i, time in enumerate(times.tolist()):
         values[i] = as_float(f"the sampled signal of '{name}' at {time:g} s", function(time))
         if not np.isfinite(values[i]):
-            raise ParameterError(f"the sampled signal of '{name}' is {values[i]} at {time:g} s; it must be finite.")
+            raise ParameterError(
+                f"the sampled signal of '{name}' is {values[i]} at {time:g} s; it must be finite."
+            )
     return values
 
 
 class Trajectory(NamedTuple):
     """The input signal that drives a motion, and its initial position [m] and speed [m/s].
 
-    `simulate(plant, motion.input, duration=..., initial_state=plant.state_at(pressure=..., **motion.initial_state))`;
-    with other inputs, `SampledSignal({**motion.input.points, "fill": ...})`.
+    `simulate(plant, motion.input, duration=..., initial_state=plant.state_at(pressure=...,
+    **motion.initial_state))`; with other inputs, `SampledSignal({**motion.input.points, "fill":
+    ...})`.
     """
 
     input: SampledSignal
     initial_state: dict[str, float]
 
 
-def spline_trajectory(times: npt.ArrayLike, positions: npt.ArrayLike, *, from_rest: bool = True) -> Trajectory:
-    """The motion along the cubic spline through positions (N,) [m] at times (N,) [s], for `PrescribedMotion`.
+def spline_trajectory(
+    times: npt.ArrayLike, positions: npt.ArrayLike, *, from_rest: bool = True
+) -> Trajectory:
+    """The motion along the cubic spline through positions (N,) [m] at times (N,) [s], for
+    `PrescribedMotion`.
 
-    The second derivative of a cubic spline is linear between its points, and so is an input: the motion is followed
-    exactly. With `from_rest` it begins and ends at rest; otherwise the first two and the last two intervals are one
-    cubic each, which needs four points. Begin the run at times[0]. Raises ParameterError for fewer than two points,
-    points that are not finite, or times that do not rise.
+    The second derivative of a cubic spline is linear between its points, and so is an input: the
+    motion is followed exactly. With `from_rest` it begins and ends at rest; otherwise the first two
+    and the last two intervals are one cubic each, which needs four points. Begin the run at
+    times[0]. Raises ParameterError for fewer than two points, points that are not finite, or times
+    that do not rise.
     """
     try:
-        t, y = np.asarray(times, dtype=float), np.asarray(positions, dtype=float)
+        t = np.asarray(times, dtype=float)
+        y = np.asarray(positions, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError(
             f"spline_trajectory: {times!r} and {positions!r} are not times [s] and positions [m]."
@@ -166,13 +210,16 @@ def spline_trajectory(times: npt.ArrayLike, positions: npt.ArrayLike, *, from_re
     needed = 2 if from_rest else 4
     if t.ndim != 1 or t.shape != y.shape or t.size < needed:
         raise ParameterError(
-            f"spline_trajectory: give at least {needed} times and as many positions; they are {t.shape} and {y.shape}."
+            f"spline_trajectory: give at least {needed} times and as many positions; they are"
+            f" {t.shape} and {y.shape}."
         )
     if not (np.isfinite(t).all() and np.isfinite(y).all()):
         raise ParameterError("spline_trajectory: times and positions must be finite.")
     if not (np.diff(t) > 0).all():
         i = int(np.argmax(np.diff(t) <= 0))
-        raise ParameterError(f"spline_trajectory: times must rise; {t[i]:g} s is followed by {t[i + 1]:g} s.")
+        raise ParameterError(
+            f"spline_trajectory: times must rise; {t[i]:g} s is followed by {t[i + 1]:g} s."
+        )
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(t, y, bc_type="clamped" if from_rest else "not-a-knot")

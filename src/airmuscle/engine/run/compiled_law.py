@@ -1,4 +1,6 @@
-"""Compiled sample of a control law: measurements, set points and memory to commands and memory, as machine code."""
+"""Compiled sample of a control law: measurements, set points and memory to commands and memory, as
+machine code.
+"""
 
 import array
 import ctypes
@@ -18,8 +20,8 @@ _functions: dict[tuple[tree.Structure, int], Function] = {}
 
 
 def compiled_sample(law: ControlLaw, lanes: int = 1) -> Function:
-    """A function (measured, setpoints, memory, minimum, maximum, sample time, parameters, commands, memory), with
-    `lanes` above 1 of so many loops at once, one a lane.
+    """A function (measured, setpoints, memory, minimum, maximum, sample time, parameters, commands,
+    memory), with `lanes` above 1 of so many loops at once, one a lane.
 
     Control laws of one structure share it. Raises TraceError if the law cannot be traced.
     """
@@ -32,7 +34,8 @@ def compiled_sample(law: ControlLaw, lanes: int = 1) -> Function:
 
 
 class LawSample:
-    """The sample of a control law as machine code that is called from Python; its memory is a tuple.
+    """The sample of a control law as machine code that is called from Python; its memory is a
+    tuple.
 
     Raises TraceError if the law cannot be traced.
     """
@@ -40,13 +43,22 @@ class LawSample:
     def __init__(self, law: ControlLaw) -> None:
         self._function = compiled_sample(law)
         self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 9)(self._function.address)
-        self._measured, self._setpoints, self._inputs = law.measured_columns, law.setpoints, law.inputs
+        self._measured = law.measured_columns
+        self._setpoints = law.setpoints
+        self._inputs = law.inputs
         self._parameters = parameters_of(law).tolist()
         self.initial = tuple(float(value) for value in law.initial_memory.values())
         sizes = (
-            len(self._measured), len(self._setpoints), len(self.initial), len(self._inputs), len(self._inputs), 1,
-            len(self._parameters), len(self._inputs), len(self.initial),
-        )  # fmt: skip
+            len(self._measured),
+            len(self._setpoints),
+            len(self.initial),
+            len(self._inputs),
+            len(self._inputs),
+            1,
+            len(self._parameters),
+            len(self._inputs),
+            len(self.initial),
+        )
         self._ends = list(itertools.accumulate(sizes))
         self._offsets = [8 * (end - size) for end, size in zip(self._ends, sizes, strict=True)]
 
@@ -56,10 +68,18 @@ class LawSample:
         """The commands of a sample and the memory after it, as `ControlLaw.step`."""
         columns, setpoints, ranges = measurement
         limits = [ranges.get(name, UNLIMITED) for name in self._inputs]
-        given = array.array("d", (
-            *[columns[name] for name in self._measured], *[setpoints[name] for name in self._setpoints], *memory,
-            *[low for low, _ in limits], *[high for _, high in limits], dt, *self._parameters,
-        ))  # fmt: skip
+        given = array.array(
+            "d",
+            (
+                *[columns[name] for name in self._measured],
+                *[setpoints[name] for name in self._setpoints],
+                *memory,
+                *[low for low, _ in limits],
+                *[high for _, high in limits],
+                dt,
+                *self._parameters,
+            ),
+        )
         given.frombytes(bytes(8 * (self._ends[8] - self._ends[6])))
         start = given.buffer_info()[0]
         self._call(*[start + offset for offset in self._offsets])
@@ -68,13 +88,17 @@ class LawSample:
 
 
 def parameters_of(law: ControlLaw) -> Array:
-    """The parameters of a law, for its compiled sample: at least one number, so that the array has an address."""
+    """The parameters of a law, for its compiled sample: at least one number, so that the array has
+    an address.
+    """
     parameters = tree.flatten(law)
     return parameters if len(parameters) else np.zeros(1)
 
 
 class TracedSample(NamedTuple):
-    """A sample of a control law as expressions; the arguments are vectors in the order of the names of the law."""
+    """A sample of a control law as expressions; the arguments are vectors in the order of the names
+    of the law.
+    """
 
     measured: Any
     setpoints: Any
@@ -111,13 +135,15 @@ def trace_sample(law: ControlLaw) -> TracedSample:
         later = casadi.densify(casadi.vertcat(*(memory[name] for name in names["memory"])))
     except KeyError as missing:
         raise TraceError(
-            f"{owner}.step does not return {missing}; it must return a value for each of {', '.join(law.inputs)}, and "
-            f"for each of its memory: {', '.join(names['memory']) or 'none'}."
+            f"{owner}.step does not return {missing}; it must return a value for each of"
+            f" {', '.join(law.inputs)}, and for each of its memory:"
+            f" {', '.join(names['memory']) or 'none'}."
         ) from None
     except (TypeError, ValueError, RuntimeError) as reason:
         raise TraceError(
-            f"{owner}.step cannot be compiled ({' '.join(str(reason).split())[:160]}). Use airmuscle.core.ops instead "
-            "of math, numpy and `if`, or derive the controller from Controller."
+            f"{owner}.step cannot be compiled ({' '.join(str(reason).split())[:160]}). Use"
+            " airmuscle.core.ops instead of math, numpy and `if`, or derive the controller from"
+            " Controller."
         ) from None
     autodiff.check_finite(casadi.vertcat(commanded, later), f"{owner}.step")
     return TracedSample(**vectors, parameters=parameters, commands=commanded, later=later)

@@ -1,6 +1,8 @@
-"""Control loop as one program: control law, drivers and plant from sample to sample without a return to Python.
+"""Control loop as one program: control law, drivers and plant from sample to sample without a
+return to Python.
 
-A controller that is no control law, and drivers that no kernel implements, are called from Python at each sample.
+A controller that is no control law, and drivers that no kernel implements, are called from Python
+at each sample.
 """
 
 from typing import Any
@@ -19,48 +21,82 @@ from .sampled_loop import CalledController, DriverTable, SampledLoop, are_called
 
 FIRST_SEGMENTS = 4096
 """Segments and rows that the buffers of driven inputs hold at first."""
-_PAUSED, _WAITING, _INTERVAL = Status.PAUSED.value, Progress.WAITING.value, Progress.INTERVAL.value
+_PAUSED = Status.PAUSED.value
+_WAITING = Progress.WAITING.value
+_INTERVAL = Progress.INTERVAL.value
 
 
 class CompiledLoop:
-    """A prepared loop with the data that all its runs share; `law` is None for a controller that is called."""
+    """A prepared loop with the data that all its runs share; `law` is None for a controller that is
+    called.
+    """
 
     def __init__(self, compiled: CompiledSystem, prepared: SampledLoop) -> None:
-        loop, known = prepared.loop, compiled.description
+        loop = prepared.loop
+        known = compiled.description
         controller = loop.controller
-        self.prepared, self.law = prepared, controller if isinstance(controller, ControlLaw) else None
+        self.prepared, self.law = (
+            prepared,
+            (controller if isinstance(controller, ControlLaw) else None),
+        )
         self._function = compiled_sample(self.law) if self.law is not None else None
         self.sample_address = 0 if self._function is None else self._function.address
         self.parameters = parameters_of(self.law) if self.law is not None else np.zeros(1)
         self.called_drivers = bool(loop.drivers) and are_called(prepared)
         pieces = int(np.diff(prepared.first_segments).max())
-        self.capacity = pieces if self.called_drivers else max_capacity(prepared) if loop.drivers else 0
+        self.capacity = (
+            pieces if self.called_drivers else max_capacity(prepared) if loop.drivers else 0
+        )
         columns = (*known.state_names, *known.output_names)
-        measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
+        measured_at = np.array(
+            [columns.index(name) for name in controller.measured_columns], dtype=np.int64
+        )
         commanded_at = np.array(prepared.commanded, dtype=np.int64)
-        limits = np.array([prepared.ranges[name] for name in controller.inputs], dtype=float).reshape(-1, 2)
+        limits = np.array(
+            [prepared.ranges[name] for name in controller.inputs], dtype=float
+        ).reshape(-1, 2)
         self.edges = edges = prepared.instants
         self.measuring = compiled.address["outputs"], measured_at
-        self.commanding = np.array([loop.sample_time]), *map(np.ascontiguousarray, limits.T), commanded_at
-        self.intervals = edges, np.spacing(np.abs(edges)), 0 if prepared.sampled else 1, prepared.setpoint_values
+        self.commanding = (
+            np.array([loop.sample_time]),
+            *map(np.ascontiguousarray, limits.T),
+            commanded_at,
+        )
+        self.intervals = (
+            edges,
+            np.spacing(np.abs(edges)),
+            0 if prepared.sampled else 1,
+            prepared.setpoint_values,
+        )
 
 
 class CompiledRun:
-    """A run of a compiled loop; with a control law, the results are those of the same controller called to rounding.
+    """A run of a compiled loop; with a control law, the results are those of the same controller
+    called to rounding.
 
     compiled       the plant, whose structure is that of the loop's plant
     initial_state  (n,)
-    parameters     of the control law (P,), an array of this run; those of the loop's controller unless given
+    parameters     of the control law (P,), an array of this run; those of the loop's controller
+    unless given
     """
 
     def __init__(
-        self, loop: CompiledLoop, compiled: CompiledSystem, integrator: Integrator, initial_state: Array,
-        control_state: ControlLoopState, parameters: Array | None = None,
-    ) -> None:  # fmt: skip
-        self.loop, self.prepared = loop, loop.prepared
-        self._integrator, self._precomputed = integrator, compiled.precomputed
+        self,
+        loop: CompiledLoop,
+        compiled: CompiledSystem,
+        integrator: Integrator,
+        initial_state: Array,
+        control_state: ControlLoopState,
+        parameters: Array | None = None,
+    ) -> None:
+        self.loop = loop
+        self.prepared = loop.prepared
+        self._integrator = integrator
+        self._precomputed = compiled.precomputed
         self.bound = integrator.bind(compiled)
-        self._drivers = DriverTable(loop.prepared, control_state, loop.capacity, loop.called_drivers)
+        self._drivers = DriverTable(
+            loop.prepared, control_state, loop.capacity, loop.called_drivers
+        )
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
         self._parameters = loop.parameters.copy() if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
@@ -71,38 +107,56 @@ class CompiledRun:
         self._begin(initial_state, control_state)
 
     def restart(
-        self, compiled: CompiledSystem, initial_state: Array, parameters: Array,
+        self,
+        compiled: CompiledSystem,
+        initial_state: Array,
+        parameters: Array,
         control_state: ControlLoopState | None = None,
-    ) -> None:  # fmt: skip
-        """Begin again in the same arrays, with a plant of the same structure and other parameters; arguments as before.
+    ) -> None:
+        """Begin again in the same arrays, with a plant of the same structure and other parameters;
+        arguments as before.
 
-        `control_state` is by default that of the first time; another one differs from it in the controller's memory
-        alone. Everything that was returned by this run is overwritten.
+        `control_state` is by default that of the first time; another one differs from it in the
+        controller's memory alone. Everything that was returned by this run is overwritten.
         """
         self.bound.rebind(self._integrator.binding(compiled))
-        self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
+        self._precomputed[:] = compiled.precomputed
+        self._parameters[:] = parameters
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
         self._drivers.restart()
         self._begin(initial_state, control_state or self._begin_state)
 
     def _begin(self, initial_state: Array, state: ControlLoopState) -> None:
         """Write what the kernel finds at the beginning; no sample has been taken yet."""
-        law, self._begin_state = self.loop.law, state
+        law = self.loop.law
+        self._begin_state = state
         self.bound.state[:] = self.state[:] = initial_state
         self.bound.count[:] = 0
         self.progress.fill(0)
-        self._memory[:] = [state.controller[name] for name in law.initial_memory] if law is not None else []
-        self._measured[:], self._command[:] = state.measured, state.commanded
-        self._applied[:] = self._kept_inputs[:] = state.applied_inputs or self.prepared.inputs.values[0]
-        self._memories, self._called_at = [state.controller] * 2, -1
+        self._memory[:] = (
+            [state.controller[name] for name in law.initial_memory] if law is not None else []
+        )
+        self._measured[:] = state.measured
+        self._command[:] = state.commanded
+        self._applied[:] = self._kept_inputs[:] = (
+            state.applied_inputs or self.prepared.inputs.values[0]
+        )
+        self._memories = [state.controller] * 2
+        self._called_at = -1
         self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
 
     def _make_arrays(self, n: int, m: int) -> None:
-        prepared, controller, law = self.prepared, self.prepared.loop.controller, self.loop.law
-        inputs, intervals = prepared.inputs, self.loop.edges.size - 1
+        prepared = self.prepared
+        controller = self.prepared.loop.controller
+        law = self.loop.law
+        inputs = prepared.inputs
+        intervals = self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
         self._memory = np.empty((2, 0 if law is None else len(law.initial_memory)))
-        self._measured, self._command = np.empty(len(controller.measured_columns)), np.empty(len(controller.inputs))
+        self._measured, self._command = (
+            np.empty(len(controller.measured_columns)),
+            np.empty(len(controller.inputs)),
+        )
         self._views = flat_view(self._measured), flat_view(self._command)
         self._applied, self._kept_inputs, self.state = np.empty(m), np.empty(m), np.empty(n)
         """The state (n,) at the end of the last completed interval."""
@@ -110,29 +164,71 @@ class CompiledRun:
         self._commands = np.empty((intervals, self._command.size))
         self._inputs = inputs.ends, inputs.values.copy(), inputs.slopes
         if self._drivers.kinds.size:
-            segments, rows = FIRST_SEGMENTS + self.loop.capacity * m, FIRST_SEGMENTS + 2 * self.loop.capacity * m
-            self._segments: Any = np.empty(segments), np.empty((segments, m)), np.empty((segments, m))
+            segments = FIRST_SEGMENTS + self.loop.capacity * m
+            rows = FIRST_SEGMENTS + 2 * self.loop.capacity * m
+            self._segments: Any = (
+                np.empty(segments),
+                np.empty((segments, m)),
+                np.empty((segments, m)),
+            )
             self._times, self._rows = np.empty(rows), np.empty((rows, n))
         else:
             self._segments = self._inputs
             self._times, self._rows = prepared.times, np.empty((prepared.times.size, n))
 
     def _arguments(self, compiled: CompiledSystem, parameters: Array) -> tuple[Any, ...]:
-        loop, prepared, bound, drivers = self.loop, self.prepared, self.bound, self._drivers
+        loop = self.loop
+        prepared = self.prepared
+        bound = self.bound
+        drivers = self._drivers
         outputs, measured_at = loop.measuring
         return (
-            bound.entry_address or 0, bound.slots, bound.places, bound.clock, bound.count, bound.state,
-            outputs, compiled.precomputed, np.empty(max(compiled.sizes.outputs, 1)), measured_at,
-            loop.sample_address, parameters, *loop.commanding, *loop.intervals, *self._inputs, prepared.first_segments,
-            prepared.times, prepared.first_rows, drivers.kinds, drivers.settings, drivers.states, drivers.columns,
-            drivers.counts, drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied,
-            self._memory, self._measured, self._command, self.state, self._kept_inputs, drivers.kept, *self._segments,
-            self._times, self._rows, self._samples, self._commands, self.progress, INTERRUPT_CHECK_STEPS,
-        )  # fmt: skip
+            bound.entry_address or 0,
+            bound.slots,
+            bound.places,
+            bound.clock,
+            bound.count,
+            bound.state,
+            outputs,
+            compiled.precomputed,
+            np.empty(max(compiled.sizes.outputs, 1)),
+            measured_at,
+            loop.sample_address,
+            parameters,
+            *loop.commanding,
+            *loop.intervals,
+            *self._inputs,
+            prepared.first_segments,
+            prepared.times,
+            prepared.first_rows,
+            drivers.kinds,
+            drivers.settings,
+            drivers.states,
+            drivers.columns,
+            drivers.counts,
+            drivers.scratch,
+            drivers.begins,
+            compiled.description.lower_bounds,
+            self._applied,
+            self._memory,
+            self._measured,
+            self._command,
+            self.state,
+            self._kept_inputs,
+            drivers.kept,
+            *self._segments,
+            self._times,
+            self._rows,
+            self._samples,
+            self._commands,
+            self.progress,
+            INTERRUPT_CHECK_STEPS,
+        )
 
     def integrate(self) -> None:
         """Run the loop until its end, or until an interval fails or the user stops it."""
-        run, flags = self._kernel.runner, flat_view(self.progress)
+        run = self._kernel.runner
+        flags = flat_view(self.progress)
         try:
             status = run()
             while status == _PAUSED:
@@ -153,12 +249,15 @@ class CompiledRun:
 
     def _takes_too_many_steps(self) -> bool:
         running = self.progress[Progress.RUNNING]
-        return bool(running and self.bound.count[2] - self.progress[Progress.STEPS_BEFORE] >= MAX_STEPS)
+        return bool(
+            running and self.bound.count[2] - self.progress[Progress.STEPS_BEFORE] >= MAX_STEPS
+        )
 
     def _answer(self, waiting: int, interval: int) -> None:
         """Give the kernel what it awaits."""
         if waiting == Waiting.COMMANDS:
-            (measured, command), memories = self._views, self._memories
+            measured, command = self._views
+            memories = self._memories
             memories[0] = memories[1]
             assert self._controller is not None
             commands, memories[1] = self._controller.step(memories[0], measured.tolist(), interval)
@@ -166,11 +265,17 @@ class CompiledRun:
             for i, value in enumerate(commands):
                 command[i] = value
         elif waiting == Waiting.DRIVERS:
-            first_rows, progress, drivers = self.prepared.first_rows, self.progress, self._drivers
+            first_rows = self.prepared.first_rows
+            progress = self.progress
+            drivers = self._drivers
             count = drivers.call(interval, float(self.loop.edges[interval]))
             self._kernel.replace(self._columns, drivers.columns)
             segments = progress[Progress.SEGMENTS] + count
-            rows = progress[Progress.ROWS] + count + int(first_rows[interval + 1] - first_rows[interval])
+            rows = (
+                progress[Progress.ROWS]
+                + count
+                + int(first_rows[interval + 1] - first_rows[interval])
+            )
             while segments > len(self._segments[0]) or rows > len(self._times):
                 self._extend()
         else:  # the integrator has no machine code that a kernel could call
@@ -178,20 +283,26 @@ class CompiledRun:
 
     def _extend(self) -> None:
         """Longer buffers for the segments and rows of driven inputs."""
-        buffers = [np.concatenate([each, np.empty_like(each)]) for each in (*self._segments, self._times, self._rows)]
+        buffers = [
+            np.concatenate([each, np.empty_like(each)])
+            for each in (*self._segments, self._times, self._rows)
+        ]
         *self._segments, self._times, self._rows = buffers
         for i, array in enumerate(buffers, self._first_buffer):
             self._kernel.replace(i, array)
         self.progress[Progress.FULL] = 0
 
     def _discard_interval(self) -> None:
-        """Forget an interval that was interrupted, so that the run can be continued from its beginning."""
+        """Forget an interval that was interrupted, so that the run can be continued from its
+        beginning.
+        """
         progress = self.progress
         if progress[Progress.RUNNING]:
             progress[Progress.SEGMENTS] = progress[Progress.FIRST_SEGMENT]
             progress[Progress.ROWS] = progress[Progress.FIRST_ROW]
         progress[Progress.SAMPLES] = progress[Progress.INTERVAL]
-        self.stopped_at, self.bound.state[:] = self.time, self.state
+        self.stopped_at = self.time
+        self.bound.state[:] = self.state
 
     @property
     def time(self) -> float:
@@ -210,7 +321,9 @@ class CompiledRun:
 
     @property
     def signal(self) -> PiecewiseLinear:
-        """The segments of all inputs of the intervals that have begun; without any, one of zeros."""
+        """The segments of all inputs of the intervals that have begun; without any, one of
+        zeros.
+        """
         count = int(self.progress[Progress.SEGMENTS])
         if not count:
             none = np.zeros((1, self._applied.size))
@@ -224,25 +337,34 @@ class CompiledRun:
         return self._times[:count], self._rows[:count]
 
     def columns(self, intervals: npt.NDArray[np.int64], setpoints: Array) -> dict[str, Array]:
-        """Set points (R, s), and measurements and commands of the last sample, at rows in these intervals (R,)."""
+        """Set points (R, s), and measurements and commands of the last sample, at rows in these
+        intervals (R,).
+        """
         intervals = np.minimum(intervals, max(len(self.measured) - 1, 0))
-        measured, commanded = (values.take(intervals, axis=0) for values in (self.measured, self.commanded))
+        measured, commanded = (
+            values.take(intervals, axis=0) for values in (self.measured, self.commanded)
+        )
         columns = *setpoints.T, *measured.T, *commanded.T
         return dict(zip(self.prepared.loop.column_names, columns, strict=True))
 
     def raw(self, rows: Array) -> RawSolution:
         """The result of the integrator, of which these rows (N, n) are taken."""
         state = self.bound.state.copy() if len(self.measured) else self.state
-        return RawSolution(rows, len(rows), self.stopped_at, state, self.status, *self.bound.count[2:].tolist())
+        return RawSolution(
+            rows, len(rows), self.stopped_at, state, self.status, *self.bound.count[2:].tolist()
+        )
 
     @property
     def control_state(self) -> ControlLoopState:
         """The state of the loop at the end of the last completed interval."""
-        done, begun = int(self.progress[Progress.INTERVAL]), self._begin_state
+        done = int(self.progress[Progress.INTERVAL])
+        begun = self._begin_state
         if not done:
             return begun
-        # the last sample of a controller that is called may be that of an interval that was not completed
-        memory, law = self._memories[1 if done > self._called_at else 0], self.loop.law
+        # the last sample of a controller that is called may be that of an interval that was not
+        # completed
+        memory = self._memories[1 if done > self._called_at else 0]
+        law = self.loop.law
         if law is not None:
             memory = dict(zip(law.initial_memory, self._memory[0].tolist(), strict=True))
         return ControlLoopState(

@@ -1,4 +1,5 @@
-"""Integrators: numerical methods for ordinary differential equations, each a thin caller of one kernel.
+"""Integrators: numerical methods for ordinary differential equations, each a thin caller of one
+kernel.
 
 An integrator is bound to a compiled system: its kernel with all arguments, run after run.
 """
@@ -9,7 +10,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, Status, abridged, flat_view, model, parameter, published
+from ...core import (
+    Array,
+    ParameterError,
+    Reference,
+    Status,
+    abridged,
+    flat_view,
+    model,
+    parameter,
+    published,
+)
 from ..compile.cache.kernel import Kernel, fixed_step, rodas4
 from ..compile.functions import ArraySizes
 from ..compile.program import CompiledSystem, Tableau
@@ -19,7 +30,8 @@ INTERRUPT_CHECK_STEPS = 100_000
 """Steps between two checks whether the user wants to stop, or the state is impossible."""
 MAX_STEPS = 50_000_000
 """Steps of one run, by default."""
-_PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
+_PAUSED = Status.PAUSED.value
+_TOO_MANY = Status.TOO_MANY_STEPS.value
 
 
 class RawSolution(NamedTuple):
@@ -35,7 +47,9 @@ class RawSolution(NamedTuple):
 
 
 class Binding(NamedTuple):
-    """Binding of an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
+    """Binding of an integrator to a system: kernel, arguments before and after those of a run,
+    workspace size.
+    """
 
     kernel: Kernel
     leading: tuple[Any, ...]
@@ -53,7 +67,11 @@ class BoundIntegrator:
         self.count = self._progress[3:]
         """Segment, next row, steps, rejected steps."""
         self._duration = 1.0
-        self._end, inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
+        self._end, inputs, slopes = (
+            np.ones(1),
+            np.zeros((1, sizes.inputs)),
+            np.zeros((1, sizes.inputs)),
+        )
         self.held: Array = inputs[0]
         """The inputs (m,) of `proceed`."""
         no_rows = np.zeros(0), np.zeros((0, sizes.states))
@@ -64,35 +82,55 @@ class BoundIntegrator:
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
         self._run, self._first = self._kernel.runner, len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self.clock), flat_view(self.count)
-        self.places = np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
-        """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
+        self.places = np.array(
+            [self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64
+        )
+        """The places in the slots of ends, values and slopes of segments, and of times and rows
+        (5,).
+        """
         self.slots: Any = self._kernel.slots
         """The slots of the kernel's arguments."""
         self._words = None if self._kernel.entry_address is None else flat_view(self.slots)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def rebind(self, binding: Binding) -> None:
-        """Take the values of the same integrator at a system of the same structure with other parameters."""
-        for own, other in zip(self._bound_values, (*binding.leading, *binding.trailing), strict=True):
+        """Take the values of the same integrator at a system of the same structure with other
+        parameters.
+        """
+        for own, other in zip(
+            self._bound_values, (*binding.leading, *binding.trailing), strict=True
+        ):
             if isinstance(own, np.ndarray):
                 own[...] = other
 
     def run(
-        self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
+        self,
+        segments: PiecewiseLinear,
+        start: float,
+        state: Array,
+        times: Array,
+        max_steps: int = MAX_STEPS,
         check: Callable[[Array, float], Status] | None = None,
-    ) -> RawSolution:  # fmt: skip
-        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,).
+    ) -> RawSolution:
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising
+        `times` (N,).
 
-        `check` states for a state (n,) and a time [s], DONE or why the run ends there; it is called between packets of
-        many steps, because the steps can become endlessly many where the model does not hold.
+        `check` states for a state (n,) and a time [s], DONE or why the run ends there; it is called
+        between packets of many steps, because the steps can become endlessly many where the model
+        does not hold.
         """
         rows = np.empty((times.size, self.state.size))
         self.state[:] = state
-        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
+        for i, argument in enumerate(
+            (segments.ends, segments.values, segments.slopes, times), self._first
+        ):
             self._kernel.replace_input(i, argument)
         self._kernel.replace(self._first + 4, rows)
-        clock, count = self._clock_view, self._count_view
-        clock[0], clock[1], clock[2] = start, 0.0, start
+        clock = self._clock_view
+        count = self._count_view
+        clock[0] = start
+        clock[1] = 0.0
+        clock[2] = start
         count[0] = count[1] = count[2] = count[3] = 0
         if max_steps < INTERRUPT_CHECK_STEPS:
             self._kernel.replace(self._budget, max_steps)
@@ -103,13 +141,16 @@ class BoundIntegrator:
         except KeyboardInterrupt:
             status = Status.INTERRUPTED.value
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        reached, ended = count[1], Status.DONE if status == 0 else Status(status)
+        reached = count[1]
+        ended = Status.DONE if status == 0 else Status(status)
         if reached < len(rows):
             rows[reached:] = np.nan
         return RawSolution(rows, reached, clock[0], self.state.copy(), ended, count[2], count[3])
 
     def proceed(self, duration: float) -> Status:
-        """Advance `self.state` by `duration` [s] with `self.held` held. Not to be mixed with `run`."""
+        """Advance `self.state` by `duration` [s] with `self.held` held. Not to be mixed with
+        `run`.
+        """
         if duration != self._duration:
             self._end[0] = self._duration = duration
         self._progress.fill(0)
@@ -119,7 +160,9 @@ class BoundIntegrator:
         return Status.DONE if status == 0 else Status(status)
 
     def run_part(self) -> Status:
-        """Go on through the segments and rows in the slots, for a kernel that cannot call this one itself."""
+        """Go on through the segments and rows in the slots, for a kernel that cannot call this one
+        itself.
+        """
         a, b, c, d, e = self.places.tolist()
         if self._words is None:
             slots = self.slots.tolist()
@@ -134,13 +177,22 @@ class BoundIntegrator:
 
     @property
     def entry_address(self) -> int | None:
-        """The address of the kernel's entry point, for a kernel that calls it; None without machine code."""
+        """The address of the kernel's entry point, for a kernel that calls it; None without machine
+        code.
+        """
         return self._kernel.entry_address
 
-    def _continue(self, status: int, max_steps: int, check: Callable[[Array, float], Status] | None = None) -> int:
-        """Go on where the kernel paused so that an interruption or an impossible state can be noticed."""
+    def _continue(
+        self, status: int, max_steps: int, check: Callable[[Array, float], Status] | None = None
+    ) -> int:
+        """Go on where the kernel paused so that an interruption or an impossible state can be
+        noticed.
+        """
         while status == _PAUSED:
-            if check is not None and (outcome := check(self.state, self._clock_view[0])) != Status.DONE:
+            if (
+                check is not None
+                and (outcome := check(self.state, self._clock_view[0])) != Status.DONE
+            ):
                 return outcome.value
             left = max_steps - int(self.count[2])
             if left <= 0:
@@ -153,7 +205,8 @@ class BoundIntegrator:
 class Integrator(abc.ABC):
     """A numerical method for ordinary differential equations.
 
-    printed_step  module of the kernels with the step that exported programs print; empty: there is none
+    printed_step  module of the kernels with the step that exported programs print; empty: there is
+    none
     """
 
     printed_step: ClassVar[str] = ""
@@ -167,9 +220,16 @@ class Integrator(abc.ABC):
         return BoundIntegrator(self.binding(compiled), compiled.sizes)
 
     def run(
-        self, compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, times: Array
+        self,
+        compiled: CompiledSystem,
+        segments: PiecewiseLinear,
+        start: float,
+        state: Array,
+        times: Array,
     ) -> RawSolution:
-        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising
+        `times` (N,).
+        """
         return self.bind(compiled).run(segments, start, state, times)
 
 
@@ -178,23 +238,42 @@ class Rodas4(Integrator):
     """Rosenbrock method of order four for stiff systems, adaptive; the default.
 
     The absolute tolerance of a state is the relative one times its nominal size.
-    Reference: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, section VI.4, method RODAS.
+    Reference: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, section VI.4,
+    method RODAS.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("hairer-wanner-1996"),)
     printed_step: ClassVar[str] = "rodas4"
 
-    rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
+    rtol: float = parameter(
+        "1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6
+    )
 
     def binding(self, compiled: CompiledSystem) -> Binding:
-        sizes, at = compiled.sizes, compiled.address
-        addresses = (at["stage"], at["jac"], at["factor"], at["solve"], at["df_dt"], sizes.jacobian, sizes.factors)
+        sizes = compiled.sizes
+        at = compiled.address
+        addresses = (
+            at["stage"],
+            at["jac"],
+            at["factor"],
+            at["solve"],
+            at["df_dt"],
+            sizes.jacobian,
+            sizes.factors,
+        )
         work = 11 * sizes.states + 2 * sizes.inputs + sizes.jacobian + sizes.factors
-        return Binding(rodas4, (*addresses, compiled.precomputed), (self.rtol, self.rtol * compiled.nominal), work)
+        return Binding(
+            rodas4,
+            (*addresses, compiled.precomputed),
+            (self.rtol, self.rtol * compiled.nominal),
+            work,
+        )
 
 
 class ExplicitRungeKutta(Integrator):
-    """An explicit Runge-Kutta method of fixed step size, stable only for small steps; a subclass has its tableau."""
+    """An explicit Runge-Kutta method of fixed step size, stable only for small steps; a subclass
+    has its tableau.
+    """
 
     printed_step: ClassVar[str] = "fixed_step"
     step: float
@@ -213,12 +292,15 @@ _DEFAULT = Rodas4()
 
 
 def default_integrator(integrator: Integrator | None) -> Integrator:
-    """The given integrator, or the default. Raises ParameterError for anything else, such as a name."""
+    """The given integrator, or the default. Raises ParameterError for anything else, such as a
+    name.
+    """
     if integrator is None:
         return _DEFAULT
     if not isinstance(integrator, Integrator):
         raise ParameterError(
-            f"the integrator is {abridged(integrator)}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step)."
+            f"the integrator is {abridged(integrator)}; give Rodas4(), RungeKutta4(step) or"
+            " DormandPrince8(step)."
         )
     return integrator
 
@@ -237,7 +319,8 @@ class RungeKutta4(ExplicitRungeKutta):
 
 @model
 class DormandPrince8(ExplicitRungeKutta):
-    """RK8(7)13M of Prince and Dormand (1981), the weights of order eight: Simulink's ode8, which the third paper uses.
+    """RK8(7)13M of Prince and Dormand (1981), the weights of order eight: Simulink's ode8, which
+    the third paper uses.
 
     Reference: Prince, P. J., Dormand, J. R., High order embedded Runge-Kutta formulae,
     J. Computational and Applied Mathematics 7(1):67-75, 1981, table 2.
@@ -257,23 +340,23 @@ _RK8_ROWS = (
     (1 / 32, 0.0, 3 / 32),
     (5 / 16, 0.0, -75 / 64, 75 / 64),
     (3 / 80, 0.0, 0.0, 3 / 16, 3 / 20),
-    (29443841 / 614563906, 0.0, 0.0, 77736538 / 692538347, -28693883 / 1125000000, 23124283 / 1800000000),
-    (16016141 / 946692911, 0.0, 0.0, 61564180 / 158732637, 22789713 / 633445777, 545815736 / 2771057229,
+    (29443841 / 614563906, 0.0, 0.0, 77736538 / 692538347, -28693883 / 1125000000, 23124283 / 1800000000),  # noqa: E501
+    (16016141 / 946692911, 0.0, 0.0, 61564180 / 158732637, 22789713 / 633445777, 545815736 / 2771057229,  # noqa: E501
      -180193667 / 1043307555),
-    (39632708 / 573591083, 0.0, 0.0, -433636366 / 683701615, -421739975 / 2616292301, 100302831 / 723423059,
+    (39632708 / 573591083, 0.0, 0.0, -433636366 / 683701615, -421739975 / 2616292301, 100302831 / 723423059,  # noqa: E501
      790204164 / 839813087, 800635310 / 3783071287),
-    (246121993 / 1340847787, 0.0, 0.0, -37695042795 / 15268766246, -309121744 / 1061227803, -12992083 / 490766935,
+    (246121993 / 1340847787, 0.0, 0.0, -37695042795 / 15268766246, -309121744 / 1061227803, -12992083 / 490766935,  # noqa: E501
      6005943493 / 2108947869, 393006217 / 1396673457, 123872331 / 1001029789),
-    (-1028468189 / 846180014, 0.0, 0.0, 8478235783 / 508512852, 1311729495 / 1432422823, -10304129995 / 1701304382,
-     -48777925059 / 3047939560, 15336726248 / 1032824649, -45442868181 / 3398467696, 3065993473 / 597172653),
-    (185892177 / 718116043, 0.0, 0.0, -3185094517 / 667107341, -477755414 / 1098053517, -703635378 / 230739211,
-     5731566787 / 1027545527, 5232866602 / 850066563, -4093664535 / 808688257, 3962137247 / 1805957418,
+    (-1028468189 / 846180014, 0.0, 0.0, 8478235783 / 508512852, 1311729495 / 1432422823, -10304129995 / 1701304382,  # noqa: E501
+     -48777925059 / 3047939560, 15336726248 / 1032824649, -45442868181 / 3398467696, 3065993473 / 597172653),  # noqa: E501
+    (185892177 / 718116043, 0.0, 0.0, -3185094517 / 667107341, -477755414 / 1098053517, -703635378 / 230739211,  # noqa: E501
+     5731566787 / 1027545527, 5232866602 / 850066563, -4093664535 / 808688257, 3962137247 / 1805957418,  # noqa: E501
      65686358 / 487910083),
-    (403863854 / 491063109, 0.0, 0.0, -5068492393 / 434740067, -411421997 / 543043805, 652783627 / 914296604,
-     11173962825 / 925320556, -13158990841 / 6184727034, 3936647629 / 1978049680, -160528059 / 685178525,
+    (403863854 / 491063109, 0.0, 0.0, -5068492393 / 434740067, -411421997 / 543043805, 652783627 / 914296604,  # noqa: E501
+     11173962825 / 925320556, -13158990841 / 6184727034, 3936647629 / 1978049680, -160528059 / 685178525,  # noqa: E501
      248638103 / 1413531060, 0.0),
 )  # fmt: skip
 _RK8_WEIGHTS = (
-    14005451 / 335480064, 0.0, 0.0, 0.0, 0.0, -59238493 / 1068277825, 181606767 / 758867731, 561292985 / 797845732,
-    -1041891430 / 1371343529, 760417239 / 1151165299, 118820643 / 751138087, -528747749 / 2220607170, 1 / 4,
+    14005451 / 335480064, 0.0, 0.0, 0.0, 0.0, -59238493 / 1068277825, 181606767 / 758867731, 561292985 / 797845732,  # noqa: E501
+    -1041891430 / 1371343529, 760417239 / 1151165299, 118820643 / 751138087, -528747749 / 2220607170, 1 / 4,  # noqa: E501
 )  # fmt: skip

@@ -1,4 +1,6 @@
-"""Sensitivities of control loops: derivatives of laws and through their samples, gradient of a tracking error."""
+"""Sensitivities of control loops: derivatives of laws and through their samples, gradient of a
+tracking error.
+"""
 
 import dataclasses
 import functools
@@ -9,7 +11,17 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, System, Value, autodiff, check_known, model, suggestion, tree
+from ...core import (
+    Array,
+    ParameterError,
+    System,
+    Value,
+    autodiff,
+    check_known,
+    model,
+    suggestion,
+    tree,
+)
 from ...core.declaration import forwarded
 from ...recording.recording import Recording
 from ..loop import SETPOINT, ControlLaw, ControlLoop, Measurement, Memory, Sampled
@@ -27,12 +39,16 @@ class LoopWithSensitivities(NamedTuple):
     loop: ControlLoop
 
     def initial_state(self, state: Mapping[str, float]) -> dict[str, float]:
-        """The initial state of the system for one of the plant that does not depend on the columns."""
+        """The initial state of the system for one of the plant that does not depend on the
+        columns.
+        """
         return {**dict.fromkeys((s.name for s in self.system.states), 0.0), **state}
 
 
 class TrackingSensitivity(NamedTuple):
-    """The rms error of a column, in its unit, and its gradient (K,) by the columns of a sensitivity analysis."""
+    """The rms error of a column, in its unit, and its gradient (K,) by the columns of a sensitivity
+    analysis.
+    """
 
     error: float
     gradient: Array
@@ -46,69 +62,87 @@ def differentiate_loop(
     *,
     observed: Sequence[str] = (),
 ) -> LoopWithSensitivities:
-    """A plant and its control loop with the derivatives of all states, outputs and commands by parameters.
+    """A plant and its control loop with the derivatives of all states, outputs and commands by
+    parameters.
 
-    columns   paths of parameters of the plant (`mechanism.mass`) or of the control law (`controller.gain`); a tuple of
+    columns   paths of parameters of the plant (`mechanism.mass`) or of the control law
+    (`controller.gain`); a tuple of
               paths varies together
     scales    size of a change of each column [SI], for the error control of the derivatives
-    observed  states and outputs whose derivatives are wanted; all unless given. Those that are measured are added
+    observed  states and outputs whose derivatives are wanted; all unless given. Those that are
+    measured are added
 
-    Between two samples the derivatives obey the variational equation of the plant with v_k = du/dtheta_k held; at a
-    sample those of commands and memory follow from those of the measurements by the chain rule, in compiled code. Both
-    are exact for the step and the sample: with an integrator of fixed step they are the derivatives of that very run.
-    Set points and inputs that are not commanded do not depend on the columns. The instants of samples are fixed; the
-    instants of pulses would move, therefore a loop with drivers is refused.
+    Between two samples the derivatives obey the variational equation of the plant with v_k =
+    du/dtheta_k held; at a sample those of commands and memory follow from those of the measurements
+    by the chain rule, in compiled code. Both are exact for the step and the sample: with an
+    integrator of fixed step they are the derivatives of that very run. Set points and inputs that
+    are not commanded do not depend on the columns. The instants of samples are fixed; the instants
+    of pulses would move, therefore a loop with drivers is refused.
 
-    Raises ParameterError for a path that does not exist, a controller that is no ControlLaw, and drivers.
+    Raises ParameterError for a path that does not exist, a controller that is no ControlLaw, and
+    drivers.
     """
     law = loop.controller
     if not isinstance(law, ControlLaw):
         raise ParameterError(
-            f"differentiate_loop: {type(law).__name__} is no ControlLaw, its samples have no derivatives. Write the "
-            "controller as a ControlLaw over airmuscle.core.ops."
+            f"differentiate_loop: {type(law).__name__} is no ControlLaw, its samples have no"
+            " derivatives. Write the controller as a ControlLaw over airmuscle.core.ops."
         )
     if loop.drivers:
         raise ParameterError(
-            f"differentiate_loop: the input '{next(iter(loop.drivers))}' has a driver, whose pulses begin and end at "
-            "instants that move with the parameters; this is not differentiated. Give a loop without drivers."
+            f"differentiate_loop: the input '{next(iter(loop.drivers))}' has a driver, whose pulses"
+            " begin and end at instants that move with the parameters; this is not differentiated."
+            " Give a loop without drivers."
         )
     groups = [(each,) if isinstance(each, str) else tuple(each) for each in columns]
-    of_law = tuple(tuple(p[len(CONTROLLER) :] for p in group if p.startswith(CONTROLLER)) for group in groups)
+    of_law = tuple(
+        tuple(p[len(CONTROLLER) :] for p in group if p.startswith(CONTROLLER)) for group in groups
+    )
     of_plant = tuple(tuple(p for p in group if not p.startswith(CONTROLLER)) for group in groups)
     seen = tuple(dict.fromkeys((*observed, *law.measured_columns))) if observed else ()
     system = WithSensitivities(plant, of_plant, tuple(map(float, scales)), seen, law.inputs)
-    return LoopWithSensitivities(system, dataclasses.replace(loop, controller=LawWithSensitivities(law, of_law)))
+    return LoopWithSensitivities(
+        system, dataclasses.replace(loop, controller=LawWithSensitivities(law, of_law))
+    )
 
 
-def tracking_sensitivity(recording: Recording, column: str, *, begin: float = 0.0) -> TrackingSensitivity:
-    """The rms error of a controlled column of a recording, and its gradient by all columns of the sensitivities.
+def tracking_sensitivity(
+    recording: Recording, column: str, *, begin: float = 0.0
+) -> TrackingSensitivity:
+    """The rms error of a controlled column of a recording, and its gradient by all columns of the
+    sensitivities.
 
-        J = sqrt((1/T) integral e^2 dt),   dJ/dtheta_k = -(1/(J T)) integral e dy/dtheta_k dt,   e = r - y
+        J = sqrt((1/T) integral e^2 dt),   dJ/dtheta_k = -(1/(J T)) integral e dy/dtheta_k dt,   e =
+        r - y
 
-    r set point, y the column, from `begin` [s] on, by the trapezoidal rule between the rows. Without any error the
-    gradient is not defined and NaN. Raises ParameterError for a recording without the column, its set point, its
-    derivatives, or at least two rows from `begin` on.
+    r set point, y the column, from `begin` [s] on, by the trapezoidal rule between the rows.
+    Without any error the gradient is not defined and NaN. Raises ParameterError for a recording
+    without the column, its set point, its derivatives, or at least two rows from `begin` on.
     """
     for name in (column, f"{SETPOINT}{column}", sensitivity(column, 0)):
         if name not in recording.columns:
             raise ParameterError(
-                f"tracking_sensitivity: the recording has no column '{name}'; simulate a loop of differentiate_loop "
-                f"with a set point '{column}'.{suggestion(name, recording.columns)}"
+                f"tracking_sensitivity: the recording has no column '{name}'; simulate a loop of"
+                " differentiate_loop with a set point"
+                f" '{column}'.{suggestion(name, recording.columns)}"
             )
     time = np.asarray(recording["time"], dtype=float)
     rows = time >= begin - 1e-12
     if not math.isfinite(begin) or np.count_nonzero(rows) < 2:
         raise ParameterError(
-            f"tracking_sensitivity: begin is {begin:g} s; at least two rows must follow, allowed range: "
-            f"{time[0]:g} to {time[-2] if time.size > 1 else time[0]:g} s."
+            f"tracking_sensitivity: begin is {begin:g} s; at least two rows must follow, allowed"
+            f" range: {time[0]:g} to {time[-2] if time.size > 1 else time[0]:g} s."
         )
-    error, slopes = (recording[f"{SETPOINT}{column}"] - recording[column])[rows], list[Array]()
+    error = (recording[f"{SETPOINT}{column}"] - recording[column])[rows]
+    slopes = list[Array]()
     while (name := sensitivity(column, len(slopes))) in recording.columns:
         slopes.append(recording[name][rows])
     duration = time[rows][-1] - time[rows][0]
     size = math.sqrt(np.trapezoid(error**2, time[rows]) / duration)
     with np.errstate(divide="ignore", invalid="ignore"):
-        gradient = -np.trapezoid(error * np.array(slopes), time[rows], axis=1) / (np.float64(size) * duration)
+        gradient = -np.trapezoid(error * np.array(slopes), time[rows], axis=1) / (
+            np.float64(size) * duration
+        )
     return TrackingSensitivity(size, gradient)
 
 
@@ -119,11 +153,12 @@ class LawWithSensitivities(ControlLaw):
         du/dtheta_k   = (dk/dy) dy/dtheta_k + (dk/dm) dm/dtheta_k + dk/dtheta_k,
         dm_+/dtheta_k = (dl/dy) dy/dtheta_k + (dl/dm) dm/dtheta_k + dl/dtheta_k,
 
-    u commands, y measurements, r set points, m memory. A column is a group of parameters of the law that vary
-    together, or an empty group for a parameter of the plant alone. A command at a limit of its input has no
-    derivative. The derivatives are further measured columns, commanded inputs and values of the memory, by the name
-    `sensitivity(name, k)`. Where a law is not differentiable, such as at a quantisation, the derivative is that of one
-    side. `differentiate_loop` makes the law for a loop.
+    u commands, y measurements, r set points, m memory. A column is a group of parameters of the law
+    that vary together, or an empty group for a parameter of the plant alone. A command at a limit
+    of its input has no derivative. The derivatives are further measured columns, commanded inputs
+    and values of the memory, by the name `sensitivity(name, k)`. Where a law is not differentiable,
+    such as at a quantisation, the derivative is that of one side. `differentiate_loop` makes the
+    law for a loop.
     """
 
     from_file: ClassVar[bool] = False
@@ -135,7 +170,9 @@ class LawWithSensitivities(ControlLaw):
         if not self.columns:
             raise ParameterError("LawWithSensitivities: there are no columns; give at least one.")
         known = [leaf.path for leaf in tree.leaves(self.law)]
-        check_known(f"{type(self.law).__name__} has no parameter", itertools.chain(*self.columns), known)
+        check_known(
+            f"{type(self.law).__name__} has no parameter", itertools.chain(*self.columns), known
+        )
 
     def _with_derivatives(self, names: tuple[str, ...]) -> tuple[str, ...]:
         return (*names, *(sensitivity(name, k) for name in names for k in range(len(self.columns))))
@@ -160,13 +197,19 @@ class LawWithSensitivities(ControlLaw):
         import casadi
 
         symbolic, parameters = autodiff.symbolic(self.law)
-        traced = casadi.vertcat(casadi.SX(0, 1), *(casadi.SX(v) for v in symbolic.initial_memory.values()))
-        slopes = [casadi.jtimes(traced, parameters, self._direction(k)) for k in range(len(self.columns))]
+        traced = casadi.vertcat(
+            casadi.SX(0, 1), *(casadi.SX(v) for v in symbolic.initial_memory.values())
+        )
+        slopes = [
+            casadi.jtimes(traced, parameters, self._direction(k)) for k in range(len(self.columns))
+        ]
         numbers = casadi.Function("start", [parameters], slopes)(tree.flatten(self.law))
         columns = numbers if isinstance(numbers, tuple | list) else [numbers]
         values = dict(self.law.initial_memory)
         further = {
-            sensitivity(name, k): float(column[i]) for i, name in enumerate(values) for k, column in enumerate(columns)
+            sensitivity(name, k): float(column[i])
+            for i, name in enumerate(values)
+            for k, column in enumerate(columns)
         }
         return {**values, **further}
 
@@ -180,8 +223,10 @@ class LawWithSensitivities(ControlLaw):
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         import casadi
 
-        sample, law = trace_sample(self.law), self.law
-        names, remembered = law.measured_columns, tuple(law.initial_memory)
+        sample = trace_sample(self.law)
+        law = self.law
+        names = law.measured_columns
+        remembered = tuple(law.initial_memory)
         limited = casadi.fmin(casadi.fmax(sample.commands, sample.minimum), sample.maximum)
         results = casadi.vertcat(limited, sample.later)
         parts = [casadi.vertcat(sample.commands, sample.later)]
@@ -196,10 +241,14 @@ class LawWithSensitivities(ControlLaw):
             parts.append(casadi.jtimes(results, variables, seed))
         ranges = [measurement.ranges[name] for name in law.inputs]
         point = [
-            *(measurement.columns[name] for name in names), *(measurement.setpoints[name] for name in law.setpoints),
-            *(memory[name] for name in remembered), *(low for low, _ in ranges), *(high for _, high in ranges), dt,
+            *(measurement.columns[name] for name in names),
+            *(measurement.setpoints[name] for name in law.setpoints),
+            *(memory[name] for name in remembered),
+            *(low for low, _ in ranges),
+            *(high for _, high in ranges),
+            dt,
             *(leaf.value for leaf in tree.leaves(law)),
-        ]  # fmt: skip
+        ]
         columns = evaluated(casadi.horzcat(*parts), sample[:-2], point)
         count = len(law.inputs)
         commands = dict(zip(law.inputs, columns[0], strict=False))

@@ -1,8 +1,9 @@
-"""Simulation of a problem, with a control loop from one sampling instant to the next, each met exactly; short ways in.
+"""Simulation of a problem, with a control loop from one sampling instant to the next, each met
+exactly; short ways in.
 
-Runs of compiled loops are kept with the system for the next loop of the same form. Loops have the same form if they
-differ in the parameters of the control law alone: the sampling instants, the set points and the segments of the other
-inputs are then the same, and so is the kernel with its arrays.
+Runs of compiled loops are kept with the system for the next loop of the same form. Loops have the
+same form if they differ in the parameters of the control law alone: the sampling instants, the set
+points and the segments of the other inputs are then the same, and so is the kernel with its arrays.
 """
 
 import functools
@@ -21,7 +22,13 @@ from ..compile.program import CompiledSystem, compile_system
 from ..loop import ControlLaw, ControlLoop, InputSignal, PiecewiseLinear, Schedule
 from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
-from .integrators import INTERRUPT_CHECK_STEPS, BoundIntegrator, Integrator, RawSolution, default_integrator
+from .integrators import (
+    INTERRUPT_CHECK_STEPS,
+    BoundIntegrator,
+    Integrator,
+    RawSolution,
+    default_integrator,
+)
 from .problem import MAX_KEPT_ROWS, Problem, check_input_range, plain_numbers
 from .sampled_loop import prepare_loop
 from .solution import Solution, early_end, make_solution, possible_rows, status_of_state
@@ -35,49 +42,68 @@ _NO_INPUT = -1, (np.inf, -np.inf)
 
 
 def solve(problem: Problem) -> Solution:
-    """The solution of a problem; a run that ended early is returned as far as it was computed, with its status.
+    """The solution of a problem; a run that ended early is returned as far as it was computed, with
+    its status.
 
-    With a ControlLoop the recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time,
-    and the controller's measurements and commands at the last sample. Every sampling instant is a row. Measurements are
-    taken just before the command of the same instant: an output that jumps with an input has not jumped yet. Split at a
-    sampling instant and continued, a run equals the run in one, to the last bit; split between two, to the tolerance.
+    With a ControlLoop the recording also has `setpoint.`, `measured.` and `command.` columns: the
+    set points in time, and the controller's measurements and commands at the last sample. Every
+    sampling instant is a row. Measurements are taken just before the command of the same instant:
+    an output that jumps with an input has not jumped yet. Split at a sampling instant and
+    continued, a run equals the run in one, to the last bit; split between two, to the tolerance.
     """
-    compiled, integrator = problem.compiled, problem.integrator
+    compiled = problem.compiled
+    integrator = problem.integrator
     assert integrator is not None
     if isinstance(problem.input, ControlLoop):
         return _solve_closed_loop(problem, problem.input)
-    segments, times = problem.segments, problem.times
+    segments = problem.segments
+    times = problem.times
     pool = compiled.description.cache.integrators
     bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
     check = functools.partial(status_of_state, compiled, segments, problem.start_time)
     raw = bound.run(segments, problem.start_time, problem.initial_vector, times, check=check)
     pool.give_back(integrator, bound)
     raw, table = possible_rows(compiled, raw, times, segments, problem.start_time)
-    if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:  # a short run
+    if (
+        raw.status not in _AT_POSSIBLE_STATE
+        and raw.reached > 0
+        and raw.steps < INTERRUPT_CHECK_STEPS
+    ):  # a short run
         raw = _end_between_rows(problem, raw)
     return make_solution(problem, raw, table, times, (raw.time, raw.state), {})
 
 
 def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
-    """The solution, which ended early, cut at the first impossible one of many instants since its last row, if any."""
-    compiled, integrator = problem.compiled, problem.integrator
+    """The solution, which ended early, cut at the first impossible one of many instants since its
+    last row, if any.
+    """
+    compiled = problem.compiled
+    integrator = problem.integrator
     assert integrator is not None
     instants = np.linspace(problem.times[raw.reached - 1], raw.time, INSTANTS + 1)[1:]
-    again = integrator.run(compiled, problem.segments, problem.start_time, problem.initial_vector, instants)
+    again = integrator.run(
+        compiled, problem.segments, problem.start_time, problem.initial_vector, instants
+    )
     end, _ = possible_rows(compiled, again, instants, problem.segments, problem.start_time)
     return raw if end is again else raw._replace(time=end.time, state=end.state, status=end.status)
 
 
 def _solve_closed_loop(problem: Problem, loop: ControlLoop) -> Solution:
-    """The solution of a problem with a ControlLoop, and the state from which the run can be continued."""
-    compiled, form, law = problem.compiled, form_of(problem), loop.controller
+    """The solution of a problem with a ControlLoop, and the state from which the run can be
+    continued.
+    """
+    compiled = problem.compiled
+    form = form_of(problem)
+    law = loop.controller
     control_state = problem.control_state or loop.init(problem.start_time)
     pool = compiled.description.cache.loops
     run: CompiledRun | None = pool.borrow(form)
     if run is None:
         assert problem.integrator is not None
         prepared = CompiledLoop(compiled, prepare_loop(problem, control_state))
-        run = CompiledRun(prepared, compiled, problem.integrator, problem.initial_vector, control_state)
+        run = CompiledRun(
+            prepared, compiled, problem.integrator, problem.initial_vector, control_state
+        )
     else:
         assert isinstance(law, ControlLaw)
         run.restart(compiled, problem.initial_vector, parameters_of(law), control_state)
@@ -90,36 +116,61 @@ def _solve_closed_loop(problem: Problem, loop: ControlLoop) -> Solution:
 
 def _loop_solution(problem: Problem, loop: ControlLoop, run: CompiledRun) -> Solution:
     """The rows of all intervals as one solution."""
-    compiled, segments, (times, states) = problem.compiled, run.signal, run.rows
-    times, states = times.copy(), states.copy()  # the next run may be in the same arrays
+    compiled = problem.compiled
+    segments = run.signal
+    times, states = run.rows
+    # the next run may be in the same arrays
+    times = times.copy()
+    states = states.copy()
     raw, table = possible_rows(compiled, run.raw(states), times, segments, problem.start_time)
-    way = "compiled with the plant" if run.loop.law is not None else "called from Python at each sample"
+    way = (
+        "compiled with the plant"
+        if run.loop.law is not None
+        else "called from Python at each sample"
+    )
     measured = [name for name in loop.controller.measured_columns if name in compiled.output_names]
     note = f"controlled by {loop.describe(column_units(problem.system, measured))}; {way}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(loop.controller).__name__, note)
     control_state = run.control_state
     notes = loop.controller.notes(control_state.controller)
-    remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
+    remarks = (
+        remark,
+        *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes),
+    )
     reached = times[: raw.reached]
-    at, setpoints = run.prepared.at(reached) if loop.drivers else run.prepared.at_times  # drivers add rows
+    at, setpoints = (
+        run.prepared.at(reached) if loop.drivers else run.prepared.at_times
+    )  # drivers add rows
     more = run.columns(at[: reached.size], setpoints[: reached.size])
-    return make_solution(problem, raw, table, times, (run.time, run.state), more, remarks, control_state)
+    return make_solution(
+        problem, raw, table, times, (run.time, run.state), more, remarks, control_state
+    )
 
 
 def form_of(problem: Problem) -> Hashable | None:
-    """The form of a problem's loop; None where a part of it may change, or where the run continues another one."""
+    """The form of a problem's loop; None where a part of it may change, or where the run continues
+    another one.
+    """
     loop = problem.input
     assert isinstance(loop, ControlLoop)
-    law, given = loop.controller, problem.output_times
+    law = loop.controller
+    given = problem.output_times
     signals = type(loop.setpoint) is Schedule and type(loop.other_inputs) is Schedule
     if not signals or problem.control_state is not None or not isinstance(law, ControlLaw):
         return None
     if not (given is None or type(given) in (float, int)):
         return None
     form = (
-        tree.structure(law), id(loop.setpoint), id(loop.other_inputs), tuple(loop.drivers.items()), loop.sample_time,
-        problem.start_time, problem.duration, given, problem.integrator,
-    )  # fmt: skip
+        tree.structure(law),
+        id(loop.setpoint),
+        id(loop.other_inputs),
+        tuple(loop.drivers.items()),
+        loop.sample_time,
+        problem.start_time,
+        problem.duration,
+        given,
+        problem.integrator,
+    )
     try:
         hash(form)
     except TypeError:  # a driver or an integrator that can change
@@ -143,16 +194,20 @@ def simulate(
     plant          any System: a Plant, or a user-defined one
     input          an InputSignal such as a Schedule, or a ControlLoop
     initial_state  values by state; by default a Plant's equilibrium at ambient pressure
-    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10 ms. The instants of
+    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10
+    ms. The instants of
                    the input are always among the rows, with the inputs that begin there
     integrator     Rodas4(rtol=1e-6) by default
-    complete       whether a run that ends early raises SimulationError (its `.recording` holds what was computed);
+    complete       whether a run that ends early raises SimulationError (its `.recording` holds what
+    was computed);
                    otherwise that part is returned, with the reason in its notes
 
-    The short form of `solve(Problem(...)).recording`. The result does not depend on `output_times`. Raises
-    ParameterError for an input or state that the plant does not have.
+    The short form of `solve(Problem(...)).recording`. The result does not depend on `output_times`.
+    Raises ParameterError for an input or state that the plant does not have.
     """
-    solution = solve(Problem(plant, input, duration, initial_state, start_time, output_times, integrator))
+    solution = solve(
+        Problem(plant, input, duration, initial_state, start_time, output_times, integrator)
+    )
     return (solution.raise_if_incomplete() if complete else solution).recording
 
 
@@ -168,15 +223,17 @@ def advance(
     """The state of a plant `dt` [s] later, with the inputs held.
 
     Inputs that vary meanwhile are given as PiecewiseLinear from `start_time` on:
-    `segments, states = WithDrivers(signal, drivers).step(states, plant.inputs, start_time, dt)`. For many steps of one
-    plant a `Stepper` is quicker. Raises SimulationError where the step fails,
+    `segments, states = WithDrivers(signal, drivers).step(states, plant.inputs, start_time, dt)`.
+    For many steps of one plant a `Stepper` is quicker. Raises SimulationError where the step fails,
     ParameterError for an unknown name or an input beyond its range.
     """
     check_system("advance", plant)
-    dt, start_time = as_float("advance: dt", dt), as_float("advance: start_time", start_time)
+    dt = as_float("advance: dt", dt)
+    start_time = as_float("advance: start_time", start_time)
     if not 0 < dt < float("inf"):
         raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
-    compiled, integrator = compile_system(plant), default_integrator(integrator)
+    compiled = compile_system(plant)
+    integrator = default_integrator(integrator)
     final = _hold(compiled, integrator, state, inputs, dt) if isinstance(inputs, Mapping) else None
     if final is not None:
         return dict(zip(compiled.description.state_names, final, strict=True))
@@ -193,9 +250,15 @@ def advance(
 
 
 def _hold(
-    compiled: CompiledSystem, integrator: Integrator, state: Mapping[str, float], inputs: Mapping[str, float], dt: float
+    compiled: CompiledSystem,
+    integrator: Integrator,
+    state: Mapping[str, float],
+    inputs: Mapping[str, float],
+    dt: float,
 ) -> list[float] | None:
-    """The state after a step with held inputs; None if `advance` must check the arguments or report a failure."""
+    """The state after a step with held inputs; None if `advance` must check the arguments or report
+    a failure.
+    """
     known = compiled.description
     x = plain_numbers(state, known.state_limits)
     if x is None:
@@ -208,7 +271,8 @@ def _hold(
         held[column] = value
     pool = known.cache.holders
     bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
-    bound.state[:], bound.held[:] = x, held
+    bound.state[:] = x
+    bound.held[:] = held
     status = bound.proceed(dt)
     final: list[float] = bound.state.tolist()
     pool.give_back(integrator, bound)
@@ -229,6 +293,9 @@ def _segments(
         hold = Schedule({name: ((start, value),) for name, value in inputs.items()})
         segments = hold.segments(known.input_names, start, dt)
     else:
-        raise ParameterError(f"advance: inputs are {one_line(inputs)}; give a value for each name, or PiecewiseLinear.")
+        raise ParameterError(
+            f"advance: inputs are {one_line(inputs)}; give a value for each name, or"
+            " PiecewiseLinear."
+        )
     check_input_range(compiled, segments, start)
     return segments

@@ -1,4 +1,6 @@
-"""Solution: the recording of a run with its status, statistics, diagnostics, final state and references."""
+"""Solution: the recording of a run with its status, statistics, diagnostics, final state and
+references.
+"""
 
 import dataclasses
 import functools
@@ -25,17 +27,22 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _HINTS = {
-    Status.TOO_MANY_STEPS: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
+    Status.TOO_MANY_STEPS: (
+        "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters."
+    ),
     Status.INTERRUPTED: "Nothing is lost; the rows until then are in the recording.",
     Status.NON_FINITE_COMMAND: "Check the last measurement of the controller, and its parameters.",
 }
-_GENERAL_HINT = "Check the last state: a parameter may be far from physical, or a fixed step too long."
+_GENERAL_HINT = (
+    "Check the last state: a parameter may be far from physical, or a fixed step too long."
+)
 _name = functools.lru_cache(maxsize=32)(str)
 """The text of an integrator."""
 
 
 class RowTable(NamedTuple):
-    """Inputs (N, m) and outputs (N, k) of a run, the ranges of its columns with limits, the first row not finite.
+    """Inputs (N, m) and outputs (N, k) of a run, the ranges of its columns with limits, the first
+    row not finite.
 
     lower, upper   smallest and largest values of the `ranged_names` of the system's description
     """
@@ -51,25 +58,46 @@ class RowRecorder:
     """The kernel of the rows, bound to a compiled system. For one thread at a time."""
 
     def __init__(self, compiled: CompiledSystem) -> None:
-        self.sizes, columns = compiled.sizes, compiled.description.ranged_columns
-        sizes, self._ranges = self.sizes, np.empty((2, columns.size))
-        states, inputs, outputs = (np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs))
-        none, nothing = np.empty(0), np.empty((0, sizes.inputs))
+        self.sizes = compiled.sizes
+        columns = compiled.description.ranged_columns
+        sizes = self.sizes
+        self._ranges = np.empty((2, columns.size))
+        states, inputs, outputs = (
+            np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs)
+        )
+        none = np.empty(0)
+        nothing = np.empty((0, sizes.inputs))
         function, width = compiled.program.outputs_at_rows
         work = (np.zeros((width, count)) for count in (sizes.states, sizes.inputs, sizes.outputs))
         self._kernel = record.bind(
-            function, compiled.precomputed, states, none, 0.0, none, nothing, nothing, inputs,
-            outputs, columns, *self._ranges, *work,
-        )  # fmt: skip
+            function,
+            compiled.precomputed,
+            states,
+            none,
+            0.0,
+            none,
+            nothing,
+            nothing,
+            inputs,
+            outputs,
+            columns,
+            *self._ranges,
+            *work,
+        )
 
     def adopt(self, compiled: CompiledSystem) -> None:
         """Take another compiled system of the same structure."""
         self._kernel.replace(1, compiled.precomputed)
 
-    def evaluate(self, states: Array, times: Array, segments: PiecewiseLinear, start: float) -> RowTable:
-        """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
+    def evaluate(
+        self, states: Array, times: Array, segments: PiecewiseLinear, start: float
+    ) -> RowTable:
+        """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin
+        at `start` [s].
+        """
         count = times.size
-        inputs, outputs = np.empty((count, self.sizes.inputs)), np.empty((count, self.sizes.outputs))
+        inputs = np.empty((count, self.sizes.inputs))
+        outputs = np.empty((count, self.sizes.outputs))
         kernel = self._kernel
         kernel.replace(2, states)
         kernel.replace_input(3, times)
@@ -84,21 +112,30 @@ class RowRecorder:
 
 
 def possible_rows(
-    compiled: CompiledSystem, raw: RawSolution, times: Array, segments: PiecewiseLinear, start: float
+    compiled: CompiledSystem,
+    raw: RawSolution,
+    times: Array,
+    segments: PiecewiseLinear,
+    start: float,
 ) -> tuple[RawSolution, RowTable]:
     """The solution with inputs and outputs of its rows, up to the first row that is impossible.
 
-    Numbers can go on although the model does not hold: a fixed step can end in numbers that are far off; isothermal
-    air has a pressure, below vacuum, in a negative volume. `start` [s] is where segments begin. For a system with its
-    own parameters, whose recorder is kept with its description.
+    Numbers can go on although the model does not hold: a fixed step can end in numbers that are far
+    off; isothermal air has a pressure, below vacuum, in a negative volume. `start` [s] is where
+    segments begin. For a system with its own parameters, whose recorder is kept with its
+    description.
     """
-    known, all_reached = compiled.description, raw.reached == times.size
-    positive, idle = known.positive_outputs, known.cache.recorders
+    known = compiled.description
+    all_reached = raw.reached == times.size
+    positive = known.positive_outputs
+    idle = known.cache.recorders
     shown = (raw.rows, times) if all_reached else (raw.rows[: raw.reached], times[: raw.reached])
     recorder: RowRecorder = idle.borrow(None) or RowRecorder(compiled)
     table = recorder.evaluate(*shown, segments, start)
     idle.give_back(None, recorder)
-    if table.first_invalid == raw.reached and all(map(operator.ge, table.lower, known.range_floors)):
+    if table.first_invalid == raw.reached and all(
+        map(operator.ge, table.lower, known.range_floors)
+    ):
         return raw, table
     reasons: dict[Status, Any] = {
         Status.NOT_FINITE: ~np.isfinite(table.outputs).all(axis=1),
@@ -111,35 +148,53 @@ def possible_rows(
     row = int(invalid[0])
     status = next(status for status, rows in reasons.items() if rows[row])
     raw = raw._replace(reached=row, time=float(times[row]), state=raw.rows[row], status=status)
-    inputs, outputs = table.inputs[:row], table.outputs[:row]
-    kept = np.hstack([raw.rows[:row], outputs]) if row else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
+    inputs = table.inputs[:row]
+    outputs = table.outputs[:row]
+    kept = (
+        np.hstack([raw.rows[:row], outputs])
+        if row
+        else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
+    )
     columns = kept[:, known.ranged_columns]
-    return raw, RowTable(inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row)
+    return raw, RowTable(
+        inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row
+    )
 
 
 def status_of_state(
     compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, time: float
 ) -> Status:
-    """DONE, or why a state (n,) at a time [s] of a run is impossible; arguments as of `possible_rows`."""
+    """DONE, or why a state (n,) at a time [s] of a run is impossible; arguments as of
+    `possible_rows`.
+    """
     raw = RawSolution(state[np.newaxis].copy(), 1, time, state, Status.DONE, 0, 0)
     return possible_rows(compiled, raw, np.array([time]), segments, start)[0].status
 
 
 def make_solution(
-    problem: Problem, raw: RawSolution, table: RowTable, times: Array, end: tuple[float, Array],
-    more: dict[str, Array], before: tuple[Diagnostic, ...] = (), control_state: ControlLoopState | None = None,
-) -> "Solution":  # fmt: skip
-    """The solution of a problem from the rows that were reached, with its diagnostics as notes of the recording.
+    problem: Problem,
+    raw: RawSolution,
+    table: RowTable,
+    times: Array,
+    end: tuple[float, Array],
+    more: dict[str, Array],
+    before: tuple[Diagnostic, ...] = (),
+    control_state: ControlLoopState | None = None,
+) -> "Solution":
+    """The solution of a problem from the rows that were reached, with its diagnostics as notes of
+    the recording.
 
     end     final time [s] and state (n,)
     more    further columns
     before  diagnostics that come first
     """
     compiled = problem.compiled
-    known, reached = compiled.description, raw.reached
+    known = compiled.description
+    reached = raw.reached
     states = raw.rows
     if reached < times.size:
-        states, times = states[:reached], times[:reached]
+        states = states[:reached]
+        times = times[:reached]
     for array in (times, states, table.outputs, table.inputs, *more.values()):
         array.setflags(write=False)
     values = times, *states.T, *table.outputs.T, *table.inputs.T
@@ -151,14 +206,21 @@ def make_solution(
     diagnostics += known.remarks
     later: list[Diagnostic] = []
     if reached:
-        later += compiled.system.diagnose(Columns(columns, known.range_places, table.lower, table.upper))
+        later += compiled.system.diagnose(
+            Columns(columns, known.range_places, table.lower, table.upper)
+        )
     if raw.status != Status.DONE:
         later.append(early_end(compiled, raw, problem.end_time))
     notes += [diagnostic.message for diagnostic in later]
-    recording = Recording.from_arrays(columns, "simulation", known.constants, tuple(notes), problem.references)
+    recording = Recording.from_arrays(
+        columns, "simulation", known.constants, tuple(notes), problem.references
+    )
     final = dict(zip(known.state_names, end[1].tolist(), strict=True))
-    statistics, remarks = Statistics(raw.steps, raw.rejected), (*diagnostics, *later)
-    return Solution(problem, recording, raw.status, statistics, remarks, end[0], final, control_state)
+    statistics = Statistics(raw.steps, raw.rejected)
+    remarks = (*diagnostics, *later)
+    return Solution(
+        problem, recording, raw.status, statistics, remarks, end[0], final, control_state
+    )
 
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
@@ -167,7 +229,9 @@ def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnos
     if raw.status != Status.INTERRUPTED:
         state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
         hint = compiled.system.failure_hint(state) or hint
-    return Diagnostic(DiagnosticCode.INCOMPLETE, "run", reason_of_end(compiled, raw, end), hint=hint)
+    return Diagnostic(
+        DiagnosticCode.INCOMPLETE, "run", reason_of_end(compiled, raw, end), hint=hint
+    )
 
 
 def reason_of_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> str:
@@ -195,7 +259,8 @@ class Solution(NotebookDisplay):
     statistics     steps of the integrator
     diagnostics    what the reader must know: assumptions, extrapolation, an early end
     final_time     [s], and
-    final_state    by state: the end of the run, or where it failed; of a control loop the last sampling instant from
+    final_state    by state: the end of the run, or where it failed; of a control loop the last
+    sampling instant from
                    which the run can be continued
     control_state  of a control loop, for a Problem that continues the run
     """
@@ -220,9 +285,11 @@ class Solution(NotebookDisplay):
         return list(self.problem.references)
 
     def continuation(self, duration: float) -> Problem:
-        """The Problem that continues this run for `duration` [s] from its final state, at the same output spacing.
+        """The Problem that continues this run for `duration` [s] from its final state, at the same
+        output spacing.
 
-        After a list of output times the default spacing is used. Raises ParameterError for a duration <= 0.
+        After a list of output times the default spacing is used. Raises ParameterError for a
+        duration <= 0.
         """
         given = self.problem.output_times
         return dataclasses.replace(
@@ -238,23 +305,33 @@ class Solution(NotebookDisplay):
         """The solution itself; raises SimulationError with the solution if the run ended early."""
         if self.complete:
             return self
-        raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)
+        raise SimulationError(
+            self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED
+        )
 
     def to_pandas(self) -> "pd.DataFrame":
         """The recording as a data frame."""
         return self.recording.to_pandas()
 
     def plot(self, *names: str, ax: Any = None) -> Any:
-        """Plot the named columns, or all, over time, as `Recording.plot`, with the units of the system."""
+        """Plot the named columns, or all, over time, as `Recording.plot`, with the units of the
+        system.
+        """
         units = column_units(self.problem.system, [])
-        columns = {name: self.recording[name] for name in (names or self.recording) if name != "time"}
+        columns = {name: self.recording[name] for name in names or self.recording if name != "time"}
         options: dict[str, Any] = {"ax": ax, "units": units, "ordered": not names}
         return plot_columns(columns, self.recording["time"], self.recording.origin, **options)
 
     def _card(self) -> Card:
         card = recording_card(self.recording, column_units(self.problem.system, []))
-        text = f"{self.status.name}, {self.statistics.steps} steps, {self.statistics.rejected_steps} rejected"
-        notes = [f"{text}, final time {self.final_time:.4g} s", *(each.message for each in self.diagnostics)]
+        text = (
+            f"{self.status.name}, {self.statistics.steps} steps, {self.statistics.rejected_steps}"
+            " rejected"
+        )
+        notes = [
+            f"{text}, final time {self.final_time:.4g} s",
+            *(each.message for each in self.diagnostics),
+        ]
         return dataclasses.replace(card, title=f"Solution: {card.title}", notes=notes)
 
     def __repr__(self) -> str:

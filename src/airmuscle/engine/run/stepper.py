@@ -1,4 +1,6 @@
-"""Stepper: a plant that is advanced by hand, step after step, for hardware in the loop, other simulators and ROS."""
+"""Stepper: a plant that is advanced by hand, step after step, for hardware in the loop, other
+simulators and ROS.
+"""
 
 import numbers
 from collections.abc import Mapping, Sequence
@@ -24,7 +26,8 @@ _RANGES = {
 
 
 class Snapshot(NamedTuple):
-    """Everything that the further steps of a Stepper depend on: time [s], states and inputs in their order.
+    """Everything that the further steps of a Stepper depend on: time [s], states and inputs in
+    their order.
 
     It can be pickled and restored in another process.
     """
@@ -35,56 +38,76 @@ class Snapshot(NamedTuple):
 
 
 class Stepper:
-    """A plant with its present state, advanced by `step(inputs, dt)` in real time or by another program.
+    """A plant with its present state, advanced by `step(inputs, dt)` in real time or by another
+    program.
 
     plant           any System: a Plant, or a user-defined one
     initial_state   values by state; by default a Plant's equilibrium at ambient pressure
-    integrator      Rodas4(rtol=1e-6) by default; RungeKutta4(step) takes the same time for every step
-    start_time      [s]
-    check_validity  whether a step that leaves a validity range, a rating of a muscle, or the range of a geometry
+    integrator      Rodas4(rtol=1e-6) by default; RungeKutta4(step) takes the same time for every
+    step start_time      [s] check_validity  whether a step that leaves a validity range, a rating
+    of a muscle, or the range of a geometry
                     raises SimulationError; otherwise only impossible states do
 
     state_names, input_names, output_names   order of the arrays
-    state (n,), inputs (m,), outputs (k,)    present values [SI]; `state` may be written to, for instance by an observer
+    state (n,), inputs (m,), outputs (k,)    present values [SI]; `state` may be written to, for
+    instance by an observer
 
-    Equal steps from equal states give equal results to the last bit. A step allocates no arrays. A Stepper is for one
-    thread at a time; a copy, also a pickled one, goes on from the present state by itself. Raises ParameterError for
-    an unknown or impossible initial state.
+    Equal steps from equal states give equal results to the last bit. A step allocates no arrays. A
+    Stepper is for one thread at a time; a copy, also a pickled one, goes on from the present state
+    by itself. Raises ParameterError for an unknown or impossible initial state.
     """
 
     def __init__(
-        self, plant: System, initial_state: Mapping[str, float] | None = None, *,
-        integrator: Integrator | None = None, start_time: float = 0.0, check_validity: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        plant: System,
+        initial_state: Mapping[str, float] | None = None,
+        *,
+        integrator: Integrator | None = None,
+        start_time: float = 0.0,
+        check_validity: bool = False,
+    ) -> None:
         check_system("Stepper", plant)
-        self.integrator, self.check_validity = default_integrator(integrator), check_validity
+        self.integrator = default_integrator(integrator)
+        self.check_validity = check_validity
         known = compile_system(plant).description
-        self.state_names, self.input_names = known.state_names, known.input_names
+        self.state_names = known.state_names
+        self.input_names = known.input_names
         self.output_names = known.output_names
         sizes = known.program.sizes
         self.state, self.inputs = np.zeros(sizes.states), np.zeros(sizes.inputs)
         self.outputs, self._found = np.zeros(sizes.outputs), np.zeros(sizes.outputs)
         self._always = np.zeros(1, dtype=np.int64)
         self._initial: Array | None = None
-        kinds = {"state": self.state_names, "outputs": self.output_names, "inputs": self.input_names}
-        self._index = {name: (kind, i) for kind, names in kinds.items() for i, name in enumerate(names)}
+        kinds = {
+            "state": self.state_names,
+            "outputs": self.output_names,
+            "inputs": self.input_names,
+        }
+        self._index = {
+            name: (kind, i) for kind, names in kinds.items() for i, name in enumerate(names)
+        }
         self._bind(compile_system(plant))
         self.reset(initial_state, start_time=start_time)
 
     def reset(
-        self, initial_state: Mapping[str, float] | None = None, *, start_time: float = 0.0, plant: System | None = None
+        self,
+        initial_state: Mapping[str, float] | None = None,
+        *,
+        start_time: float = 0.0,
+        plant: System | None = None,
     ) -> Array:
-        """Return to an initial state, by default that of the first time, with all inputs 0; the outputs (k,).
+        """Return to an initial state, by default that of the first time, with all inputs 0; the
+        outputs (k,).
 
-        `plant` is another plant of the same structure, with other parameter values. Raises ParameterError for a plant
-        of another structure or an impossible state.
+        `plant` is another plant of the same structure, with other parameter values. Raises
+        ParameterError for a plant of another structure or an impossible state.
         """
         if plant is not None:
             check_system("Stepper.reset", plant)
             if tree.structure(plant) is not tree.structure(self.plant):
                 raise ParameterError(
-                    "Stepper.reset: the plant has another structure; give one that differs in parameter values only, "
-                    "or make a new Stepper."
+                    "Stepper.reset: the plant has another structure; give one that differs in"
+                    " parameter values only, or make a new Stepper."
                 )
             self._bind(compile_system(plant))
             self._initial = None
@@ -97,24 +120,32 @@ class Stepper:
         return self._settle()
 
     def begin(self, parameters: Array, state: Array) -> Array:
-        """Begin at a state (n,) with other parameters (P,), in the order of `core.tree.leaves`, at time 0 with all
-        inputs 0; the outputs (k,). Nothing is checked: for callers that draw both often."""
+        """Begin at a state (n,) with other parameters (P,), in the order of `core.tree.leaves`, at
+        time 0 with all inputs 0; the outputs (k,). Nothing is checked: for callers that draw both
+        often."""
         self._bind(self._compiled.at(parameters, self._compiled.nominal))
-        self.state[:], self.time = state, 0.0
+        self.state[:] = state
+        self.time = 0.0
         return self._settle()
 
     def step(self, inputs: Any, dt: float) -> Array:
-        """Advance by `dt` [s] with the inputs held; the outputs (k,) at the end, the array `outputs` itself.
+        """Advance by `dt` [s] with the inputs held; the outputs (k,) at the end, the array
+        `outputs` itself.
 
-        inputs  (m,) in the order of `input_names`, or by name: a mapping keeps the present values of the other inputs
+        inputs  (m,) in the order of `input_names`, or by name: a mapping keeps the present values
+        of the other inputs
 
-        Raises ParameterError for a number of inputs, an input or a time step that is impossible, SimulationError where
-        the step fails or leads to an impossible state. The state is then that before the step.
+        Raises ParameterError for a number of inputs, an input or a time step that is impossible,
+        SimulationError where the step fails or leads to an impossible state. The state is then that
+        before the step.
         """
         if not isinstance(dt, (float, numbers.Real)) or not 0.0 < dt <= LARGEST:
-            raise ParameterError(f"Stepper: dt is {one_line(dt)} s; it must be positive and finite.")
+            raise ParameterError(
+                f"Stepper: dt is {one_line(dt)} s; it must be positive and finite."
+            )
         if hasattr(inputs, "keys"):
-            given, inputs = inputs, self.inputs.tolist()
+            given = inputs
+            inputs = self.inputs.tolist()
             for name, value in given.items():  # the others keep their present values
                 if name not in self.input_names:
                     check_known("Stepper: no input", name, self.input_names)
@@ -125,30 +156,34 @@ class Stepper:
             self._given[:] = inputs
         except (TypeError, ValueError):
             raise ParameterError(
-                f"Stepper: inputs are {one_line(inputs)}; give {self._given.size} numbers in the order of "
-                f"{', '.join(self.input_names)}, or values by name."
+                f"Stepper: inputs are {one_line(inputs)}; give {self._given.size} numbers in the"
+                f" order of {', '.join(self.input_names)}, or values by name."
             ) from None
         if self._begin():
             check_inputs(self._compiled, self._given, f"at {self.time:g} s")
         status = self._bound.proceed(dt)
         if status is not Status.DONE:
             raise SimulationError(
-                f"a step of {dt:g} s from {self.time:.6g} s on failed because {status.message}, at "
-                f"{_listed(self.state_names, self._next)}. The stepper is in the state before the step."
+                f"a step of {dt:g} s from {self.time:.6g} s on failed because {status.message}, at"
+                f" {_listed(self.state_names, self._next)}. The stepper is in the state before the"
+                " step."
             )
         defect = self._end()
         if defect:
             name = (*self.state_names, *self.output_names)[defect - 1]
             value = [*self._next, *self._found][defect - 1]
             raise SimulationError(
-                f"the step of {dt:g} s from {self.time:.6g} s on led to {name} {value:.4g}: "
-                f"{self._limits.meaning(defect - 1, value)} The stepper is in the state before the step."
+                f"the step of {dt:g} s from {self.time:.6g} s on led to {name} {value:.4g}:"
+                f" {self._limits.meaning(defect - 1, value)} The stepper is in the state before the"
+                " step."
             )
         self.time += dt
         return self.outputs
 
     def __getitem__(self, name: str) -> float:
-        """The present value of a state, an output or an input [SI]. Raises ParameterError for an unknown name."""
+        """The present value of a state, an output or an input [SI]. Raises ParameterError for an
+        unknown name.
+        """
         if name not in self._index:
             check_known("Stepper: no state, output or input", name, self._index)
         kind, i = self._index[name]
@@ -163,24 +198,40 @@ class Stepper:
         return Snapshot(self.time, tuple(self.state.tolist()), tuple(self.inputs.tolist()))
 
     def restore(self, snapshot: Snapshot) -> Array:
-        """Return to a snapshot; the outputs (k,). Raises ParameterError for one of another plant."""
+        """Return to a snapshot; the outputs (k,). Raises ParameterError for one of another
+        plant.
+        """
         if not isinstance(snapshot, Snapshot) or (len(snapshot.state), len(snapshot.inputs)) != (
-            self.state.size, self.inputs.size
-        ):  # fmt: skip
+            self.state.size,
+            self.inputs.size,
+        ):
             raise ParameterError(
-                f"Stepper.restore: {one_line(snapshot)} is no snapshot of this plant, which has {self.state.size} "
-                f"states and {self.inputs.size} inputs."
+                f"Stepper.restore: {one_line(snapshot)} is no snapshot of this plant, which has"
+                f" {self.state.size} states and {self.inputs.size} inputs."
             )
         state_vector(self.plant, dict(zip(self.state_names, snapshot.state, strict=True)))
-        self.state[:], self._given[:], self.time = snapshot.state, snapshot.inputs, float(snapshot.time)
+        self.state[:], self._given[:], self.time = (
+            snapshot.state,
+            snapshot.inputs,
+            float(snapshot.time),
+        )
         return self._settle()
 
     def __getstate__(self) -> dict[str, Any]:
         """Arguments, parameters and present state; kernels and addresses belong to a process."""
         options = {"integrator": self.integrator, "check_validity": self.check_validity}
-        initial = None if self._initial is None else dict(zip(self.state_names, self._initial.tolist(), strict=True))
+        initial = (
+            None
+            if self._initial is None
+            else dict(zip(self.state_names, self._initial.tolist(), strict=True))
+        )
         parameters = self._compiled.parameters, self._compiled.nominal
-        return {"arguments": (self.plant, initial), "options": options, "at": parameters, "present": self.snapshot()}
+        return {
+            "arguments": (self.plant, initial),
+            "options": options,
+            "at": parameters,
+            "present": self.snapshot(),
+        }
 
     def __setstate__(self, stored: dict[str, Any]) -> None:
         self.__init__(*stored["arguments"], **stored["options"])  # type: ignore[misc]
@@ -194,46 +245,75 @@ class Stepper:
 
     def __repr__(self) -> str:
         present = _listed(self.state_names, self.state)
-        return f"Stepper({type(self.plant).__name__} at {self.time:.6g} s: {present}; {self.integrator})"
+        return (
+            f"Stepper({type(self.plant).__name__} at {self.time:.6g} s: {present};"
+            f" {self.integrator})"
+        )
 
     def _bind(self, compiled: CompiledSystem) -> None:
-        """Bind integrator and kernels to a plant; `_next` and `_given` are the state and the inputs of a step."""
+        """Bind integrator and kernels to a plant; `_next` and `_given` are the state and the inputs
+        of a step.
+        """
         self._compiled, self._bound = compiled, self.integrator.bind(compiled)
         self._limits = _Limits(compiled, self.check_validity)
-        self._next, self._given = self._bound.state, self._bound.held
+        self._next = self._bound.state
+        self._given = self._bound.held
         known = compiled.description
-        begin = begin_step.bind(self._given, known.input_lower_limits, known.input_upper_limits, self.state, self._next)
+        begin = begin_step.bind(
+            self._given, known.input_lower_limits, known.input_upper_limits, self.state, self._next
+        )
         end = end_step.bind(
-            compiled.address["outputs"], compiled.precomputed, self._next, self._given, self._found,
-            *self._limits.arrays, self.state, self.inputs, self.outputs, self._always,
-        )  # fmt: skip
-        self._kernels, self._begin, self._end = (begin, end), begin.runner, end.runner
+            compiled.address["outputs"],
+            compiled.precomputed,
+            self._next,
+            self._given,
+            self._found,
+            *self._limits.arrays,
+            self.state,
+            self.inputs,
+            self.outputs,
+            self._always,
+        )
+        self._kernels = (begin, end)
+        self._begin = begin.runner
+        self._end = end.runner
 
     def _settle(self) -> Array:
         """Compute the outputs at the present state and the given inputs."""
-        self._next[:], self._always[0] = self.state, 1
+        self._next[:] = self.state
+        self._always[0] = 1
         self._end()
         self._always[0] = 0
         return self.outputs
 
 
 class _Limits:
-    """Limits of states (n,) and outputs (k,): those of possible states and, if wanted, of the validity of the model."""
+    """Limits of states (n,) and outputs (k,): those of possible states and, if wanted, of the
+    validity of the model.
+    """
 
     def __init__(self, compiled: CompiledSystem, check_validity: bool) -> None:
-        known, n = compiled.description, compiled.sizes.states
+        known = compiled.description
+        n = compiled.sizes.states
         self.names = (*known.state_names, *known.output_names)
-        self.lower, self.upper = np.full(len(self.names), -LARGEST), np.full(len(self.names), LARGEST)
+        self.lower, self.upper = (
+            np.full(len(self.names), -LARGEST),
+            np.full(len(self.names), LARGEST),
+        )
         self.lower[:n] = np.maximum(known.lower_bounds, -LARGEST)
         self.lower[n + known.positive_outputs] = np.nextafter(0.0, 1.0)
         self.validity: dict[int, ColumnLimit] = {}
         for limit in compiled.system.column_limits if check_validity else ():
             if limit.column not in self.names:
                 continue
-            i, (low, high) = self.names.index(limit.column), limit.bounds
+            i = self.names.index(limit.column)
+            low, high = limit.bounds
             slack = 1e-9 * (high - low if np.isfinite(high - low) else 0.0)
             if low - slack > self.lower[i] or high + slack < self.upper[i]:
-                self.lower[i], self.upper[i] = max(self.lower[i], low - slack), min(self.upper[i], high + slack)
+                self.lower[i], self.upper[i] = (
+                    max(self.lower[i], low - slack),
+                    min(self.upper[i], high + slack),
+                )
                 self.validity[i] = limit
         self.arrays = self.lower[:n], self.upper[:n], self.lower[n:], self.upper[n:]
 
@@ -245,10 +325,12 @@ class _Limits:
         if limit is None:
             return "it must be positive." if self.lower[i] > 0 else "it must not be negative."
         return (
-            f"allowed range: {self.lower[i]:.4g} to {self.upper[i]:.4g} ({_RANGES[limit.code]} of {limit.subject}; "
-            "check_validity=False continues beyond it)."
+            f"allowed range: {self.lower[i]:.4g} to {self.upper[i]:.4g} ({_RANGES[limit.code]} of"
+            f" {limit.subject}; check_validity=False continues beyond it)."
         )
 
 
 def _listed(names: Sequence[str], values: Array) -> str:
-    return ", ".join(f"{name} {value:.4g}" for name, value in zip(names, values.tolist(), strict=True))
+    return ", ".join(
+        f"{name} {value:.4g}" for name, value in zip(names, values.tolist(), strict=True)
+    )

@@ -1,4 +1,6 @@
-"""Forward sensitivities: a system extended by the derivatives of its states with respect to chosen parameters."""
+"""Forward sensitivities: a system extended by the derivatives of its states with respect to chosen
+parameters.
+"""
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,33 +11,38 @@ from ...core.system import Input, SensitivitySystem, StateVariable, System
 from ..compile.functions import TracedSystem, trace_system
 
 TOLERANCE_FACTOR = 10.0
-"""How much more a derivative times its scale may err than the state. Chosen: without any control derivatives are lost
-while the states rest, and at 1 the steps double."""
+"""How much more a derivative times its scale may err than the state. Chosen: without any control
+derivatives are lost while the states rest, and at 1 the steps double."""
 
 
 @model
 class WithSensitivities(SensitivitySystem):
-    """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs' derivatives.
+    """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs'
+    derivatives.
 
-        s_k' = (df/dx) s_k + (df/du) v_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + (dy/du) v_k + dy/dtheta_k,
-        y' = (dy/dx) f
+        s_k' = (df/dx) s_k + (df/du) v_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + (dy/du) v_k +
+        dy/dtheta_k, y' = (dy/dx) f
 
     A column is a group of leaf paths that share one value (`("circuit.fill.conductance",
-    "circuit.discharge.conductance")`), or an empty group for something that acts on the start alone. A step of this
-    system is exactly the derivative of the same step of the inner system, because it uses the Jacobian of the whole.
-    Columns steer the step ten times less than states do. Inputs that move are held in y'. `observed` names the states
-    and outputs y; all of them unless named. v_k = du/dtheta_k are further inputs, `sensitivity("fill", k)`, of the
-    inputs that `dependent_inputs` names: those of a controller whose measurements or parameters depend on theta_k
-    (`differentiate_loop`). All other inputs are independent of the columns.
+    "circuit.discharge.conductance")`), or an empty group for something that acts on the start
+    alone. A step of this system is exactly the derivative of the same step of the inner system,
+    because it uses the Jacobian of the whole. Columns steer the step ten times less than states do.
+    Inputs that move are held in y'. `observed` names the states and outputs y; all of them unless
+    named. v_k = du/dtheta_k are further inputs, `sensitivity("fill", k)`, of the inputs that
+    `dependent_inputs` names: those of a controller whose measurements or parameters depend on
+    theta_k (`differentiate_loop`). All other inputs are independent of the columns.
 
-    `rates` and `outputs` are the law; what runs is printed from the inner system, all columns in one vector.
+    `rates` and `outputs` are the law; what runs is printed from the inner system, all columns in
+    one vector.
     """
 
     from_file: ClassVar[bool] = False
 
     inner: System
     columns: tuple[tuple[str, ...], ...]
-    scales: tuple[float, ...] = parameter("1", "theta_k", "size of a change of each column", fitted=False)
+    scales: tuple[float, ...] = parameter(
+        "1", "theta_k", "size of a change of each column", fitted=False
+    )
     observed: tuple[str, ...] = ()
     dependent_inputs: tuple[str, ...] = ()
 
@@ -46,8 +53,12 @@ class WithSensitivities(SensitivitySystem):
                 f"there are {len(self.scales)}."
             )
         known = [leaf.path for leaf in tree.leaves(self.inner)]
-        check_known(f"{type(self.inner).__name__} has no parameter", itertools.chain(*self.columns), known)
-        check_known(f"{type(self.inner).__name__} has no input", self.dependent_inputs, self.inner.inputs)
+        check_known(
+            f"{type(self.inner).__name__} has no parameter", itertools.chain(*self.columns), known
+        )
+        check_known(
+            f"{type(self.inner).__name__} has no input", self.dependent_inputs, self.inner.inputs
+        )
         names = self._all_names if self.observed else ()
         check_known(f"{type(self.inner).__name__} has no state or output", self.observed, names)
 
@@ -74,7 +85,9 @@ class WithSensitivities(SensitivitySystem):
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Names of the observed quantities, of the derivatives of each by every column, and of their slopes in time."""
+        """Names of the observed quantities, of the derivatives of each by every column, and of
+        their slopes in time.
+        """
         names = self.observed_names
         further = [sensitivity(n, k) for n in names for k in range(len(self.columns))]
         return (*names, *further, *(f"{n}.rate" for n in names))
@@ -86,21 +99,30 @@ class WithSensitivities(SensitivitySystem):
         further = []
         for s, (k, scale) in itertools.product(inner, enumerate(self.scales)):
             nominal = TOLERANCE_FACTOR * s.nominal / scale
-            further.append(StateVariable(sensitivity(s.name, k), s.unit, nominal, f"d {s.name} by column {k}"))
+            further.append(
+                StateVariable(sensitivity(s.name, k), s.unit, nominal, f"d {s.name} by column {k}")
+            )
         return (*inner, *further)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The inner system's inputs, then for each dependent one its derivatives by every column."""
-        further = [sensitivity(name, k) for name in self.dependent_inputs for k in range(len(self.columns))]
+        """The inner system's inputs, then for each dependent one its derivatives by every
+        column.
+        """
+        further = [
+            sensitivity(name, k) for name in self.dependent_inputs for k in range(len(self.columns))
+        ]
         return (*self.inner.inputs, *further)
 
     @property
     def input_variables(self) -> tuple[Input, ...]:
         """The inner system's inputs, then the derivatives of the dependent ones, without bounds."""
-        further, infinity = [], float("inf")
+        further = []
+        infinity = float("inf")
         for name, k in itertools.product(self.dependent_inputs, range(len(self.columns))):
-            further.append(Input(sensitivity(name, k), "", -infinity, infinity, f"derivative of {name}"))
+            further.append(
+                Input(sensitivity(name, k), "", -infinity, infinity, f"derivative of {name}")
+            )
         return (*self.inner.input_variables, *further)
 
     @property
@@ -111,33 +133,54 @@ class WithSensitivities(SensitivitySystem):
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The inner rates, and the variational equation of every column."""
-        t, names = trace_system(self.inner), [s.name for s in self.inner.states]
+        t = trace_system(self.inner)
+        names = [s.name for s in self.inner.states]
         rates, *along, _ = self._differentiated(t, names, t.f, state, inputs)
-        return rates | {sensitivity(n, k): column[n] for k, column in enumerate(along) for n in names}
+        return rates | {
+            sensitivity(n, k): column[n] for k, column in enumerate(along) for n in names
+        }
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """The observed quantities, their derivatives by every column, and their slopes in time (`pressure.rate`)."""
+        """The observed quantities, their derivatives by every column, and their slopes in time
+        (`pressure.rate`).
+        """
         import casadi
 
-        t, names = trace_system(self.inner), self.observed_names
+        t = trace_system(self.inner)
+        names = self.observed_names
         every = [*(s.name for s in self.inner.states), *t.output_names]
-        values, *along, slopes = self._differentiated(t, every, casadi.vertcat(t.x, t.o), state, inputs)
+        values, *along, slopes = self._differentiated(
+            t, every, casadi.vertcat(t.x, t.o), state, inputs
+        )
         further = {sensitivity(n, k): column[n] for n in names for k, column in enumerate(along)}
         return {n: values[n] for n in names} | further | {f"{n}.rate": slopes[n] for n in names}
 
     def _differentiated(
-        self, t: TracedSystem, names: Sequence[str], values: Any, state: Mapping[str, Value],
+        self,
+        t: TracedSystem,
+        names: Sequence[str],
+        values: Any,
+        state: Mapping[str, Value],
         inputs: Mapping[str, Value],
-    ) -> list[dict[str, Value]]:  # fmt: skip
-        """Values of the traced inner system by names, their total derivatives along every column, and their slopes."""
+    ) -> list[dict[str, Value]]:
+        """Values of the traced inner system by names, their total derivatives along every column,
+        and their slopes.
+        """
         import casadi
 
-        by_state, by_leaf = casadi.jacobian(values, t.x), casadi.jacobian(values, t.p)
+        by_state = casadi.jacobian(values, t.x)
+        by_leaf = casadi.jacobian(values, t.p)
         by_input = casadi.jacobian(values, t.u)[:, list(self.input_indices)]
         directions = [
-            casadi.mtimes(by_state, casadi.vertcat(*(state[sensitivity(s.name, k)] for s in self.inner.states)))
+            casadi.mtimes(
+                by_state,
+                casadi.vertcat(*(state[sensitivity(s.name, k)] for s in self.inner.states)),
+            )
             + casadi.mtimes(
-                by_input, casadi.vertcat(casadi.SX(0, 1), *(inputs[sensitivity(n, k)] for n in self.dependent_inputs))
+                by_input,
+                casadi.vertcat(
+                    casadi.SX(0, 1), *(inputs[sensitivity(n, k)] for n in self.dependent_inputs)
+                ),
             )
             + sum((by_leaf[:, i] for i in indices), casadi.SX(values.numel(), 1))
             for k, indices in enumerate(self.parameter_indices)
@@ -155,7 +198,9 @@ def sensitivity(name: str, column: int) -> str:
 
 
 def evaluated(matrix: Any, variables: Iterable[Any], values: Sequence[Value]) -> list[list[Any]]:
-    """The columns of a matrix of expressions at these values of their variables, which may be symbols themselves."""
+    """The columns of a matrix of expressions at these values of their variables, which may be
+    symbols themselves.
+    """
     import casadi
 
     at = casadi.substitute(casadi.cse(matrix), casadi.vertcat(*variables), casadi.vertcat(*values))

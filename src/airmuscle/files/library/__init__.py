@@ -1,6 +1,8 @@
-"""Library: parameter sets of muscles, laws, valves, plants and products as TOML files, with sources and checks.
+"""Library: parameter sets of muscles, laws, valves, plants and products as TOML files, with sources
+and checks.
 
-Readers raise FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
+Readers raise FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the
+location.
 """
 
 from ...core.stubs import attach_stub

@@ -1,6 +1,8 @@
-"""Entries of the library: muscles and laws, valves, products and plants, with sources, provenance and verified checks.
+"""Entries of the library: muscles and laws, valves, products and plants, with sources, provenance
+and verified checks.
 
-The fields of an entry are the keys of its file, see build.py, docs/muscle-file.md and docs/valves.md.
+The fields of an entry are the keys of its file, see build.py, docs/muscle-file.md and
+docs/valves.md.
 """
 
 import dataclasses
@@ -10,9 +12,24 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 from ...core import ABSOLUTE, Reference, check_field_types, model, parameter
-from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, check_known, suggestion
+from ...core.errors import (
+    AirmuscleWarning,
+    ParameterError,
+    UnknownNameError,
+    check_known,
+    suggestion,
+)
 from ...physics import Characteristic, ForceLaw, Friction, Geometry, Plant, ValidityRange
-from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
+from ...physics.muscle import (
+    CreepElements,
+    Damper,
+    Muscle,
+    Ratings,
+    SeriesElement,
+    Spring,
+    Stop,
+    Wall,
+)
 from ...physics.pneumatics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Orifice
 from ...report.chapter import Table
 from .entry_display import CHECK_UNITS, EntryDisplay
@@ -23,24 +40,30 @@ OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "cre
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
 
 MISSING_GEOMETRY = (
-    "a [geometry], from which a plant takes the enclosed volume: give airmuscle fit or campaign --braid 'radius=10 mm, "
-    "angle=24.4 deg' (from the outer diameter at rest and at full contraction) and the resting length, or write the "
-    "table [geometry] in the file or in [plant.muscle]"
+    "a [geometry], from which a plant takes the enclosed volume: give airmuscle fit or campaign"
+    " --braid 'radius=10 mm, angle=24.4 deg' (from the outer diameter at rest and at full"
+    " contraction) and the resting length, or write the table [geometry] in the file or in"
+    " [plant.muscle]"
 )
 """Geometry that a law needs to be a muscle, and the ways to give and to measure it."""
 PATHS = ("valve", "exhaust")
 """Flow paths through a valve that a file may describe; the first is the default."""
 CONDITIONS = {
-    "pressure": ("Pa", ("contraction", "force")), "contraction": ("1", ("pressure", "force")),
-    "force": ("N", ("pressure", "contraction")), "volume": ("m3", ("contraction",)),
+    "pressure": ("Pa", ("contraction", "force")),
+    "contraction": ("1", ("pressure", "force")),
+    "force": ("N", ("pressure", "contraction")),
+    "volume": ("m3", ("contraction",)),
     "flow": ("m3/s", ("upstream", "downstream")),
-}  # fmt: skip
-"""Quantities of a check, each with its unit and the quantities on which it depends; a flow is that of a valve."""
+}
+"""Quantities of a check, each with its unit and the quantities on which it depends; a flow is that
+of a valve.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """Published value that an entry must reproduce within a tolerance: a quantity at given values of others, all SI.
+    """Published value that an entry must reproduce within a tolerance: a quantity at given values
+    of others, all SI.
 
     A volume flow is [m3/s at the reference atmosphere] between two absolute pressures [Pa].
     """
@@ -52,15 +75,25 @@ class Check:
     pressure: float | None = parameter("Pa", "p", "gauge pressure", default=None)
     contraction: float | None = parameter("1", "eps", "contraction", default=None)
     force: float | None = parameter("N", "F", "force", default=None)
-    upstream: float | None = parameter(ABSOLUTE, "p_1", "absolute pressure upstream of a valve", default=None)
-    downstream: float | None = parameter(ABSOLUTE, "p_2", "absolute pressure downstream of a valve", default=None)
+    upstream: float | None = parameter(
+        ABSOLUTE, "p_1", "absolute pressure upstream of a valve", default=None
+    )
+    downstream: float | None = parameter(
+        ABSOLUTE, "p_2", "absolute pressure downstream of a valve", default=None
+    )
 
     def __post_init__(self) -> None:
         check_field_types(self)
         _, required = _conditions_of(self.quantity)
         if tuple(name for name, _ in self.conditions) != required:
-            raise ParameterError(f"a check of the {self.quantity} requires {' and '.join(required)}, and no other.")
-        for name, value in (("equals", self.equals), ("tolerance", self.tolerance), *self.conditions):
+            raise ParameterError(
+                f"a check of the {self.quantity} requires {' and '.join(required)}, and no other."
+            )
+        for name, value in (
+            ("equals", self.equals),
+            ("tolerance", self.tolerance),
+            *self.conditions,
+        ):
             if not math.isfinite(value) or (name == "tolerance" and value < 0.0):
                 must = "not be negative" if math.isfinite(value) else "be finite"
                 raise ParameterError(f"{name} is {value:g}; it must {must}.")
@@ -68,7 +101,9 @@ class Check:
     @property
     def conditions(self) -> tuple[tuple[str, float], ...]:
         """The quantities on which the checked one depends, with their values."""
-        return tuple((name, getattr(self, name)) for name in CHECK_UNITS if getattr(self, name) is not None)
+        return tuple(
+            (name, getattr(self, name)) for name in CHECK_UNITS if getattr(self, name) is not None
+        )
 
     @staticmethod
     def units_of_table(table: Mapping[str, Any]) -> dict[str, str]:
@@ -77,18 +112,22 @@ class Check:
 
 
 def _conditions_of(quantity: Any) -> tuple[str, tuple[str, ...]]:
-    """The unit of a checked quantity, and the quantities on which it depends. Raises ParameterError."""
+    """The unit of a checked quantity, and the quantities on which it depends. Raises
+    ParameterError.
+    """
     check_known("there is no check of the quantity", str(quantity), CONDITIONS)
     return CONDITIONS[quantity]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Entry(EntryDisplay):
-    """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a plant.
+    """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a
+    plant.
 
-    `validity_range` is the range of the measurements or the publication, `uncertainty` the standard errors and
-    correlations of fitted parameters, if the file states them, `error_band` the 95 % band of the predicted quantity,
-    `ratings` the values that the maker of the muscle permits, if known.
+    `validity_range` is the range of the measurements or the publication, `uncertainty` the standard
+    errors and correlations of fitted parameters, if the file states them, `error_band` the 95 %
+    band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if
+    known.
     """
 
     characteristic: Characteristic
@@ -109,11 +148,17 @@ class Entry(EntryDisplay):
 
     @property
     def muscle(self) -> Muscle:
-        """Muscle with the elements of the entry. Raises UnknownNameError if the entry is a law without a geometry, or
-        a law that is not solved for the force."""
+        """Muscle with the elements of the entry. Raises UnknownNameError if the entry is a law
+        without a geometry, or a law that is not solved for the force."""
         if not isinstance(self.characteristic, ForceLaw) or self.geometry is None:
-            missing = MISSING_GEOMETRY if self.geometry is None else "a law solved for the force: see as_force_law"
-            raise UnknownNameError(f"{self.name} is a characteristic, not a muscle; it lacks {missing}.")
+            missing = (
+                MISSING_GEOMETRY
+                if self.geometry is None
+                else "a law solved for the force: see as_force_law"
+            )
+            raise UnknownNameError(
+                f"{self.name} is a characteristic, not a muscle; it lacks {missing}."
+            )
         names = (*OPTIONAL_PARTS, "validity_range", "ratings")
         parts = {name: part for name in names if (part := getattr(self, name)) is not None}
         return Muscle(self.characteristic, self.geometry, **parts)
@@ -121,17 +166,25 @@ class Entry(EntryDisplay):
 
 @model
 class SwitchingTimes:
-    """Published switching times of a valve; a data sheet may state upper limits, such as "10 ms or less"."""
+    """Published switching times of a valve; a data sheet may state upper limits, such as "10 ms or
+    less".
+    """
 
     from_file: ClassVar[bool] = False
 
-    opening_delay: float = parameter("s", "t_on", "time from the command to open until open", bounds=(0.0, 1.0))
-    closing_delay: float = parameter("s", "t_off", "time from the command to close until closed", bounds=(0.0, 1.0))
+    opening_delay: float = parameter(
+        "s", "t_on", "time from the command to open until open", bounds=(0.0, 1.0)
+    )
+    closing_delay: float = parameter(
+        "s", "t_off", "time from the command to close until closed", bounds=(0.0, 1.0)
+    )
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ValveEntry(EntryDisplay):
-    """Library entry of a valve, all numbers SI; `valve` and `exhaust` are the orifices for use in a circuit."""
+    """Library entry of a valve, all numbers SI; `valve` and `exhaust` are the orifices for use in a
+    circuit.
+    """
 
     valve: Orifice
     exhaust: Orifice | None = None
@@ -140,7 +193,9 @@ class ValveEntry(EntryDisplay):
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
 
     def orifice(self, path: str) -> Orifice:
-        """Orifice of a flow path, "valve" or "exhaust". Raises UnknownNameError if the entry has no such path."""
+        """Orifice of a flow path, "valve" or "exhaust". Raises UnknownNameError if the entry has no
+        such path.
+        """
         orifice: Orifice | None = getattr(self, path, None) if path in PATHS else None
         if orifice is None:
             available = ", ".join(p for p in PATHS if getattr(self, p) is not None)
@@ -149,16 +204,22 @@ class ValveEntry(EntryDisplay):
         return orifice
 
     def flow(self, upstream: float, downstream: float) -> float:
-        """Volume flow [m3/s at the reference atmosphere] of the open valve at 293.15 K, absolute pressures [Pa]."""
-        return float(self.valve.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / REFERENCE_DENSITY)
+        """Volume flow [m3/s at the reference atmosphere] of the open valve at 293.15 K, absolute
+        pressures [Pa].
+        """
+        return float(
+            self.valve.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE)
+            / REFERENCE_DENSITY
+        )
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ProductEntry(EntryDisplay):
-    """Library entry of a commercial muscle: the values that its maker permits [SI], with provenance and sources.
+    """Library entry of a commercial muscle: the values that its maker permits [SI], with provenance
+    and sources.
 
-    It has no characteristic; the file of a muscle or a law that was measured on this product refers to it, `product =
-    "festo-dmsp-20"`, or has a table [ratings] of its own.
+    It has no characteristic; the file of a muscle or a law that was measured on this product refers
+    to it, `product = "festo-dmsp-20"`, or has a table [ratings] of its own.
     """
 
     ratings: Ratings
@@ -170,7 +231,9 @@ class ProductEntry(EntryDisplay):
         columns = {"permitted": [row.quantity for row in rows], "range": list(map(str, rows))}
         yield Table("permitted", "Permitted ranges", columns)
         laws = entries_of_product(self.name)
-        yield Table("laws", "Muscles and laws of this product", {"law": list(laws)}, brief=len(laws))
+        yield Table(
+            "laws", "Muscles and laws of this product", {"law": list(laws)}, brief=len(laws)
+        )
 
     def _remarks(self) -> Iterator[str]:
         if not entries_of_product(self.name):
@@ -179,10 +242,11 @@ class ProductEntry(EntryDisplay):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class PlantEntry(EntryDisplay):
-    """Plant of the library, all numbers SI; its file has the tables of a scenario, and the source of each number.
+    """Plant of the library, all numbers SI; its file has the tables of a scenario, and the source
+    of each number.
 
-    `sources` are pairs of a path in the file, such as mechanism.radius, and the source of the numbers under it:
-    "chosen" if no publication states them.
+    `sources` are pairs of a path in the file, such as mechanism.radius, and the source of the
+    numbers under it: "chosen" if no publication states them.
     """
 
     plant: Plant
@@ -197,8 +261,8 @@ AnyEntry = Entry | ValveEntry | ProductEntry | PlantEntry
 
 
 def issue_warning(name: str, warning: str, stacklevel: int) -> None:
-    """Issue the warning of an entry, if it has one, as an AirmuscleWarning; `stacklevel` counts from the caller;
-    the functions of a room are called by one frame more (core/stubs.py)."""
+    """Issue the warning of an entry, if it has one, as an AirmuscleWarning; `stacklevel` counts
+    from the caller; the functions of a room are called by one frame more (core/stubs.py)."""
     if warning:
         warnings.warn(f"{name}: {warning}", AirmuscleWarning, stacklevel=stacklevel + 1)
 
@@ -230,6 +294,10 @@ def verify(entry: Entry) -> tuple[CheckResult, ...]:
     for check in entry.checks:
         model: Any = entry.geometry if check.quantity == "volume" else entry.characteristic
         if model is None:
-            raise ParameterError(f"{entry.name}: a check of the volume requires a [geometry] in the file.")
-        results.append(CheckResult(check, float(getattr(model, check.quantity)(**dict(check.conditions)))))
+            raise ParameterError(
+                f"{entry.name}: a check of the volume requires a [geometry] in the file."
+            )
+        results.append(
+            CheckResult(check, float(getattr(model, check.quantity)(**dict(check.conditions))))
+        )
     return tuple(results)

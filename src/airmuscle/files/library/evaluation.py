@@ -1,4 +1,6 @@
-"""Evaluation of a muscle or a law: the third of pressure, contraction and force from the other two."""
+"""Evaluation of a muscle or a law: the third of pressure, contraction and force from the other
+two.
+"""
 
 import dataclasses
 import math
@@ -8,9 +10,22 @@ from typing import Any
 
 from ...bench.reported import Reported
 from ...core import check_above_vacuum, contraction_text, quantity, quantity_text
-from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
+from ...core.errors import (
+    AirmuscleWarning,
+    GeometryLimitError,
+    ParameterError,
+    PhysicsError,
+    RatingError,
+    SolveError,
+)
 from ...physics.muscle.characteristic import ForceLaw, ValidityRange, validity_range_of
-from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars, describe_point, isobar_figure
+from ...physics.muscle.isobars import (
+    Isobars,
+    WorkingPoint,
+    compute_isobars,
+    describe_point,
+    isobar_figure,
+)
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from . import Entry, own_length
 
@@ -29,7 +44,9 @@ class Evaluation(Reported):
     def stiffness(self) -> float | None:
         """-dF/deps at constant pressure [N]; None where the force is not unique or not defined."""
         try:
-            return float(self.entry.characteristic.stiffness(self.point.pressure, self.point.contraction))
+            return float(
+                self.entry.characteristic.stiffness(self.point.pressure, self.point.contraction)
+            )
         except PhysicsError:
             return None
 
@@ -40,27 +57,56 @@ class Evaluation(Reported):
 
     def chapter(self) -> Chapter:
         """The description of the point: quantities, stiffness, and the isobars around it."""
-        point, length, stiffness = self.point, own_length(self.entry), self.stiffness
-        limits, ratings = self.validity_range, self.entry.ratings
+        point = self.point
+        length = own_length(self.entry)
+        stiffness = self.stiffness
+        limits = self.validity_range
+        ratings = self.entry.ratings
         remarks = {"pressure": "gauge"}
         if length:
-            moved, whole = quantity_text(length * point.contraction, "m", "mm"), quantity_text(length, "m", "mm", 6)
+            moved = quantity_text(length * point.contraction, "m", "mm")
+            whole = quantity_text(length, "m", "mm", 6)
             remarks["contraction"] = f"{moved} of {whole}"
         shown = {"pressure": "kPa", "contraction": "%", "force": "N"}
-        digits = {name: 4 if name in (self.solved, "contraction") else 6 for name in UNITS}  # a given value as given
+        digits = {
+            name: 4 if name in (self.solved, "contraction") else 6 for name in UNITS
+        }  # a given value as given
         values = [
-            NamedValue(name, value, UNITS[name], shown[name], digits[name],
-                       "; ".join(filter(None, (remarks.get(name, ""), "solved" * (name == self.solved)))))
+            NamedValue(
+                name,
+                value,
+                UNITS[name],
+                shown[name],
+                digits[name],
+                "; ".join(filter(None, (remarks.get(name, ""), "solved" * (name == self.solved)))),
+            )
             for name, value in point._asdict().items()
-        ]  # fmt: skip
+        ]
         if stiffness is not None and length:
-            values.append(NamedValue("stiffness", stiffness / length, "N/m", "N/mm", remark="at constant pressure"))
+            values.append(
+                NamedValue(
+                    "stiffness", stiffness / length, "N/m", "N/mm", remark="at constant pressure"
+                )
+            )
             values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
         elif stiffness is not None:
-            values.append(NamedValue("stiffness per contraction", stiffness, "N", "N/%", remark="at constant pressure"))
+            values.append(
+                NamedValue(
+                    "stiffness per contraction",
+                    stiffness,
+                    "N",
+                    "N/%",
+                    remark="at constant pressure",
+                )
+            )
         title = self.entry.title
-        caption = f"{title}: force over contraction at constant gauge pressure. Working point: {describe_point(point)}."
-        inside = None if limits is None else bool(limits.contains(point.pressure, point.contraction))
+        caption = (
+            f"{title}: force over contraction at constant gauge pressure. Working point:"
+            f" {describe_point(point)}."
+        )
+        inside = (
+            None if limits is None else bool(limits.contains(point.pressure, point.contraction))
+        )
         permitted = None if ratings is None else not ratings.excesses(**point._asdict())
         return Chapter(
             name="evaluation",
@@ -77,7 +123,8 @@ class Evaluation(Reported):
         )
 
     def _figure(self) -> Any:
-        law, title = self.entry.characteristic, self.entry.title
+        law = self.entry.characteristic
+        title = self.entry.title
         return isobar_figure(law, title, self.isobars(), self.validity_range, self.point)
 
     def isobars(self) -> Isobars:
@@ -94,17 +141,23 @@ class Evaluation(Reported):
 
 
 def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
-    """The working point of two of pressure, contraction and force: numbers in SI units, or texts with a unit.
+    """The working point of two of pressure, contraction and force: numbers in SI units, or texts
+    with a unit.
 
-    If several solutions exist, it is the one reached from the state of rest. Warns of a point that is measured but not
-    permitted, slack, or extrapolated. Raises SolveError, GeometryLimitError, UnitError, and RatingError for a point
-    that is neither permitted nor measured.
+    If several solutions exist, it is the one reached from the state of rest. Warns of a point that
+    is measured but not permitted, slack, or extrapolated. Raises SolveError, GeometryLimitError,
+    UnitError, and RatingError for a point that is neither permitted nor measured.
     """
     unknown = [name for name in UNITS if name not in given]
     if len(unknown) != 1 or len(given) != 2:
         raise ParameterError(f"give two of {', '.join(UNITS)}, not {', '.join(given) or 'none'}.")
-    values = {name: quantity(given[name], unit, where=name) for name, unit in UNITS.items() if name in given}
-    law, solved = entry.characteristic, unknown[0]
+    values = {
+        name: quantity(given[name], unit, where=name)
+        for name, unit in UNITS.items()
+        if name in given
+    }
+    law = entry.characteristic
+    solved = unknown[0]
     if "pressure" in values:
         check_above_vacuum(values["pressure"])
     contraction = values.get("contraction")
@@ -114,14 +167,16 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
             as_percentage = contraction >= 1.0 and contraction / 100 <= high
             hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
             raise GeometryLimitError(
-                f"contraction: {100 * contraction:.6g} % is outside the range of {type(law).__name__}, "
-                f"{100 * low:.4g} to {100 * high:.4g} %.{hint}"
+                f"contraction: {100 * contraction:.6g} % is outside the range of"
+                f" {type(law).__name__}, {100 * low:.4g} to {100 * high:.4g} %.{hint}"
             )
     point = WorkingPoint(**values, **{solved: float(getattr(law, solved)(*values.values()))})
-    if not math.isfinite(sum(point)) or (solved == "contraction" and not -0.5 <= point.contraction < 1.0):
+    if not math.isfinite(sum(point)) or (
+        solved == "contraction" and not -0.5 <= point.contraction < 1.0
+    ):
         raise SolveError(
-            f"{type(law).__name__}: the solution {describe_point(point)} is not physical. Give values nearer to the "
-            "validity range of the characteristic (airmuscle show)."
+            f"{type(law).__name__}: the solution {describe_point(point)} is not physical. Give"
+            " values nearer to the validity range of the characteristic (airmuscle show)."
         )
     found = Evaluation(entry, point, solved)
     for message in _warnings(found):
@@ -130,21 +185,27 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
 
 
 def _warnings(found: Evaluation) -> Iterator[str]:
-    """That a point is measured but not permitted, slack, or extrapolated. Raises RatingError as `evaluate`."""
-    point, ratings, limits = found.point, found.entry.ratings, found.validity_range
+    """That a point is measured but not permitted, slack, or extrapolated. Raises RatingError as
+    `evaluate`.
+    """
+    point = found.point
+    ratings = found.entry.ratings
+    limits = found.validity_range
     is_measured = limits is not None and limits.contains(point.pressure, point.contraction)
     if excesses := "; ".join(ratings.excesses(**point._asdict()) if ratings is not None else ()):
         if not is_measured:
             raise RatingError(
-                f"beyond the values that the maker permits, and not measured: {excesses}. Choose a permitted point, or "
-                "a larger muscle."
+                f"beyond the values that the maker permits, and not measured: {excesses}. Choose a"
+                " permitted point, or a larger muscle."
             )
         yield f"beyond the values that the maker permits: {excesses}."
     if point.force < 0:
         yield "the force is negative; a muscle cannot push and is slack here."
     if limits is not None and not is_measured:
-        (low, high), contractions = limits.pressure, map(contraction_text, limits.contraction)
+        low, high = limits.pressure
+        contractions = map(contraction_text, limits.contraction)
         yield (
-            f"the operating point is outside the validity range of the characteristic, {low / 1e3:.4g} to "
-            f"{high / 1e3:.4g} kPa and {' to '.join(contractions)}: the result is an extrapolation."
+            "the operating point is outside the validity range of the characteristic,"
+            f" {low / 1e3:.4g} to {high / 1e3:.4g} kPa and {' to '.join(contractions)}: the result"
+            " is an extrapolation."
         )

@@ -1,4 +1,6 @@
-"""Files of the library: folders, entry names, reading of TOML, and locations in a file for error messages."""
+"""Files of the library: folders, entry names, reading of TOML, and locations in a file for error
+messages.
+"""
 
 import contextlib
 import dataclasses
@@ -9,13 +11,24 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.readers.file_kind import read_toml as read_toml_file
-from ...core import AirmuscleError, FileError, ParameterError, UnknownNameError, abridged, one_line, suggestion, units
+from ...core import (
+    AirmuscleError,
+    FileError,
+    ParameterError,
+    UnknownNameError,
+    abridged,
+    one_line,
+    suggestion,
+    units,
+)
 from ...core.errors import check_known, listed
 
 
 @dataclasses.dataclass(frozen=True)
 class Location:
-    """Location of a table in a file, or of the value of a `key`, for messages; data files are relative to `folder`."""
+    """Location of a table in a file, or of the value of a `key`, for messages; data files are
+    relative to `folder`.
+    """
 
     file: str
     table: str
@@ -29,7 +42,9 @@ class Location:
 
     def inside(self, key: str) -> "Location":
         """Location of a table or list item inside this table."""
-        return dataclasses.replace(self, table=".".join(filter(None, (self.table, self.key, key))), key="")
+        return dataclasses.replace(
+            self, table=".".join(filter(None, (self.table, self.key, key))), key=""
+        )
 
     def at(self, key: str) -> "Location":
         """Location of the value of a key of this table."""
@@ -54,22 +69,30 @@ def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Locatio
 
 
 def read_table(value: Any, known: Any, where: object, remedy: str = "") -> Mapping[str, Any]:
-    """A table as it is. Raises ParameterError for anything else; `remedy` is what the message says of its contents."""
+    """A table as it is. Raises ParameterError for anything else; `remedy` is what the message says
+    of its contents.
+    """
     if not isinstance(value, Mapping):
         raise ParameterError(f"{where} is {abridged(value)}; it must be a table{remedy}.")
     return value
 
 
 def read_number(value: Any, unit: str, where: object, about: str = "") -> float:
-    """Number [SI] of a number in `unit` or a text. Raises ParameterError, which ends with `about`, or UnitError."""
+    """Number [SI] of a number in `unit` or a text. Raises ParameterError, which ends with `about`,
+    or UnitError.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         expected = "a number" if unit == "1" else f"a number in {unit}"
-        raise ParameterError(f"{where} is {abridged(value)}; it must be {expected}, or a text with a unit{about}.")
+        raise ParameterError(
+            f"{where} is {abridged(value)}; it must be {expected}, or a text with a unit{about}."
+        )
     return units.quantity(value, unit, where=str(where))
 
 
 def read_finite_number(value: Any, unit: str, where: object) -> float:
-    """Finite number in SI units, as `read_number`. Raises ParameterError for inf and nan, which TOML allows."""
+    """Finite number in SI units, as `read_number`. Raises ParameterError for inf and nan, which
+    TOML allows.
+    """
     number = read_number(value, unit, where)
     if not math.isfinite(number):
         raise ParameterError(f"{where} is {abridged(value)}; it must be finite.")
@@ -80,7 +103,9 @@ def read_text(table: Mapping[str, Any], key: str, location: Location, *, needed:
     """Text under a key; empty if the key is missing and not needed. Raises ParameterError."""
     value = table.get(key, "")
     if not isinstance(value, str):
-        raise ParameterError(f"{location}: {key} is {abridged(value)}; it must be a text in quotes.")
+        raise ParameterError(
+            f"{location}: {key} is {abridged(value)}; it must be a text in quotes."
+        )
     if needed and not value.strip():
         raise ParameterError(f"{location}: '{key}' is missing; it must be a text in quotes.")
     return value
@@ -92,19 +117,30 @@ PLANTS = LAWS / "plants"
 """Folder of the plants."""
 DATA = LAWS / "data"
 """Folder of the data sets."""
-FOLDERS = {"valve": LAWS / "valves", "plant": PLANTS, "product": LAWS / "products", "muscle or law": LAWS}
+FOLDERS = {
+    "valve": LAWS / "valves",
+    "plant": PLANTS,
+    "product": LAWS / "products",
+    "muscle or law": LAWS,
+}
 """Folders of the entries, by what they are."""
 MAX_NAME = 255
-"""Maximum length of a name in a file system; the question whether a longer one exists is an error."""
+"""Maximum length of a name in a file system; the question whether a longer one exists is an
+error.
+"""
 
 
 def list_names(folder: Path) -> tuple[str, ...]:
     """Names of the entries in a folder of the library, sorted."""
-    return tuple(sorted(name.removesuffix(".toml") for name in os.listdir(folder) if name.endswith(".toml")))
+    return tuple(
+        sorted(name.removesuffix(".toml") for name in os.listdir(folder) if name.endswith(".toml"))
+    )
 
 
 def list_library() -> tuple[str, ...]:
-    """Names of all entries that `load` reads: muscles, laws, valves, plants and products, sorted."""
+    """Names of all entries that `load` reads: muscles, laws, valves, plants and products,
+    sorted.
+    """
     return tuple(sorted(name for folder in FOLDERS.values() for name in list_names(folder)))
 
 
@@ -134,7 +170,9 @@ def entries_of_product(name: str) -> tuple[str, ...]:
 
 
 def products_of_laws() -> dict[str, str]:
-    """The product on which each muscle or law of the library was measured, by its name; empty where none is stated."""
+    """The product on which each muscle or law of the library was measured, by its name; empty where
+    none is stated.
+    """
     return {law: str(read_toml(LAWS / f"{law}.toml").get("product", "")) for law in list_laws()}
 
 
@@ -144,9 +182,11 @@ def list_data() -> tuple[str, ...]:
 
 
 def complete_name(name: str, known: Iterable[str], kind: str) -> str:
-    """The known name that equals or uniquely begins with `name`, in any case and with blanks or "_" for "-".
+    """The known name that equals or uniquely begins with `name`, in any case and with blanks or "_"
+    for "-".
 
-    Raises UnknownNameError, listing the known names and suggesting a similar one, or those that contain `name`.
+    Raises UnknownNameError, listing the known names and suggesting a similar one, or those that
+    contain `name`.
     """
     known = tuple(known)
     if name in known:
@@ -156,10 +196,14 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
         return folded
     matches = [candidate for candidate in known if folded and candidate.lower().startswith(folded)]
     if len(matches) > 1:
-        raise UnknownNameError(f"'{one_line(name)}' is ambiguous: {', '.join(matches)}. Write more of the name.")
+        raise UnknownNameError(
+            f"'{one_line(name)}' is ambiguous: {', '.join(matches)}. Write more of the name."
+        )
     if not matches:
         words = [word for word in (folded, *folded.split("-")) if len(word) > 2]
-        similar = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
+        similar = list(
+            dict.fromkeys(name for word in words for name in known if word in name.lower())
+        )[:3]
         containing = f" Did you mean {' or '.join(map(repr, similar))}?" if similar else ""
         hint = _file_in_folder(name) or suggestion(folded, known) or containing
         raise UnknownNameError(f"no {kind} '{one_line(name)}'; there are {listed(known)}.{hint}")
@@ -167,14 +211,20 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
 
 
 def _file_in_folder(name: str) -> str:
-    """A sentence with the muscle file or the scenario in a folder of this name; empty if there is none."""
+    """A sentence with the muscle file or the scenario in a folder of this name; empty if there is
+    none.
+    """
     files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
-    found = next((file.as_posix() for file in files if 0 < len(name) <= MAX_NAME and file.is_file()), "")
+    found = next(
+        (file.as_posix() for file in files if 0 < len(name) <= MAX_NAME and file.is_file()), ""
+    )
     return f" '{name}' is a folder; write {found}." if found else ""
 
 
 def is_path(name_or_path: str | Path) -> bool:
-    """Whether the argument is a path: a Path, or text with the suffix .toml or a folder separator."""
+    """Whether the argument is a path: a Path, or text with the suffix .toml or a folder
+    separator.
+    """
     name = str(name_or_path)
     return isinstance(name_or_path, Path) or name.endswith(".toml") or "/" in name or "\\" in name
 
@@ -185,8 +235,14 @@ def read_toml(path: Path) -> dict[str, Any]:
         if "\0" not in str(path) and not path.exists():
             raise FileError(f"{path}: there is no such file.")
         if path.is_dir():
-            rest = "; it contains neither muscle.toml nor scenario.toml, which a fit or a campaign writes."
-            raise FileError(f"{path}: is a folder{_file_in_folder(str(path)).partition(' is a folder')[2] or rest}")
+            rest = (
+                "; it contains neither muscle.toml nor scenario.toml, which a fit or a campaign"
+                " writes."
+            )
+            raise FileError(
+                f"{path}: is a"
+                f" folder{_file_in_folder(str(path)).partition(' is a folder')[2] or rest}"
+            )
     except OSError as error:  # a name that is too long
         raise FileError(f"{path}: cannot be read ({error.strerror}).") from None
     return read_toml_file(path)

@@ -1,4 +1,6 @@
-"""Entries before and after a fit: initial law, fitted law, and muscle of a campaign, each with its uncertainty."""
+"""Entries before and after a fit: initial law, fitted law, and muscle of a campaign, each with its
+uncertainty.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -8,9 +10,22 @@ import numpy as np
 
 from ...bench.identify import LEVEL, Fit, RankedModel, standard_candidates
 from ...bench.identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
-from ...bench.identify.specimen_errors import SpecimenErrors, ranked_specimen_errors, resting_lengths_of, specimens_of
+from ...bench.identify.specimen_errors import (
+    SpecimenErrors,
+    ranked_specimen_errors,
+    resting_lengths_of,
+    specimens_of,
+)
 from ...bench.segment import maximum_rate
-from ...core import HintedText, IdentificationError, ParameterError, UnknownNameError, cite, printable, suggestion
+from ...core import (
+    HintedText,
+    IdentificationError,
+    ParameterError,
+    UnknownNameError,
+    cite,
+    printable,
+    suggestion,
+)
 from ...physics import Characteristic, ContractileSurface, Geometry, NoFriction
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
@@ -19,31 +34,36 @@ from . import ParameterUncertainty, StatedBand, is_path, load_law, model_class, 
 from .entry import MISSING_GEOMETRY, Entry
 from .scaling import entry_at_length
 
-MAX_NAMES, MAX_NAME = 3, 60
+MAX_NAMES = 3
+MAX_NAME = 60
 """Maximum number of file names in a title, and of characters of each (chosen)."""
 
 
 def find_initial_law(
     name: str, recordings: Sequence[Recording], degree: int, option: str = "--characteristic"
 ) -> tuple[Entry, tuple[str, ...]]:
-    """The library entry or muscle file of that name, or the named model with initial values estimated from the data;
-    and the parameters to keep fixed because they only scale other parameters.
+    """The library entry or muscle file of that name, or the named model with initial values
+    estimated from the data; and the parameters to keep fixed because they only scale other
+    parameters.
 
-    Law and geometry of an entry are scaled to the resting length of the data. Raises ParameterError for a model whose
-    initial values cannot be estimated, and for an entry that cannot be scaled. A law of a user, `module:Class`, has the
-    initial values of its `guess`.
+    Law and geometry of an entry are scaled to the resting length of the data. Raises ParameterError
+    for a model whose initial values cannot be estimated, and for an entry that cannot be scaled. A
+    law of a user, `module:Class`, has the initial values of its `guess`.
     """
     is_code = ":" in name and not is_path(name)
     if not is_code and name not in model_names():
         try:
-            entry, lengths = load_law(name), resting_lengths(recordings)
+            entry = load_law(name)
+            lengths = resting_lengths(recordings)
         except UnknownNameError as error:  # the message also lists the laws
             if is_path(name):
                 raise
             laws = model_names(Characteristic)
             text = f" Or name a law: {', '.join(laws)}.{suggestion(name, laws)}"
             raise UnknownNameError(HintedText(error.message, text)) from None
-        return entry_at_length(entry, *lengths, f"{option} {name}") if len(lengths) == 1 else entry, ()
+        return (
+            entry_at_length(entry, *lengths, f"{option} {name}") if len(lengths) == 1 else entry
+        ), ()
     cls = model_class(name, option)
     if not issubclass(cls, Characteristic):
         known = ", ".join(model_names(Characteristic))
@@ -56,10 +76,15 @@ def find_initial_law(
         if type(candidate.law) is cls:
             return Entry(name, name, "chosen", candidate.law), candidate.fixed
     has_length = all("resting_length" in run.constants for run in recordings)
-    length = "" if has_length else " Or give the resting length, which allows more models to be initialised from data."
+    length = (
+        ""
+        if has_length
+        else " Or give the resting length, which allows more models to be initialised from data."
+    )
     raise ParameterError(
-        f"{option}: {name} needs initial values, which cannot be estimated from these data. Give a library entry of "
-        f"this model (see airmuscle list) or a muscle file with initial values.{length}"
+        f"{option}: {name} needs initial values, which cannot be estimated from these data. Give a"
+        " library entry of this model (see airmuscle list) or a muscle file with initial"
+        f" values.{length}"
     )
 
 
@@ -70,36 +95,65 @@ def resting_lengths(recordings: Sequence[Recording]) -> tuple[float, ...]:
 
 
 def fitted_entry(
-    result: Fit, initial: Entry, files: Sequence[Path], error_ratio: float = 1.0, recordings: Sequence[Recording] = (),
+    result: Fit,
+    initial: Entry,
+    files: Sequence[Path],
+    error_ratio: float = 1.0,
+    recordings: Sequence[Recording] = (),
     errors: SpecimenErrors | None = None,
-) -> Entry:  # fmt: skip
-    """The initial entry with the fitted characteristic, a new provenance and its 95 % bands, without its checks.
+) -> Entry:
+    """The initial entry with the fitted characteristic, a new provenance and its 95 % bands,
+    without its checks.
 
-    error_ratio  rms error of rows left out of the fit over that of its own rows, by which the band is widened
-    recordings   of the fit, whose specimens, resting lengths and rates the band holds for
-    errors       of specimens left out of the fit, for the band of a specimen that was not measured
+    error_ratio  rms error of rows left out of the fit over that of its own rows, by which the band
+    is widened recordings   of the fit, whose specimens, resting lengths and rates the band holds
+    for errors       of specimens left out of the fit, for the band of a specimen that was not
+    measured
     """
     texts = {quantity.name: value_text(quantity) for quantity in result.goodness()}
     names = list_files([f.name for f in files])
-    note = f"Fitted to {names}: rms error {texts['rms error']}, maximum error {texts['maximum error']}."
-    geometry, inside = initial.geometry, getattr(result.model, "geometry", None)
+    note = (
+        f"Fitted to {names}: rms error {texts['rms error']}, maximum error"
+        f" {texts['maximum error']}."
+    )
+    geometry = initial.geometry
+    inside = getattr(result.model, "geometry", None)
     if isinstance(inside, Geometry) and (geometry is None or type(geometry) is type(inside)):
         geometry = inside  # the law was fitted with it
     title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
-    residuals, band = np.abs(result.residuals[result.censoring == 0]), None
+    residuals = np.abs(result.residuals[result.censoring == 0])
+    band = None
     size = residuals.size
-    half = error_ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0))) if size else 0.0
+    half = (
+        error_ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0)))
+        if size
+        else 0.0
+    )
     if np.isfinite(half) and half > 0.0:
         source = f"95 % quantile of the residuals of {size} rows of the fit"
         if error_ratio != 1.0:
-            source += f", times {error_ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
-        band = _complete_band(StatedBand(result.fitted_quantity.name, half, source), recordings, errors)
+            source += (
+                f", times {error_ratio:.3g}, the ratio of the rms errors of rows left out and of"
+                " all rows"
+            )
+        band = _complete_band(
+            StatedBand(result.fitted_quantity.name, half, source), recordings, errors
+        )
     entry = dataclasses.replace(
-        initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
-        geometry=geometry, validity_range=result.validity_range, checks=(),
-        uncertainty=None, error_band=band,
+        initial,
+        name="muscle",
+        title=title,
+        provenance="fitted",
+        note=note,
+        warning="",
+        characteristic=result.model,
+        geometry=geometry,
+        validity_range=result.validity_range,
+        checks=(),
+        uncertainty=None,
+        error_band=band,
         references=tuple(cite((initial.references, result.recording.references))),
-    )  # fmt: skip
+    )
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
 
 
@@ -110,12 +164,17 @@ def left_out_ratio(best: RankedModel) -> float:
     return max(best.cross_validated_rmse / best.in_sample_rmse, 1.0)
 
 
-def _complete_band(band: StatedBand, recordings: Sequence[Recording], errors: SpecimenErrors | None) -> StatedBand:
-    """The band with the specimens, resting lengths and maximum rates of the records that it holds for, and, of a force,
-    with that of specimens that were not measured, if their errors are known."""
+def _complete_band(
+    band: StatedBand, recordings: Sequence[Recording], errors: SpecimenErrors | None
+) -> StatedBand:
+    """The band with the specimens, resting lengths and maximum rates of the records that it holds
+    for, and, of a force, with that of specimens that were not measured, if their errors are
+    known."""
     timed = [run for run in recordings if "time" in run]
     if errors is not None and band.quantity == "force":
-        band = dataclasses.replace(band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors))
+        band = dataclasses.replace(
+            band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors)
+        )
     return dataclasses.replace(
         band,
         specimens=specimens_of(recordings),
@@ -126,28 +185,41 @@ def _complete_band(band: StatedBand, recordings: Sequence[Recording], errors: Sp
 
 
 def list_files(names: Sequence[str]) -> str:
-    """The names of files for a title: up to three of them, else their number with the first and the last."""
+    """The names of files for a title: up to three of them, else their number with the first and the
+    last.
+    """
     shown = map(printable, names)
-    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in shown]
+    short = [
+        name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}"
+        for name in shown
+    ]
     if len(short) <= MAX_NAMES:
         return ", ".join(short)
     return f"{len(short)} files, {short[0]} to {short[-1]}"
 
 
 def missing_geometry(entry: Entry) -> list[str]:
-    """The remark that the muscle has no geometry, how it is given and how it is measured; empty if it has one."""
+    """The remark that the muscle has no geometry, how it is given and how it is measured; empty if
+    it has one.
+    """
     return [] if entry.geometry is not None else [f"The muscle lacks {MISSING_GEOMETRY}."]
 
 
 def campaign_entry(campaign: Campaign, title: str, resting_length: float | None = None) -> Entry:
-    """The muscle of a resting length [m], by default of the fills. Raises IdentificationError without a static law."""
-    stage, length = campaign.static, resting_length or campaign.resting_length
+    """The muscle of a resting length [m], by default of the fills. Raises IdentificationError
+    without a static law.
+    """
+    stage = campaign.static
+    length = resting_length or campaign.resting_length
     law = campaign.law(length)
     if not isinstance(stage, StaticStage) or law is None:
         reason = "the recommended law is not solved for the force" if law is None else ""
         cause = reason if isinstance(stage, StaticStage) else stage.reason
-        raise IdentificationError(f"no muscle can be written, because there is no static law for the force: {cause}.")
-    friction, creep = campaign.friction, campaign.creep_elements
+        raise IdentificationError(
+            f"no muscle can be written, because there is no static law for the force: {cause}."
+        )
+    friction = campaign.friction
+    creep = campaign.creep_elements
     used = sum(record.kind.value != "unused" for record in campaign.records)
     note = f"Identified from {used} of {len(campaign.records)} records. {stage.band}"
     left_out = [name for name, result in campaign.stages if hasattr(result, "remedy")]
@@ -169,20 +241,27 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
 
 def _stated_band(campaign: Campaign, stage: StaticStage, length: float | None) -> StatedBand:
     """The bands of the muscle of a resting length [m], whose specimens are those of this length."""
-    held, runs = stage.held_band, [record.recording for record in campaign.records if record.kind.is_static]
+    held = stage.held_band
+    runs = [record.recording for record in campaign.records if record.kind.is_static]
     errors = ranked_specimen_errors(stage.comparison.recommended, [stage.comparison], stage.points)
     band = _complete_band(StatedBand("force", stage.band.half_width, str(stage.band)), runs, errors)
     if held is not None and held.half_width != stage.band.half_width:
-        band = dataclasses.replace(band, source=f"{stage.band} {held}", held_half_width=held.half_width)
+        band = dataclasses.replace(
+            band, source=f"{stage.band} {held}", held_half_width=held.half_width
+        )
     if length is not None:
         lengths = resting_lengths_of(runs)
-        own = tuple(n for n in band.specimens if abs(lengths.get(n, length) - length) <= LENGTH_TOLERANCE)
+        own = tuple(
+            n for n in band.specimens if abs(lengths.get(n, length) - length) <= LENGTH_TOLERANCE
+        )
         band = dataclasses.replace(band, specimens=own)
     return band
 
 
 def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty | None:
-    """Standard errors and correlations of the static law, then those of damper and creep, fitted separately."""
+    """Standard errors and correlations of the static law, then those of damper and creep, fitted
+    separately.
+    """
     from scipy.linalg import block_diag
 
     fit = stage.fit
@@ -196,10 +275,18 @@ def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty
             errors.append(damping.stderr)
     if isinstance(campaign.creep, CreepStage):
         count = len(campaign.creep.elements.stiffnesses)
-        names += [f"creep.{field}[{i}]" for field in ("stiffnesses", "relaxation_times") for i in range(count)]
+        names += [
+            f"creep.{field}[{i}]"
+            for field in ("stiffnesses", "relaxation_times")
+            for i in range(count)
+        ]
         errors += campaign.creep.standard_errors.tolist()
     if not names:
         return None
-    correlations = block_diag(fit.correlations[np.ix_(known, known)], np.eye(len(names) - len(known)))
+    correlations = block_diag(
+        fit.correlations[np.ix_(known, known)], np.eye(len(names) - len(known))
+    )
     np.fill_diagonal(correlations, 1.0)
-    return ParameterUncertainty(tuple(names), tuple(errors), tuple(map(tuple, correlations.tolist())))
+    return ParameterUncertainty(
+        tuple(names), tuple(errors), tuple(map(tuple, correlations.tolist()))
+    )

@@ -1,9 +1,11 @@
-"""Entries by name or from files (muscles, laws, valves, products, plants), data sets, and the plants of scenarios.
+"""Entries by name or from files (muscles, laws, valves, products, plants), data sets, and the
+plants of scenarios.
 
-A plant of the library is a file of the same form as a scenario, with its provenance, and in [sources] the source of
-each number of the tables, by its path or the beginning of its path. Parts of a plant may be named: a muscle and a plant
-of the library or of a file, and an orifice or a driver with the values of a valve, `{ library = "matrix-821" }`; of a
-muscle and of a plant the other keys replace parts.
+A plant of the library is a file of the same form as a scenario, with its provenance, and in
+[sources] the source of each number of the tables, by its path or the beginning of its path. Parts
+of a plant may be named: a muscle and a plant of the library or of a file, and an orifice or a
+driver with the values of a valve, `{ library = "matrix-821" }`; of a muscle and of a plant the
+other keys replace parts.
 """
 
 import dataclasses
@@ -18,15 +20,44 @@ from ...engine.loop.pwm_and_solenoid import Driver, SolenoidDriver
 from ...physics import ForceLaw, Muscle, Orifice, Plant
 from ...physics.muscle.geometry.base import Geometry
 from ...recording import Recording
-from . import Location, check_keys, entries_of_product, is_path, list_data, list_laws, located_errors
+from . import (
+    Location,
+    check_keys,
+    entries_of_product,
+    is_path,
+    list_data,
+    list_laws,
+    located_errors,
+)
 from .build import TableReader, build
-from .entry import MISSING_GEOMETRY, PATHS, AnyEntry, Entry, PlantEntry, ProductEntry, ValveEntry, issue_warning
-from .files import DATA, FOLDERS, complete_name, list_names, read_finite_number, read_table, read_text, read_toml
+from .entry import (
+    MISSING_GEOMETRY,
+    PATHS,
+    AnyEntry,
+    Entry,
+    PlantEntry,
+    ProductEntry,
+    ValveEntry,
+    issue_warning,
+)
+from .files import (
+    DATA,
+    FOLDERS,
+    complete_name,
+    list_names,
+    read_finite_number,
+    read_table,
+    read_text,
+    read_toml,
+)
 from .scaling import scale_entry
 
 NOUNS: Mapping[type[Any], str] = {
-    ValveEntry: "valve", PlantEntry: "plant", ProductEntry: "product", Entry: "muscle or law",
-}  # fmt: skip
+    ValveEntry: "valve",
+    PlantEntry: "plant",
+    ProductEntry: "product",
+    Entry: "muscle or law",
+}
 """Kinds of entries in words, which are those of their folders."""
 SCENARIO_TABLES: tuple[str, ...] = ("plant", "input", "run", "output")
 """Tables of a plant of the library that a scenario has, too."""
@@ -35,12 +66,12 @@ SIZES = ("resting_length", "diameter")
 
 
 def load(name_or_path: str | Path) -> AnyEntry:
-    """A library entry (muscle, law, valve, plant or product) by its name or a unique beginning of it, in any case, or a
-    file by its path.
+    """A library entry (muscle, law, valve, plant or product) by its name or a unique beginning of
+    it, in any case, or a file by its path.
 
-    In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry; a PlantEntry contains a
-    `.plant`. Raises UnknownNameError, FileError, ParameterError or UnitError with the location. A warning of the entry
-    is issued as an AirmuscleWarning.
+    In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry; a
+    PlantEntry contains a `.plant`. Raises UnknownNameError, FileError, ParameterError or UnitError
+    with the location. A warning of the entry is issued as an AirmuscleWarning.
     """
     tables, location = entry_tables(name_or_path)
     entry: AnyEntry = build_entry(tables, location, kind_of(tables))
@@ -49,7 +80,9 @@ def load(name_or_path: str | Path) -> AnyEntry:
 
 
 def load_law(name_or_path: str | Path) -> Entry:
-    """A muscle or a law by its name or a unique beginning of it, or its file by its path; as `load`, without valves."""
+    """A muscle or a law by its name or a unique beginning of it, or its file by its path; as
+    `load`, without valves.
+    """
     tables, location = entry_tables(name_or_path, Entry)
     check_describes_law(tables, f"{location}: the file")
     entry: Entry = build_entry(tables, location)
@@ -58,7 +91,9 @@ def load_law(name_or_path: str | Path) -> Entry:
 
 
 def load_valve(name_or_path: str | Path) -> ValveEntry:
-    """A valve by its name or a unique beginning of it, or a valve file by its path; raises and warns as `load`."""
+    """A valve by its name or a unique beginning of it, or a valve file by its path; raises and
+    warns as `load`.
+    """
     entry: ValveEntry = build_entry(*entry_tables(name_or_path, ValveEntry), ValveEntry)
     issue_warning(entry.name, entry.warning, stacklevel=3)
     return entry
@@ -70,7 +105,9 @@ def load_product(name: str) -> ProductEntry:
     return entry
 
 
-def entry_tables(name_or_path: str | Path, kind: type[Any] | None = None) -> tuple[dict[str, Any], Location]:
+def entry_tables(
+    name_or_path: str | Path, kind: type[Any] | None = None
+) -> tuple[dict[str, Any], Location]:
     """The tables of an entry of this kind, or of any, by name or path, and their location."""
     if is_path(name_or_path):
         path = Path(name_or_path)
@@ -79,24 +116,40 @@ def entry_tables(name_or_path: str | Path, kind: type[Any] | None = None) -> tup
 
 
 def _tables_of_name(name: str, kind: type[Any] | None) -> tuple[dict[str, Any], Location]:
-    """The tables of the entry of this kind, or of any, with a name or a unique beginning of it, and their location."""
+    """The tables of the entry of this kind, or of any, with a name or a unique beginning of it, and
+    their location.
+    """
     if kind is Entry and name not in list_names(FOLDERS[NOUNS[Entry]]):
-        noun = next((noun for noun, folder in FOLDERS.items() if name in list_names(folder)), NOUNS[Entry])
+        noun = next(
+            (noun for noun, folder in FOLDERS.items() if name in list_names(folder)), NOUNS[Entry]
+        )
         if noun == NOUNS[ProductEntry]:
             laws = ", ".join(entries_of_product(name))
-            entries = f"its laws are {laws}" if laws else "no law of it is published; fit one to measurements"
+            entries = (
+                f"its laws are {laws}"
+                if laws
+                else "no law of it is published; fit one to measurements"
+            )
             what = f"'{name}' is a product, of which the library states the permitted values"
             raise UnknownNameError(f"{what}; {entries}.")
         if noun != NOUNS[Entry]:
-            raise UnknownNameError(f"'{name}' is a {noun}; a muscle or a law is required: {', '.join(list_laws())}.")
-    noun, folders = ("library entry", list(FOLDERS.values())) if kind is None else (NOUNS[kind], [FOLDERS[NOUNS[kind]]])
+            raise UnknownNameError(
+                f"'{name}' is a {noun}; a muscle or a law is required: {', '.join(list_laws())}."
+            )
+    noun, folders = (
+        ("library entry", list(FOLDERS.values()))
+        if kind is None
+        else (NOUNS[kind], [FOLDERS[NOUNS[kind]]])
+    )
     known = {name: folder for folder in folders for name in list_names(folder)}
     name = complete_name(name, sorted(known), noun)
     return read_toml(known[name] / f"{name}.toml"), Location(f"{name}.toml", "", known[name])
 
 
 def plant_tables(name: str) -> tuple[dict[str, Any], Location]:
-    """The tables of a plant of the library, by its name or a unique beginning of it, and their location."""
+    """The tables of a plant of the library, by its name or a unique beginning of it, and their
+    location.
+    """
     tables, location = _tables_of_name(name, PlantEntry)
     issue_warning(Path(location.file).stem, tables.get("warning", ""), stacklevel=3)
     return tables, location
@@ -104,7 +157,12 @@ def plant_tables(name: str) -> tuple[dict[str, Any], Location]:
 
 def kind_of(tables: Mapping[str, Any]) -> type[Any]:
     """The kind of the entry that tables describe."""
-    kinds = {"characteristic": Entry, "valve": ValveEntry, "plant": PlantEntry, "ratings": ProductEntry}
+    kinds = {
+        "characteristic": Entry,
+        "valve": ValveEntry,
+        "plant": PlantEntry,
+        "ratings": ProductEntry,
+    }
     return next((kind for table, kind in kinds.items() if table in tables), Entry)
 
 
@@ -116,26 +174,30 @@ def check_describes_law(tables: Mapping[str, Any], what: str) -> None:
 
 
 def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] = Entry) -> Any:
-    """The muscle, law, valve, product or plant of the tables of a file. The ratings of an Entry are those of its
-    `product` unless it states some."""
+    """The muscle, law, valve, product or plant of the tables of a file. The ratings of an Entry are
+    those of its `product` unless it states some."""
     given: dict[str, Any] = {"name": Path(location.file).stem}
     if kind is PlantEntry:
-        keys, place = (*SCENARIO_TABLES, "sources"), location.inside("sources")
+        keys = (*SCENARIO_TABLES, "sources")
+        place = location.inside("sources")
         check_keys(tables, ("title", "provenance", "note", "warning", *keys, "reference"), location)
         sources = read_table(tables.get("sources", {}), None, place, " of paths and sources")
         given["plant"] = build_plant(tables["plant"], location.inside("plant"))
-        given["sources"] = tuple((path, read_text(sources, path, place, needed=True)) for path in sources)
+        given["sources"] = tuple(
+            (path, read_text(sources, path, place, needed=True)) for path in sources
+        )
         tables = {key: value for key, value in tables.items() if key not in keys}
     cited: tuple[Reference, ...] = ()
     if kind is Entry and "product" in tables:
         if "ratings" in tables:
             raise ParameterError(
-                f"{location}: both 'product' and [ratings] are given; the ratings of a product are in its own file. "
-                "Remove one of them."
+                f"{location}: both 'product' and [ratings] are given; the ratings of a product are"
+                " in its own file. Remove one of them."
             )
         with located_errors(location):
             product = load_product(read_text(tables, "product", location, needed=True))
-        given["ratings"], cited = product.ratings, product.references
+        given["ratings"] = product.ratings
+        cited = product.references
         tables = {key: value for key, value in tables.items() if key != "product"}
     entry = build(tables, location, given, kind=kind)
     if kind is not Entry:
@@ -157,12 +219,15 @@ def _named_plant(table: Any, location: Location, reader: TableReader) -> Plant |
         return None
     if not {"library", "muscle"} & set(table):
         raise ParameterError(
-            f"{location}: 'muscle' is missing; name a library entry or a muscle file, or write [plant.muscle]."
+            f"{location}: 'muscle' is missing; name a library entry or a muscle file, or write"
+            " [plant.muscle]."
         )
     if "library" not in table:
         return None
     if not isinstance(table["library"], str):
-        raise ParameterError(f"{location.inside('library')} is {abridged(table['library'])}; name a library plant.")
+        raise ParameterError(
+            f"{location.inside('library')} is {abridged(table['library'])}; name a library plant."
+        )
     with located_errors(location.inside("library")):
         tables, _ = plant_tables(table["library"])
     replaced = {key: value for key, value in table.items() if key != "library"}
@@ -175,7 +240,8 @@ def _named_muscle(value: Any, location: Location, reader: TableReader) -> Muscle
     table = value if isinstance(value, Mapping) else {"library": value}
     if "library" not in table:
         return None
-    name, place = table["library"], location.inside("library") if table is value else location
+    name = table["library"]
+    place = location.inside("library") if table is value else location
     if not isinstance(name, str):
         raise ParameterError(f"{place} is {abridged(name)}; name a library entry or a muscle file.")
     with located_errors(place):
@@ -184,10 +250,14 @@ def _named_muscle(value: Any, location: Location, reader: TableReader) -> Muscle
         with located_errors(location):
             return entry.muscle
     replaced = {key: item for key, item in table.items() if key not in ("library", *SIZES)}
-    sizes = {key: read_finite_number(table[key], "m", location.at(key)) for key in SIZES if key in table}
+    sizes = {
+        key: read_finite_number(table[key], "m", location.at(key)) for key in SIZES if key in table
+    }
     with located_errors(location):
         entry = scale_entry(entry, **sizes)
-    muscle: Muscle = reader.build(replaced, location, _entry_parts(entry, replaced, location), kind=Muscle)
+    muscle: Muscle = reader.build(
+        replaced, location, _entry_parts(entry, replaced, location), kind=Muscle
+    )
     return muscle
 
 
@@ -208,8 +278,8 @@ def _named_driver(table: Any, location: Location, reader: TableReader) -> Soleno
         return None
     if valve.switching_times is None:
         raise ParameterError(
-            f'{location}: {valve.name}: no switching times are published; write model = "SolenoidDriver" and its '
-            "opening_delay."
+            f"{location}: {valve.name}: no switching times are published; write model ="
+            ' "SolenoidDriver" and its opening_delay.'
         )
     return SolenoidDriver(valve.switching_times.opening_delay, valve.switching_times.closing_delay)
 
@@ -225,22 +295,33 @@ def _named_valve(table: Any, location: Location, keys: tuple[str, ...]) -> Valve
 
 
 PLANT_READER = TableReader(
-    named={Plant: _named_plant, Muscle: _named_muscle, Orifice: _named_orifice, Driver: _named_driver}
+    named={
+        Plant: _named_plant,
+        Muscle: _named_muscle,
+        Orifice: _named_orifice,
+        Driver: _named_driver,
+    }
 )
 """Reader of plants and their parts, which may be named."""
 
 
 def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) -> dict[str, Any]:
-    """Parts of an entry that a table does not replace; the table may add missing parts, such as a geometry."""
+    """Parts of an entry that a table does not replace; the table may add missing parts, such as a
+    geometry.
+    """
     names = [f.name for f in dataclasses.fields(Muscle) if f.name not in ("contractile", "name")]
-    parts = {"contractile": entry.characteristic, **{name: getattr(entry, name, None) for name in names}}
+    parts = {
+        "contractile": entry.characteristic,
+        **{name: getattr(entry, name, None) for name in names},
+    }
     if "contractile" in replaced:
         del parts["validity_range"]  # it belongs to the replaced law
     kept = {name: part for name, part in parts.items() if part is not None and name not in replaced}
     if not isinstance(kept.get("contractile"), ForceLaw | NoneType):
         raise ParameterError(
-            f"{location}: {entry.name} is {type(entry.characteristic).__name__}, which is not solved for the force; "
-            "a plant needs a ForceLaw. In Python, as_force_law(law, validity range) makes one."
+            f"{location}: {entry.name} is {type(entry.characteristic).__name__}, which is not"
+            " solved for the force; a plant needs a ForceLaw. In Python, as_force_law(law,"
+            " validity range) makes one."
         )
     if "geometry" not in {*kept, *replaced}:
         raise ParameterError(f"{location}: {entry.name} lacks {MISSING_GEOMETRY}.")
@@ -250,14 +331,21 @@ def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) 
 def load_data(name: str) -> Recording:
     """A data set of the library by its name or a unique beginning of it.
 
-    The last note of the Recording is the header of the file, with source and licence; `cite` gives its references.
+    The last note of the Recording is the header of the file, with source and licence; `cite` gives
+    its references.
     """
     path = DATA / f"{complete_name(str(name), list_data(), 'data set')}.csv"
     recording: Recording = read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
-    header = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
+    header = " ".join(
+        line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line
+    )
     file = path.parent / "references.toml"
-    sources = [source["reference"] for source in read_toml(file)["source"] if path.stem in source["data_sets"]]
+    sources = [
+        source["reference"]
+        for source in read_toml(file)["source"]
+        if path.stem in source["data_sets"]
+    ]
     if not sources:
         raise FileError(f"{file}: there is no source of the data set '{path.stem}'.")
     references = tuple(Reference(**reference) for reference in sources[0])

@@ -1,6 +1,7 @@
 """Scenario files: plants, commands, runs and dynamic fits as TOML.
 
-Readers raise FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
+Readers raise FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the
+location.
 """
 
 from ...core.stubs import attach_stub

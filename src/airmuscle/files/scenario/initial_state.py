@@ -1,8 +1,10 @@
-"""Initial state of a run or a record: gauge pressures of the muscles, and values of other states by name.
+"""Initial state of a run or a record: gauge pressures of the muscles, and values of other states by
+name.
 
-initial_state = { pressure = "2 bar" }                                   equilibrium with all muscles at this pressure
-initial_state = { "left.pressure" = "1 bar", "right.pressure" = "3 bar" }   equilibrium with each at its own
-initial_state = { pressure = "2 bar", angle = "5 deg" }                  a state at rest that need not be an equilibrium
+initial_state = { pressure = "2 bar" }                                   equilibrium with all
+muscles at this pressure initial_state = { "left.pressure" = "1 bar", "right.pressure" = "3 bar" }
+equilibrium with each at its own initial_state = { pressure = "2 bar", angle = "5 deg" }
+a state at rest that need not be an equilibrium
 """
 
 import functools
@@ -23,8 +25,12 @@ PRESSURE = "pressure"
 FIRST_ROWS = 3
 """Number of first rows whose median is the default initial value of a record (chosen)."""
 LOOSE = 1e-3
-"""Part of its nominal value by which a coordinate is moved to see whether anything holds it (chosen)."""
-read_initial_table = functools.partial(read_table, remedy='. Write initial_state = { pressure = "0 bar" }')
+"""Part of its nominal value by which a coordinate is moved to see whether anything holds it
+(chosen).
+"""
+read_initial_table = functools.partial(
+    read_table, remedy='. Write initial_state = { pressure = "0 bar" }'
+)
 """Reader of the table `initial_state`, which `build_initial_state` reads."""
 START_REMEDY = (
     ' In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another pressure, and '
@@ -42,31 +48,47 @@ def pressure_names(plant: Plant) -> tuple[str, ...]:
 def read_initial_values(
     table: Mapping[str, Any], plant: Plant, location: Location
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The stated gauge pressures of the muscles [Pa], and the values of other states [SI], by name."""
+    """The stated gauge pressures of the muscles [Pa], and the values of other states [SI], by
+    name.
+    """
     names = pressure_names(plant)
     units = {PRESSURE: "Pa", **dict.fromkeys(names, "Pa")}
     units |= {s.name: s.unit for s in plant.states if not s.name.endswith("air_mass")}
     check_keys(table, tuple(units), location)
-    values = {key: read_finite_number(value, units[key], f"{location}, {key}") for key, value in table.items()}
+    values = {
+        key: read_finite_number(value, units[key], f"{location}, {key}")
+        for key, value in table.items()
+    }
     pressures = dict.fromkeys(names, values[PRESSURE]) if PRESSURE in values else {}
     pressures |= {name: values[name] for name in names if name in values}
-    return pressures, {name: value for name, value in values.items() if name not in (PRESSURE, *names)}
+    return pressures, {
+        name: value for name, value in values.items() if name not in (PRESSURE, *names)
+    }
 
 
 def build_initial_state(
     table: Mapping[str, Any], plant: Plant, location: Location, equilibrium: dict[str, float] | None
 ) -> dict[str, float]:
-    """The initial state of a run; `equilibrium` replaces the computed one. Raises ParameterError or UnitError."""
+    """The initial state of a run; `equilibrium` replaces the computed one. Raises ParameterError or
+    UnitError.
+    """
     all_states = {state.name: state.unit for state in plant.states}
     if set(table) == set(all_states):
-        return {name: read_finite_number(table[name], unit, f"{location}, {name}") for name, unit in all_states.items()}
+        return {
+            name: read_finite_number(table[name], unit, f"{location}, {name}")
+            for name, unit in all_states.items()
+        }
     stated, values = read_initial_values(table, plant, location)
     pressures = _complete(stated or dict.fromkeys(pressure_names(plant), 0.0), plant, location)
     with located_errors(location):
         if values:
             return plant.state_at(pressure=pressures, **values)
         try:
-            return find_equilibrium(plant, pressure=tuple(pressures)) if equilibrium is None else equilibrium
+            return (
+                find_equilibrium(plant, pressure=tuple(pressures))
+                if equilibrium is None
+                else equilibrium
+            )
         except EquilibriumError as error:
             raise EquilibriumError(HintedText(error.message, START_REMEDY)) from None
 
@@ -74,16 +96,19 @@ def build_initial_state(
 def build_initial_conditions(
     table: Mapping[str, Any], plant: Plant, recording: Recording, location: Location
 ) -> InitialConditions:
-    """The initial conditions of a record: what the table states, else the first rows of the recorded pressures.
+    """The initial conditions of a record: what the table states, else the first rows of the
+    recorded pressures.
 
     A lone muscle without a recorded pressure begins at ambient pressure.
-    Without a stated value of another state it is the equilibrium at these pressures; where there is none, or slack
-    muscles leave the plant at rest in any position, the recorded coordinates of the first rows. Raises ParameterError,
-    UnitError or EquilibriumError with the location.
+    Without a stated value of another state it is the equilibrium at these pressures; where there is
+    none, or slack muscles leave the plant at rest in any position, the recorded coordinates of the
+    first rows. Raises ParameterError, UnitError or EquilibriumError with the location.
     """
     stated, values = read_initial_values(table, plant, location)
     ambient = {PRESSURE: 0.0} if len(plant.muscles) == 1 else {}
-    pressures = _complete({**ambient, **recorded_pressures(plant, recording), **stated}, plant, location)
+    pressures = _complete(
+        {**ambient, **recorded_pressures(plant, recording), **stated}, plant, location
+    )
     names = [c.name for c in plant.mechanism.coordinates]
     with located_errors(location):
         if values:
@@ -93,8 +118,9 @@ def build_initial_conditions(
             if (loose := _loose_coordinate(plant, pressures, at_rest.guess)) is None:
                 return at_rest
             raise EquilibriumError(
-                f"at these pressures every {loose.name} near {at_rest.guess[loose.name]:.3g} {loose.unit} is an "
-                f"equilibrium: no muscle pulls. Record the {loose.name}, or state it in initial_state."
+                f"at these pressures every {loose.name} near {at_rest.guess[loose.name]:.3g}"
+                f" {loose.unit} is an equilibrium: no muscle pulls. Record the {loose.name}, or"
+                " state it in initial_state."
             )
         except EquilibriumError:
             if not all(name in recording for name in names):
@@ -103,12 +129,17 @@ def build_initial_conditions(
             return InitialConditions.at_coordinates(plant, pressures, **measured)
 
 
-def _loose_coordinate(plant: Plant, pressures: list[float], state: Mapping[str, float]) -> Coordinate | None:
+def _loose_coordinate(
+    plant: Plant, pressures: list[float], state: Mapping[str, float]
+) -> Coordinate | None:
     """A coordinate of which no acceleration depends in either direction; None if there is none."""
-    coordinates, still = plant.mechanism.coordinates, dict.fromkeys(plant.inputs, 0.0)
+    coordinates = plant.mechanism.coordinates
+    still = dict.fromkeys(plant.inputs, 0.0)
     for c in coordinates:
-        moved = [{each.name: state[each.name] + part * c.nominal * (each is c) for each in coordinates}
-                 for part in (-LOOSE, 0.0, LOOSE)]  # fmt: skip
+        moved = [
+            {each.name: state[each.name] + part * c.nominal * (each is c) for each in coordinates}
+            for part in (-LOOSE, 0.0, LOOSE)
+        ]
         rates = [plant.rates(plant.state_at(pressure=pressures, **place), still) for place in moved]
         if all(rate[each.speed] == rates[0][each.speed] for rate in rates for each in coordinates):
             return c
@@ -116,15 +147,21 @@ def _loose_coordinate(plant: Plant, pressures: list[float], state: Mapping[str, 
 
 
 def first_value(recording: Recording, name: str) -> float:
-    """The median of the first finite rows of a column [SI]. Raises ParameterError where there is none."""
+    """The median of the first finite rows of a column [SI]. Raises ParameterError where there is
+    none.
+    """
     finite = recording[name][np.isfinite(recording[name])]
     if not finite.size:
-        raise ParameterError(f"{recording.origin}: the column {name} has no value; state it in initial_state.")
+        raise ParameterError(
+            f"{recording.origin}: the column {name} has no value; state it in initial_state."
+        )
     return float(np.median(finite[:FIRST_ROWS]))
 
 
 def recorded_pressures(plant: Plant, recording: Recording) -> dict[str, float]:
-    """The initial pressures [Pa] of the muscles whose pressure, or that of their tube, is recorded."""
+    """The initial pressures [Pa] of the muscles whose pressure, or that of their tube, is
+    recorded.
+    """
     columns = [name for name in recording if name.rpartition(".")[2] == PRESSURE]
     found = {}
     for prefix in plant.prefixes:
@@ -139,7 +176,8 @@ def _complete(pressures: Mapping[str, float], plant: Plant, location: Location) 
     missing = [name for name in pressure_names(plant) if name not in pressures]
     if missing:
         raise ParameterError(
-            f"{location}: the initial value of {', '.join(missing)} is neither stated nor recorded. Write "
+            f"{location}: the initial value of {', '.join(missing)} is neither stated nor recorded."
+            " Write "
             f'"{missing[0]}" = "1 bar" in initial_state.'
         )
     return [pressures[name] for name in pressure_names(plant)]

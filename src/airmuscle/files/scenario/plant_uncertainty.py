@@ -1,6 +1,8 @@
-"""Table [uncertainty] of a scenario: residuals of the fit of its plant, with the covariance of the parameters.
+"""Table [uncertainty] of a scenario: residuals of the fit of its plant, with the covariance of the
+parameters.
 
-It is written by airmuscle fit-dynamic, fit-joint and campaign, and read by predict; docs/prediction.md has its keys.
+It is written by airmuscle fit-dynamic, fit-joint and campaign, and read by predict;
+docs/prediction.md has its keys.
 """
 
 import dataclasses
@@ -10,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from ...bench import DynamicFit, PlantUncertainty
-from ...bench.identify import LEVEL, NORMAL_QUANTILE, OF_RECORD, degrees_of_freedom, root_mean_square, t_quantile
+from ...bench.identify import (
+    LEVEL,
+    NORMAL_QUANTILE,
+    OF_RECORD,
+    degrees_of_freedom,
+    root_mean_square,
+    t_quantile,
+)
 from ...bench.segment import estimate_noise, maximum_rate
 from ...core import Array, ParameterError, check_known, tree
 from ...physics.plant.plant import Plant
@@ -24,17 +33,19 @@ SEPARATOR = ", "
 
 
 def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) -> dict[str, Any]:
-    """The table [uncertainty] of the scenarios of a dynamic fit; `cross` are the rms errors [SI] by quantity of each
-    record predicted by the others.
+    """The table [uncertainty] of the scenarios of a dynamic fit; `cross` are the rms errors [SI] by
+    quantity of each record predicted by the others.
 
-    The deviation of a quantity is the rms residual of all records, or the rms error of the records predicted by each
-    other if that is greater. It is multiplied by the 95 % quantile of the residuals over that of a normal
-    distribution, if that is greater, because model errors are not normally distributed. The factor is the quantile of
-    Student's t for the number of records, as far as their errors exceed the noise; one record, or records that do not
-    predict each other, have none.
+    The deviation of a quantity is the rms residual of all records, or the rms error of the records
+    predicted by each other if that is greater. It is multiplied by the 95 % quantile of the
+    residuals over that of a normal distribution, if that is greater, because model errors are not
+    normally distributed. The factor is the quantile of Student's t for the number of records, as
+    far as their errors exceed the noise; one record, or records that do not predict each other,
+    have none.
     """
     models = fit.problem.record_models
-    deviations, factors = {}, {}
+    deviations = {}
+    factors = {}
     for name in models[0].names:
         joint = root_mean_square([fit.rms(name, i) for i in range(len(models))])
         predicted = [each[name] for each in cross if name in each]
@@ -43,14 +54,27 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
         residuals = [each[np.isfinite(each)] for each in residuals]
         deviations[name] = error * _tail_factor(np.concatenate(residuals))
         if len(predicted) > 1:
-            noise = root_mean_square([estimate_noise(each) for each in residuals])  # contains no error of the model
+            noise = root_mean_square(
+                [estimate_noise(each) for each in residuals]
+            )  # contains no error of the model
             factors[name] = t_quantile(degrees_of_freedom(error, noise, len(predicted)))
     known = {name: value for name, value in deviations.items() if value > 0.0}
     records = [model.experiment.recording for model in models]
-    table: dict[str, Any] = {"deviations": known, "records": len(models), **({"factors": factors} if factors else {})}
+    table: dict[str, Any] = {
+        "deviations": known,
+        "records": len(models),
+        **({"factors": factors} if factors else {}),
+    }
     columns = {name: np.concatenate([record[name] for record in records]) for name in deviations}
-    ranges = {name: [float(np.nanmin(each)), float(np.nanmax(each))] for name, each in columns.items()}
-    return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
+    ranges = {
+        name: [float(np.nanmin(each)), float(np.nanmax(each))] for name, each in columns.items()
+    }
+    return {
+        **table,
+        "ranges": ranges,
+        "rates": {n: maximum_rate(records, n) for n in deviations},
+        **_covariance(fit),
+    }
 
 
 def _covariance(fit: DynamicFit) -> dict[str, Any]:
@@ -70,7 +94,9 @@ def _covariance(fit: DynamicFit) -> dict[str, Any]:
 
 
 def parameter_uncertainty(found: PlantUncertainty) -> ParameterUncertainty:
-    """Standard errors and correlations of the parameters that have a variance; several paths of one are one name."""
+    """Standard errors and correlations of the parameters that have a variance; several paths of one
+    are one name.
+    """
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     known = np.flatnonzero(errors)
     correlations = found.covariance[np.ix_(known, known)] / np.outer(errors[known], errors[known])
@@ -87,9 +113,15 @@ def uncertainty_table(found: PlantUncertainty) -> dict[str, Any]:
 
 
 def _tail_factor(residuals: Array) -> float:
-    """The 95 % quantile of residuals (N,) over that of a normal distribution of their rms; at least 1."""
+    """The 95 % quantile of residuals (N,) over that of a normal distribution of their rms; at least
+    1.
+    """
     rms = float(np.sqrt(np.mean(residuals**2)))
-    return 1.0 if rms == 0.0 else max(float(np.quantile(np.abs(residuals), LEVEL)) / (NORMAL_QUANTILE * rms), 1.0)
+    return (
+        1.0
+        if rms == 0.0
+        else max(float(np.quantile(np.abs(residuals), LEVEL)) / (NORMAL_QUANTILE * rms), 1.0)
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,7 +129,8 @@ class UncertaintyTable:
     """Table [uncertainty] of a scenario."""
 
     deviations: Mapping[str, float] = custom_field(
-        BySignal(positive=True), "standard deviation of the residuals by quantity, such as pressure = 620.0"
+        BySignal(positive=True),
+        "standard deviation of the residuals by quantity, such as pressure = 620.0",
     )
     records: int | None = None
     factors: Mapping[str, float] = custom_field(
@@ -117,11 +150,15 @@ class UncertaintyTable:
         if self.records is not None and self.records < 1:
             raise ParameterError(f"records is {self.records}; it must be an integer of at least 1.")
         if not self.deviations:
-            raise ParameterError("deviations is empty; write standard deviations, such as pressure = 620.0.")
+            raise ParameterError(
+                "deviations is empty; write standard deviations, such as pressure = 620.0."
+            )
 
 
 def read_plant_uncertainty(value: Any, plant: Plant, where: Location) -> PlantUncertainty:
-    """The uncertainty of a table [uncertainty] of a scenario. Raises ParameterError or UnitError with the location."""
+    """The uncertainty of a table [uncertainty] of a scenario. Raises ParameterError or UnitError
+    with the location.
+    """
     place = where.inside("")
     table: UncertaintyTable = table_reader(plant).build(value, place, kind=UncertaintyTable)
     with located_errors(place):
@@ -131,5 +168,11 @@ def read_plant_uncertainty(value: Any, plant: Plant, where: Location) -> PlantUn
     what = f"{place}, parameters: the plant has no parameter"
     check_known(what, [path for group in groups for path in group], known, "its parameters are")
     return PlantUncertainty(
-        table.deviations, groups, fitted.covariance, table.records, table.factors, table.ranges, table.rates
+        table.deviations,
+        groups,
+        fitted.covariance,
+        table.records,
+        table.factors,
+        table.ranges,
+        table.rates,
     )

@@ -1,4 +1,6 @@
-"""Prediction of records by an identified plant or the muscle of an entry; docs/prediction.md has their file."""
+"""Prediction of records by an identified plant or the muscle of an entry; docs/prediction.md has
+their file.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -7,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.identify import RecordUnknown, is_held, law_of_length, length_notes, specimen_name, widening
+from ...bench.identify import (
+    RecordUnknown,
+    is_held,
+    law_of_length,
+    length_notes,
+    specimen_name,
+    widening,
+)
 from ...bench.identify.dynamic import Experiment
 from ...bench.identify.prediction import RecordPrediction, predict_dynamic, predict_static
 from ...bench.identify.problem import fitted_quantity_of
@@ -45,97 +54,140 @@ class PlantModel:
     def predict_recording(
         self, recording: Recording, start_time: float = 0.0, own: Sequence[RecordUnknown] = ()
     ) -> RecordPrediction:
-        """Predict a recording of a run with the input of the scenario, which begins at `start_time` [s].
+        """Predict a recording of a run with the input of the scenario, which begins at `start_time`
+        [s].
 
-        The run begins at the recorded initial pressure, and at the recorded initial values of other states that the
-        scenario states. Raises ColumnError for a recording without a predictable quantity, ParameterError otherwise.
+        The run begins at the recorded initial pressure, and at the recorded initial values of other
+        states that the scenario states. Raises ColumnError for a recording without a predictable
+        quantity, ParameterError otherwise.
         """
-        plant, state, observed = self.scenario.plant, dict(self.scenario.initial_state), self._observed
+        plant = self.scenario.plant
+        state = dict(self.scenario.initial_state)
+        observed = self._observed
         outputs = {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
         with located_errors(recording.origin):
             headings = [split_unit(heading)[0] for heading in recording]
             kept = {name: each for name, each in observed.items() if each[1] in headings}
             recording = with_observed(recording, kept, plant)
-            known = observed or [n for kind in PREDICTABLE for n in outputs if n.rpartition(".")[2] == kind]
+            known = observed or [
+                n for kind in PREDICTABLE for n in outputs if n.rpartition(".")[2] == kind
+            ]
             names = [name for name in known if name in recording]
             if not names:
-                raise ColumnError(f"no column can be predicted; the plant gives {', '.join(known)}.")
+                raise ColumnError(
+                    f"no column can be predicted; the plant gives {', '.join(known)}."
+                )
             pressures = {name: float(outputs[name]) for name in pressure_names(plant)}
             initial = pressures | recorded_pressures(plant, recording)
             stated = self.tables["run"].get("initial_state", {})
-            for name in (each for c in plant.mechanism.coordinates for each in (c.name, c.speed) if each in stated):
-                initial[name] = first_value(recording, name) if name in recording else float(outputs[name])
+            for name in (
+                each
+                for c in plant.mechanism.coordinates
+                for each in (c.name, c.speed)
+                if each in stated
+            ):
+                initial[name] = (
+                    first_value(recording, name) if name in recording else float(outputs[name])
+                )
         row = {"start_time": start_time, "initial_state": initial}
         place = Location(recording.origin, "", self.location.folder)
-        experiment, _ = build_experiment(row, place, self.tables, plant, {}, recording, predicted=True)
-        return self._predict(experiment, {name: observed.get(name, (0.0, name))[0] for name in names}, own)
+        experiment, _ = build_experiment(
+            row, place, self.tables, plant, {}, recording, predicted=True
+        )
+        return self._predict(
+            experiment, {name: observed.get(name, (0.0, name))[0] for name in names}, own
+        )
 
     def predict_file(self, path: Path) -> list[RecordPrediction]:
-        """Predict each record of a file of records. Raises FileError, ParameterError, UnitError or ColumnError."""
-        tables, location = read_toml(path), Location.of_file(path)
+        """Predict each record of a file of records. Raises FileError, ParameterError, UnitError or
+        ColumnError.
+        """
+        tables = read_toml(path)
+        location = Location.of_file(path)
         check_keys(tables, ("title", "input", "observed", "fit", "record"), location)
-        plant, table, in_fit = self.scenario.plant, optional_table(tables, "fit", location), location.inside("fit")
+        plant = self.scenario.plant
+        table = optional_table(tables, "fit", location)
+        in_fit = location.inside("fit")
         check_keys(table, ("own", "start_time", "initial_state", "integrator"), in_fit)
         fit: FitTable = table_reader(plant).build(table, in_fit, kind=FitTable)
         observed = dict(self._observed)
         if "observed" in tables:
             observed = read_observed(tables["observed"], plant, location.at("observed"))
         if not observed:
-            raise ParameterError(f"{location}: the scenario states no observed quantities; give them in [observed].")
+            raise ParameterError(
+                f"{location}: the scenario states no observed quantities; give them in [observed]."
+            )
         shared = {"plant": self.tables["plant"], "input": self.tables.get("input", {}), **tables}
         deviations = {name: deviation for name, (deviation, _) in observed.items()}
         return [
             self._predict(experiment, deviations, fit.unknowns(plant), fit.integrator)
-            for experiment, _ in build_records(tables, shared, plant, observed, location, predicted=True)
+            for experiment, _ in build_records(
+                tables, shared, plant, observed, location, predicted=True
+            )
         ]
 
     @property
     def _observed(self) -> Mapping[str, tuple[float, str]]:
-        """Deviation, 0 where it is not stated, and column of each quantity that the fit observed."""
+        """Deviation, 0 where it is not stated, and column of each quantity that the fit
+        observed.
+        """
         uncertainty = self.scenario.uncertainty
         stated = () if uncertainty is None else uncertainty.deviations
         return {name: (0.0, name) for name in stated} | dict(self.scenario.observed)
 
     def _predict(
-        self, experiment: Experiment, observed: Mapping[str, float], own: Sequence[RecordUnknown],
+        self,
+        experiment: Experiment,
+        observed: Mapping[str, float],
+        own: Sequence[RecordUnknown],
         method: Integrator | None = None,
-    ) -> RecordPrediction:  # fmt: skip
+    ) -> RecordPrediction:
         scenario = self.scenario
         method = method or scenario.problem.integrator
         with located_errors(experiment.recording.origin):
             return predict_dynamic(
-                scenario.plant, experiment, observed, uncertainty=scenario.uncertainty, own=own, method=method
+                scenario.plant,
+                experiment,
+                observed,
+                uncertainty=scenario.uncertainty,
+                own=own,
+                method=method,
             )
 
 
 def load_plant_model(path: str | Path) -> PlantModel:
-    """The identified plant of a scenario file, or of a plant of the library by name. Raises as `load_scenario`."""
+    """The identified plant of a scenario file, or of a plant of the library by name. Raises as
+    `load_scenario`.
+    """
     tables, location = scenario_tables(path)
     scenario = build_scenario(tables, location)
     if "controller" in tables.get("input", {}):
         raise ParameterError(
-            f"{location}, [input]: the plant of a prediction has no controller; give the commands that were applied as "
-            "[input] of a scenario, as rows or as a file."
+            f"{location}, [input]: the plant of a prediction has no controller; give the commands"
+            " that were applied as [input] of a scenario, as rows or as a file."
         )
     return PlantModel(scenario, tables, location)
 
 
 def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
-    """Predict a slow record by the law of an entry, its friction and its creep elements, with its stated 95 % band.
+    """Predict a slow record by the law of an entry, its friction and its creep elements, with its
+    stated 95 % band.
 
-    Law and geometry are scaled to the resting length that the record states; without one, that of the geometry is used.
-    Raises ParameterError for an entry that cannot be scaled or has a spring, and ColumnError for a record without
-    pressure, contraction and force, or whose contractions are impossible with the resting length of the geometry.
+    Law and geometry are scaled to the resting length that the record states; without one, that of
+    the geometry is used. Raises ParameterError for an entry that cannot be scaled or has a spring,
+    and ColumnError for a record without pressure, contraction and force, or whose contractions are
+    impossible with the resting length of the geometry.
     """
     if entry.spring is not None:
         raise ParameterError(
-            f"{entry.name}: a parallel spring is not part of a static prediction. Give a muscle whose law contains the "
-            "force of the spring, or a scenario with the muscle."
+            f"{entry.name}: a parallel spring is not part of a static prediction. Give a muscle"
+            " whose law contains the force of the spring, or a scenario with the muscle."
         )
     stated = recording.constants.get("resting_length")
     length = None if stated is None else float(stated)
     law = law_of_length(entry.characteristic, length, specimen_name(recording))
-    notes, differences = [], []
+    notes = []
+    differences = []
     if length is None and entry.geometry is not None:
         recording, remarks = _with_resting_length(recording, float(entry.geometry.resting_length))
         notes += remarks
@@ -150,18 +202,31 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
         notes.append(f"the law was scaled from {1e3 * own:.4g} mm to {1e3 * length:.4g} mm")
     half, source, remarks = _band(entry, fitted_quantity_of(law).name, recording)
     limits = entry.error_band
-    rates = {} if limits is None else {"contraction": limits.max_contraction_rate, "pressure": limits.max_pressure_rate}
+    rates = (
+        {}
+        if limits is None
+        else {"contraction": limits.max_contraction_rate, "pressure": limits.max_pressure_rate}
+    )
     if any(note.startswith("specimen ") for note in remarks):
         differences.append("another specimen")
     return predict_static(
-        law, recording, friction=entry.friction, creep=entry.creep, half_width=half,
-        validity_range=entry.validity_range, rates=rates, band=source,
-        notes=(*notes, *remarks), differences=differences,
-    )  # fmt: skip
+        law,
+        recording,
+        friction=entry.friction,
+        creep=entry.creep,
+        half_width=half,
+        validity_range=entry.validity_range,
+        rates=rates,
+        band=source,
+        notes=(*notes, *remarks),
+        differences=differences,
+    )
 
 
 def _with_resting_length(recording: Recording, length: float) -> tuple[Recording, list[str]]:
-    """The recording with the resting length of the muscle, and a note if its contraction depends on it."""
+    """The recording with the resting length of the muscle, and a note if its contraction depends on
+    it.
+    """
     constants = {**recording.constants, "resting_length": length}
     completed = dataclasses.replace(recording, constants=constants)
     if "contraction" in recording or "length" not in recording:
@@ -170,30 +235,39 @@ def _with_resting_length(recording: Recording, length: float) -> tuple[Recording
     low, high = (float(f(completed["contraction"])) for f in (np.nanmin, np.nanmax))
     if not CONTRACTION_RANGE[0] < low <= high < CONTRACTION_RANGE[1]:
         raise ColumnError(
-            f"{recording.origin}: {what}, its contraction is {100 * low:.4g} to {100 * high:.4g} %, which is "
-            "impossible.",
+            f"{recording.origin}: {what}, its contraction is {100 * low:.4g} to {100 * high:.4g} %,"
+            " which is impossible.",
             hint=Hint("To state the length", "resting_length", "400 mm"),
         )
     return completed, [f"{what}, its contraction is {100 * low:.4g} to {100 * high:.4g} %"]
 
 
 def _band(entry: Entry, quantity: str, recording: Recording) -> tuple[float | None, str, list[str]]:
-    """The half width of the band of a record [SI], None if it is not known; its source, or why not; and notes."""
+    """The half width of the band of a record [SI], None if it is not known; its source, or why not;
+    and notes.
+    """
     band = entry.error_band
     if band is None or band.quantity != quantity:
         return None, "", []
     held = band.held_half_width is not None and "contraction" in recording and is_held(recording)
     own = (band.held_half_width or band.half_width) if held else band.half_width
-    name, length = specimen_name(recording), recording.constants.get("resting_length")
+    name = specimen_name(recording)
+    length = recording.constants.get("resting_length")
     if not band.specimens or name in band.specimens:
         return own, band.source, []
     notes = length_notes(None if length is None else float(length), band.resting_lengths)
-    measured = ", ".join(band.specimens[:MAX_NAMES]) + (", ..." if len(band.specimens) > MAX_NAMES else "")
+    measured = ", ".join(band.specimens[:MAX_NAMES]) + (
+        ", ..." if len(band.specimens) > MAX_NAMES else ""
+    )
     which = f"specimen {name} was not measured (measured: {measured})"
     if band.new_specimen_half_width is None:
         return None, UNKNOWN, [f"{which}; the band is {UNKNOWN}", *notes]
     new = band.new_specimen_half_width
-    if length is not None and band.resting_lengths and hasattr(entry.characteristic, "with_resting_length"):
+    if (
+        length is not None
+        and band.resting_lengths
+        and hasattr(entry.characteristic, "with_resting_length")
+    ):
         new *= widening(band.resting_lengths, float(length))
     source = f"for a specimen that was not measured: {band.new_specimen_source}"
     return max(new, own), source, [f"{which}; the band is that of other specimens", *notes]

@@ -1,7 +1,9 @@
-"""Scenario: a simulation as a TOML file with the tables [plant], [input], [run] and [output]; docs/scenario.md.
+"""Scenario: a simulation as a TOML file with the tables [plant], [input], [run] and [output];
+docs/scenario.md.
 
-Components are tables with `model` and their parameters; new components need no new grammar. Beside these tables are
-[observed] and [uncertainty], which fit-dynamic writes and predict reads, see plant_uncertainty.py.
+Components are tables with `model` and their parameters; new components need no new grammar. Beside
+these tables are [observed] and [uncertainty], which fit-dynamic writes and predict reads, see
+plant_uncertainty.py.
 """
 
 import dataclasses
@@ -16,7 +18,15 @@ from ...engine.loop import ControlLoop, InputSignal
 from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
 from ...recording import Recording
-from ..library import SCENARIO_TABLES, build_plant, custom_field, is_path, list_plants, plant_tables, read_toml
+from ..library import (
+    SCENARIO_TABLES,
+    build_plant,
+    custom_field,
+    is_path,
+    list_plants,
+    plant_tables,
+    read_toml,
+)
 from ..library.files import Location, check_keys, located_errors, read_finite_number, read_table
 from .controller import build_control_loop, signal_units
 from .initial_state import build_initial_state, read_initial_table
@@ -24,7 +34,9 @@ from .plant_uncertainty import read_plant_uncertainty
 from .values import Number, build_input_signal, read_observed, required_table, table_reader
 
 MAX_ROWS = 2_000_000
-"""Maximum number of rows of a run that a command writes (chosen): 300 MB of a plant with one muscle."""
+"""Maximum number of rows of a run that a command writes (chosen): 300 MB of a plant with one
+muscle.
+"""
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
 
@@ -33,9 +45,13 @@ DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 class RunTable:
     """Table [run] of a scenario."""
 
-    duration: float = custom_field(Number("s", positive=True), 'duration of the run, such as duration = "25 s"')
+    duration: float = custom_field(
+        Number("s", positive=True), 'duration of the run, such as duration = "25 s"'
+    )
     start_time: float = custom_field(Number("s"), "time at the start of the run", default=0.0)
-    output_times: float | None = custom_field(Number("s", positive=True), "sample time of the rows", default=None)
+    output_times: float | None = custom_field(
+        Number("s", positive=True), "sample time of the rows", default=None
+    )
     initial_state: Mapping[str, Any] = custom_field(
         read_initial_table, "pressures or states", default_factory=lambda: DEFAULT_INITIAL_STATE
     )
@@ -45,8 +61,9 @@ class RunTable:
         rows = 0.0 if self.output_times is None else self.duration / self.output_times
         if rows > MAX_ROWS:
             raise ParameterError(
-                f"output_times of {self.output_times:g} s gives {rows:.3g} rows in {self.duration:g} s; at most "
-                f"{MAX_ROWS} are written. Choose a longer sample time."
+                f"output_times of {self.output_times:g} s gives {rows:.3g} rows in"
+                f" {self.duration:g} s; at most {MAX_ROWS} are written. Choose a longer sample"
+                " time."
             )
 
 
@@ -59,20 +76,30 @@ class OutputTable:
 
 @dataclasses.dataclass(frozen=True)
 class ScenarioTables:
-    """Tables of a scenario, which are keys of its file; `input` depends on the initial state and is read later."""
+    """Tables of a scenario, which are keys of its file; `input` depends on the initial state and is
+    read later.
+    """
 
     plant: Plant
     run: RunTable
     title: str = ""
-    input: Mapping[str, Any] = custom_field(read_table, "input signals or a controller", default_factory=dict)
+    input: Mapping[str, Any] = custom_field(
+        read_table, "input signals or a controller", default_factory=dict
+    )
     output: OutputTable = OutputTable()
-    observed: Mapping[str, tuple[float, str]] = custom_field(read_observed, "of a fit", default_factory=dict)
-    uncertainty: PlantUncertainty | None = custom_field(read_plant_uncertainty, "of a fit", default=None)
+    observed: Mapping[str, tuple[float, str]] = custom_field(
+        read_observed, "of a fit", default_factory=dict
+    )
+    uncertainty: PlantUncertainty | None = custom_field(
+        read_plant_uncertainty, "of a fit", default=None
+    )
     # of an entry of the library, so that its copy is a scenario; a simulation does not use them
     provenance: str = ""
     note: str = ""
     warning: str = ""
-    sources: Mapping[str, str] = custom_field(read_table, "source of each number, by its path", default_factory=dict)
+    sources: Mapping[str, str] = custom_field(
+        read_table, "source of each number, by its path", default_factory=dict
+    )
     reference: tuple[Reference, ...] = ()
 
 
@@ -90,7 +117,9 @@ class Scenario(ShortRepr):
     uncertainty: PlantUncertainty | None = None
     """That of the fit of the plant, for predictions; a simulation does not use it."""
     observed: Mapping[str, tuple[float, str]] = dataclasses.field(default_factory=dict)
-    """Standard deviation of the sensor [SI] and column of each output that the fit of the plant observed."""
+    """Standard deviation of the sensor [SI] and column of each output that the fit of the plant
+    observed.
+    """
     defaults: tuple[str, ...] = ()
     """Keys of [run] that the file does not state."""
 
@@ -112,15 +141,19 @@ class Scenario(ShortRepr):
 
     def select_columns(self, recording: Recording) -> Recording:
         """The recording with time and the columns of the scenario."""
-        kept = {name: recording[name] for name in recording if not self.columns or name in ("time", *self.columns)}
+        kept = {
+            name: recording[name]
+            for name in recording
+            if not self.columns or name in ("time", *self.columns)
+        }
         return dataclasses.replace(recording, columns=kept)
 
 
 def load_scenario(path: str | Path) -> Scenario:
     """The scenario in a file, or that of a plant of the library by its complete name.
 
-    A file of this name takes precedence. Raises FileError, ParameterError, UnitError or UnknownNameError with the
-    location.
+    A file of this name takes precedence. Raises FileError, ParameterError, UnitError or
+    UnknownNameError with the location.
     """
     return build_scenario(*scenario_tables(path))
 
@@ -131,7 +164,10 @@ def scenario_tables(path: str | Path) -> tuple[Mapping[str, Any], Location]:
     if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
         return plant_tables(str(path))
     if not is_path(str(path)) and not file.exists():
-        raise FileError(f"{path}: there is no such file, and no such plant; plants are {', '.join(list_plants())}.")
+        raise FileError(
+            f"{path}: there is no such file, and no such plant; plants are"
+            f" {', '.join(list_plants())}."
+        )
     return read_toml(file), Location.of_file(file)
 
 
@@ -141,8 +177,8 @@ def build_scenario(
     plant: Plant | None = None,
     equilibrium: dict[str, float] | None = None,
 ) -> Scenario:
-    """The scenario of the tables of a file. `plant` replaces the table [plant], `equilibrium` the computed initial
-    equilibrium. Raises as `load_scenario`."""
+    """The scenario of the tables of a file. `plant` replaces the table [plant], `equilibrium` the
+    computed initial equilibrium. Raises as `load_scenario`."""
     check_keys(tables, [field.name for field in dataclasses.fields(ScenarioTables)], location)
     for key in ("plant", "run"):
         required_table(tables, key, location)
@@ -150,27 +186,44 @@ def build_scenario(
     with ambient_pressure(plant.ambient.pressure):  # that of the texts
         reader = table_reader(plant)
         read: ScenarioTables = reader.build(tables, location, {"plant": plant}, kind=ScenarioTables)
-        run, in_input = read.run, location.inside("input")
+        run = read.run
+        in_input = location.inside("input")
         signal: InputSignal | ControlLoop | None = None
-        if "controller" not in read.input:  # before the search for an equilibrium, from which units of a loop follow
+        if (
+            "controller" not in read.input
+        ):  # before the search for an equilibrium, from which units of a loop follow
             signal = build_input_signal(read.input, plant.input_variables, in_input)
         place = location.inside("run").inside("initial_state")
         initial_state = build_initial_state(run.initial_state, plant, place, equilibrium)
         if signal is None:
-            signal = build_control_loop(read.input, plant, signal_units(plant, initial_state), in_input)
+            signal = build_control_loop(
+                read.input, plant, signal_units(plant, initial_state), in_input
+            )
         with located_errors(in_input):
             problem = Problem(
-                plant, signal, run.duration, initial_state, run.start_time, run.output_times, run.integrator
+                plant,
+                signal,
+                run.duration,
+                initial_state,
+                run.start_time,
+                run.output_times,
+                run.integrator,
             )
         known = list(run_column_units(problem))
-        check_known(f"{location.inside('output')}: the run has no column", read.output.columns, known)
+        check_known(
+            f"{location.inside('output')}: the run has no column", read.output.columns, known
+        )
         return Scenario(
             title=read.title.strip() or Path(location.file).stem,
             problem=problem,
             columns=read.output.columns,
             uncertainty=read.uncertainty,
             observed=read.observed,
-            defaults=tuple(field.name for field in dataclasses.fields(RunTable) if field.name not in tables["run"]),
+            defaults=tuple(
+                field.name
+                for field in dataclasses.fields(RunTable)
+                if field.name not in tables["run"]
+            ),
         )
 
 
@@ -182,7 +235,9 @@ def run_column_units(problem: Problem) -> dict[str, str]:
 
 
 def initial_pressure(tables: Mapping[str, Any], location: Location, plant: Plant) -> float | None:
-    """Gauge pressure [Pa] of the initial equilibrium of a plant; None if the run starts from another state."""
+    """Gauge pressure [Pa] of the initial equilibrium of a plant; None if the run starts from
+    another state.
+    """
     start = tables["run"].get("initial_state", DEFAULT_INITIAL_STATE)
     if not isinstance(start, Mapping) or set(start) - {"pressure"}:
         return None

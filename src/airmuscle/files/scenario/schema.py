@@ -1,9 +1,10 @@
-"""JSON schemas of scenario and muscle files for editors, generated from the declared tables and models.
+"""JSON schemas of scenario and muscle files for editors, generated from the declared tables and
+models.
 
-With a schema, an editor marks unknown keys, values of the wrong type and numbers out of bounds, and shows unit and
-meaning of each parameter. Names of inputs, columns and files are not in the schema; they are checked when the file is
-loaded. Within `allow_code` a class of a user stands wherever a model does, with any parameters: the schema does not
-import it. JSON Schema, draft 2020-12.
+With a schema, an editor marks unknown keys, values of the wrong type and numbers out of bounds, and
+shows unit and meaning of each parameter. Names of inputs, columns and files are not in the schema;
+they are checked when the file is loaded. Within `allow_code` a class of a user stands wherever a
+model does, with any parameters: the schema does not import it. JSON Schema, draft 2020-12.
 """
 
 import dataclasses
@@ -17,7 +18,15 @@ from typing import Any
 from ...core import Parameter, parameters
 from ...engine.loop import RELATIVE, Controller, Driver
 from ...physics import Muscle, Orifice, Plant
-from ..library import PREDICTED, SIZES, StatedBand, is_code_allowed, model_class, model_names, only_class
+from ..library import (
+    PREDICTED,
+    SIZES,
+    StatedBand,
+    is_code_allowed,
+    model_class,
+    model_names,
+    only_class,
+)
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin
 from . import controller, initial_state, plant_uncertainty, scenario, values
@@ -29,7 +38,11 @@ _NUMBER = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"
 _UNIT = r"\s*([^\s\d.,]|1/).*"
 """Pattern of the unit after a number: no comma and no further digit, except 1/s."""
 _TEXT: Schema = {"type": "string"}
-_CODE: Schema = {"description": "module:Class, code of a user", "pattern": r"^\w+(\.\w+)*:\w+$", **_TEXT}
+_CODE: Schema = {
+    "description": "module:Class, code of a user",
+    "pattern": r"^\w+(\.\w+)*:\w+$",
+    **_TEXT,
+}
 _PLAIN: Mapping[Any, str] = {int: "integer", float: "number", str: "string", bool: "boolean"}
 _CHOICES = {(Check, "quantity"): tuple(CONDITIONS), (StatedBand, "quantity"): PREDICTED}
 """Texts of which only some are allowed."""
@@ -44,7 +57,9 @@ def scenario_schema() -> Schema:
 
 
 def muscle_schema() -> Schema:
-    """Schema of a muscle file, the form of all muscles and laws of the library; see docs/muscle-file.md."""
+    """Schema of a muscle file, the form of all muscles and laws of the library; see
+    docs/muscle-file.md.
+    """
     models = _ModelSchemas()
     tables = models.table(Entry, model_needed=None)
     tables["properties"] |= {"product": _TEXT}
@@ -52,17 +67,31 @@ def muscle_schema() -> Schema:
 
 
 def _document(title: str, tables: Schema, models: "_ModelSchemas") -> Schema:
-    return {"$schema": DRAFT, **tables, "title": title, "$defs": dict(sorted(models.definitions.items()))}
+    return {
+        "$schema": DRAFT,
+        **tables,
+        "title": title,
+        "$defs": dict(sorted(models.definitions.items())),
+    }
 
 
 def _table(properties: Schema, required: Sequence[str] = ()) -> Schema:
     required_keys = {"required": list(required)} if required else {}
-    return {"type": "object", "properties": properties, **required_keys, "additionalProperties": False}
+    return {
+        "type": "object",
+        "properties": properties,
+        **required_keys,
+        "additionalProperties": False,
+    }
 
 
 def _code_table(properties: Schema, required: Sequence[str] = ()) -> Schema:
     """A table of a user's class, whose parameters the schema does not know."""
-    return {"type": "object", "properties": {"model": _CODE, **properties}, "required": ["model", *required]}
+    return {
+        "type": "object",
+        "properties": {"model": _CODE, **properties},
+        "required": ["model", *required],
+    }
 
 
 def _list_of(items: Schema) -> Schema:
@@ -74,8 +103,12 @@ def _by_name(items: Schema) -> Schema:
 
 
 def _quantity(unit: str, low: float = -math.inf, high: float = math.inf) -> Schema:
-    """A number in SI units or a text with a unit; the unit is optional for a ratio, and arbitrary for unit ""."""
-    bounds = {key: value for key, value in (("minimum", low), ("maximum", high)) if math.isfinite(value)}
+    """A number in SI units or a text with a unit; the unit is optional for a ratio, and arbitrary
+    for unit "".
+    """
+    bounds = {
+        key: value for key, value in (("minimum", low), ("maximum", high)) if math.isfinite(value)
+    }
     pattern = f"{_NUMBER}({_UNIT})?$" if unit in ("1", "") else f"{_NUMBER}{_UNIT}$"
     return {"anyOf": [{"type": "number", **bounds}, {"type": "string", "pattern": pattern}]}
 
@@ -87,19 +120,27 @@ class _ModelSchemas:
         self.definitions: Schema = {}
 
     def kind(self, cls: Any) -> Schema:
-        """Any model of a class: a table that names it, or its name alone if it needs no parameters."""
+        """Any model of a class: a table that names it, or its name alone if it needs no
+        parameters.
+        """
         if only_class(cls) is not None:
             return self._reference(cls)
         name = f"Any{cls.__name__}"
         if name not in self.definitions:
-            self.definitions[name] = {}  # placeholder, because its members may contain the same kind
+            self.definitions[
+                name
+            ] = {}  # placeholder, because its members may contain the same kind
             members = [model_class(n, "schema") for n in model_names(cls)]
             alone = [member.__name__ for member in members if not _required_keys(member)]
             tables = [self._reference(member) for member in members]
             if cls is Orifice:
-                tables.append(_table({"library": _TEXT, "path": {"enum": list(PATHS)}}, ("library",)))
+                tables.append(
+                    _table({"library": _TEXT, "path": {"enum": list(PATHS)}}, ("library",))
+                )
             ours = [_CODE, _code_table({})] if is_code_allowed() else []
-            self.definitions[name] = {"anyOf": [*([{"enum": alone}] if alone else []), *tables, *ours]}
+            self.definitions[name] = {
+                "anyOf": [*([{"enum": alone}] if alone else []), *tables, *ours]
+            }
         return {"$ref": f"#/$defs/{name}"}
 
     def _reference(self, cls: type[Any]) -> Schema:
@@ -110,7 +151,9 @@ class _ModelSchemas:
         return {"$ref": f"#/$defs/{name}"}
 
     def table(self, cls: type[Any], *, model_needed: bool | None = True) -> Schema:
-        """Table of one class; the key `model` is required (True), optional (False) or not allowed (None)."""
+        """Table of one class; the key `model` is required (True), optional (False) or not allowed
+        (None).
+        """
         is_model = hasattr(cls, "from_file") and model_needed is not None
         properties: Schema = {"model": {"const": cls.__name__}} if is_model else {}
         declared = {p.name: p for p in parameters(cls)}
@@ -120,7 +163,8 @@ class _ModelSchemas:
                 if field.name in declared:
                     properties[key] = self.number(declared[field.name], hints[field.name])
                 elif "read" in field.metadata:
-                    read, meaning = self._read(field.metadata["read"]), field.metadata["meaning"]
+                    read = self._read(field.metadata["read"])
+                    meaning = field.metadata["meaning"]
                     properties[key] = {"description": meaning, **read}
                 elif (cls, field.name) in _CHOICES:
                     properties[key] = {"enum": list(_CHOICES[cls, field.name])}
@@ -128,7 +172,10 @@ class _ModelSchemas:
                     properties[key] = self.part(hints[field.name])
         own = [*(["model"] if is_model and model_needed else []), *_required_keys(cls)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
-        return {"description": summary, **_table(properties, [n for n in own if n not in plant_fields(cls)])}
+        return {
+            "description": summary,
+            **_table(properties, [n for n in own if n not in plant_fields(cls)]),
+        }
 
     def number(self, declared: Parameter, hint: Any) -> Schema:
         """A declared parameter."""
@@ -149,7 +196,14 @@ class _ModelSchemas:
             return _by_name(_list_of(number) if reader.pairs else number)
         if reader is values.read_observed:
             deviation = _quantity("", 0.0)
-            return _by_name({"anyOf": [deviation, _table({"deviation": deviation, "column": _TEXT}, ("deviation",))]})
+            return _by_name(
+                {
+                    "anyOf": [
+                        deviation,
+                        _table({"deviation": deviation, "column": _TEXT}, ("deviation",)),
+                    ]
+                }
+            )
         if reader is plant_uncertainty.read_plant_uncertainty:
             return self._reference(plant_uncertainty.UncertaintyTable)
         if reader is initial_state.read_initial_table:
@@ -160,12 +214,19 @@ class _ModelSchemas:
         return _by_name(_TEXT)
 
     def muscle(self) -> Schema:
-        """A muscle: the name of a library entry or of a file, or a table, which may be based on one."""
+        """A muscle: the name of a library entry or of a file, or a table, which may be based on
+        one.
+        """
         muscle = self.table(Muscle, model_needed=False)
         name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
         required = muscle.pop("required")
         muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in SIZES}}
-        return {"anyOf": [name, {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}]}
+        return {
+            "anyOf": [
+                name,
+                {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]},
+            ]
+        }
 
     def part(self, hint: Any) -> Schema:
         """A structural field, by its annotation."""
@@ -185,10 +246,16 @@ def _required_keys(cls: type[Any]) -> list[str]:
 
 
 def _plant(models: _ModelSchemas) -> Schema:
-    """Table of a plant; a muscle may also be the name of a library entry, or a table based on one."""
-    plant, each = models.table(Plant, model_needed=False), models.muscle()
+    """Table of a plant; a muscle may also be the name of a library entry, or a table based on
+    one.
+    """
+    plant = models.table(Plant, model_needed=False)
+    each = models.muscle()
     needed = plant.pop("required")
-    plant["properties"]["library"] = {"description": "a plant of the library, whose parts are replaced", **_TEXT}
+    plant["properties"]["library"] = {
+        "description": "a plant of the library, whose parts are replaced",
+        **_TEXT,
+    }
     plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
     plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], _list_of(each)]}
     return plant
@@ -196,7 +263,12 @@ def _plant(models: _ModelSchemas) -> Schema:
 
 def _input(models: _ModelSchemas) -> Schema:
     """Table of input signals; keys that are not reserved are inputs with their rows."""
-    point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("")], "minItems": 2, "maxItems": 2}
+    point = {
+        "type": "array",
+        "prefixItems": [_quantity("s"), _quantity("")],
+        "minItems": 2,
+        "maxItems": 2,
+    }
     reserved = models.table(values.SignalTable)["properties"]
     reserved["model"] = {"enum": ["Schedule", "SampledSignal"]}
     signal = {
@@ -214,4 +286,9 @@ def _controller(models: _ModelSchemas, setpoint: Schema) -> Schema:
     for table in tables:
         table["properties"] |= keys
         table["required"] += controller.LOOP_KEYS
-    return {"anyOf": [*tables, *([_code_table(keys, controller.LOOP_KEYS)] if is_code_allowed() else [])]}
+    return {
+        "anyOf": [
+            *tables,
+            *([_code_table(keys, controller.LOOP_KEYS)] if is_code_allowed() else []),
+        ]
+    }

@@ -1,4 +1,6 @@
-"""Writing of scenarios that `load_scenario` reads back: of a scenario, and of each record of a campaign."""
+"""Writing of scenarios that `load_scenario` reads back: of a scenario, and of each record of a
+campaign.
+"""
 
 import dataclasses
 import re
@@ -16,7 +18,16 @@ from ...bench.segment import CONTRACTION_BAND, running_median
 from ...core import AirmuscleError, Array, ParameterError, tree
 from ...engine.loop import ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
 from ...engine.loop.sampled_signal import ACCELERATION, spline_trajectory
-from ...physics import Isometric, Muscle, Plant, PrescribedMotion, ProportionalRegulator, SecondOrderLag, Supply, Valve
+from ...physics import (
+    Isometric,
+    Muscle,
+    Plant,
+    PrescribedMotion,
+    ProportionalRegulator,
+    SecondOrderLag,
+    Supply,
+    Valve,
+)
 from ...recording import Recording
 from ..library import Location, model_table, scenario_toml, tables_toml, write_text
 from .plant_uncertainty import COVARIANCE_KEYS, SEPARATOR, fit_uncertainty
@@ -26,13 +37,17 @@ POINTS = 120
 """Number of points of the pressure and of the motion of a slow record (chosen)."""
 MEDIAN_ROWS = 5
 """Width of the moving median of the recorded motion, in rows (chosen)."""
-REGULATOR = ProportionalRegulator(Supply(1e6), Valve(2e-7, 0.3), Valve(2e-7, 0.3), SecondOrderLag(20.0), 2e3)
+REGULATOR = ProportionalRegulator(
+    Supply(1e6), Valve(2e-7, 0.3), Valve(2e-7, 0.3), SecondOrderLag(20.0), 2e3
+)
 """Regulator that follows the recorded pressure of a slow record; all its values are chosen."""
 MARGIN = 2e5
 """Pressure of the supply above the highest recorded pressure [Pa] (chosen)."""
 
 IDEAL = "Its tension is that of the volume by virtual work, because no force was measured."
-"""Note of the scenario of a fill without a static law: the pressure at a held length does not depend on the tension."""
+"""Note of the scenario of a fill without a static law: the pressure at a held length does not
+depend on the tension.
+"""
 
 
 class RecordScenario(NamedTuple):
@@ -46,36 +61,55 @@ class RecordScenario(NamedTuple):
 
 def campaign_scenarios(campaign: Campaign) -> tuple[RecordScenario, ...]:
     """The scenario of each record, or the reason why it has none; names are those of the files."""
-    names, scenarios = Counter[str](), []
+    names = Counter[str]()
+    scenarios = []
     for record in campaign.records:
-        stem = re.sub(r"[^\w-]+", "-", record.origin.rpartition(".")[0] or record.origin).strip("-").lower()
+        stem = (
+            re.sub(r"[^\w-]+", "-", record.origin.rpartition(".")[0] or record.origin)
+            .strip("-")
+            .lower()
+        )
         names[stem] += 1
         unique = stem if names[stem] == 1 else f"{stem}-{names[stem]}"
-        scenarios.append(RecordScenario(record.origin, f"{unique}.toml", *_text_or_reason(campaign, record)))
+        scenarios.append(
+            RecordScenario(record.origin, f"{unique}.toml", *_text_or_reason(campaign, record))
+        )
     return tuple(scenarios)
 
 
 def _text_or_reason(campaign: Campaign, record: CampaignRecord) -> tuple[str, str]:
     """The text of the scenario of a record, and the reason where there is none."""
-    muscle, geometry = campaign.muscle(record.resting_length), campaign.geometry(record.resting_length)
+    muscle = campaign.muscle(record.resting_length)
+    geometry = campaign.geometry(record.resting_length)
     if muscle is None and record.kind is RecordKind.FILL and geometry is not None:
         muscle = Muscle.ideal(geometry)
     if record.kind is RecordKind.UNUSED:
         return "", record.reason
     if muscle is None:
-        return "", "the muscle has no static law" if geometry is not None else "the muscle has no enclosed volume"
+        return "", (
+            "the muscle has no static law"
+            if geometry is not None
+            else "the muscle has no enclosed volume"
+        )
     if "time" not in record.recording:
         return "", "the record has no time"
     try:
         if record.kind is RecordKind.FILL:
             return _fill(campaign, record, muscle)
-        return _release(campaign, record, muscle) if record.kind is RecordKind.RELEASE else (_slow(record, muscle), "")
+        return (
+            _release(campaign, record, muscle)
+            if record.kind is RecordKind.RELEASE
+            else (_slow(record, muscle), "")
+        )
     except AirmuscleError as error:
         return "", str(error.message)
 
 
 def _note(record: CampaignRecord, start: float) -> str:
-    return f"Reproduces {record.origin} ({record.kind.value}); time 0 is at {start:.6g} s of the record."
+    return (
+        f"Reproduces {record.origin} ({record.kind.value}); time 0 is at {start:.6g} s of the"
+        " record."
+    )
 
 
 def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[str, str]:
@@ -84,14 +118,22 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
         return "", "the fills of this muscle were not fitted"
     plant, known, start = _fitted_record(stage, record, muscle)
     ideal = "" if campaign.law() is not None else f" {IDEAL}"
-    points = {name: [list(point) for point in rows] for name, rows in stage.commands(record).items()}
-    run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
+    points = {
+        name: [list(point) for point in rows] for name, rows in stage.commands(record).items()
+    }
+    run = {
+        "duration": float(record.recording["time"][-1]) - start,
+        "initial_state": {"pressure": known["pressure"]},
+    }
     sensor = stage.fit.problem.record_models[0].names[0]
     table = fit_uncertainty(stage.fit, [{sensor: error} for error in stage.cross_rms])
     fitted: dict[str, Any] = {"uncertainty": _known_in(table, plant)}
     if sensor != "pressure":  # the sensor is in a tube
         fitted["observed"] = {sensor: {"deviation": stage.fit.rms(sensor), "column": "pressure"}}
-    return scenario_toml(record.origin, plant, points, run, f"{_note(record, start)}{ideal}", fitted), ""
+    return (
+        scenario_toml(record.origin, plant, points, run, f"{_note(record, start)}{ideal}", fitted),
+        "",
+    )
 
 
 def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[str, str]:
@@ -102,20 +144,31 @@ def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tupl
     state = {name: known[name] for name in ("pressure", "position", "speed")}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": state}
     fitted = {"uncertainty": _known_in(fit_uncertainty(stage.fit), plant)}
-    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start), fitted), ""
+    return (
+        scenario_toml(
+            record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start), fitted
+        ),
+        "",
+    )
 
 
 def _known_in(table: dict[str, Any], plant: Plant) -> dict[str, Any]:
     """The table without the covariance if the plant lacks one of its parameters."""
     paths = {leaf.path for leaf in tree.leaves(plant)}
     named = {path for name in table.get("parameters", ()) for path in name.split(SEPARATOR)}
-    return table if named <= paths else {key: value for key, value in table.items() if key not in COVARIANCE_KEYS}
+    return (
+        table
+        if named <= paths
+        else {key: value for key, value in table.items() if key not in COVARIANCE_KEYS}
+    )
 
 
 def _fitted_record(
     stage: FillStage | ReleaseStage, record: CampaignRecord, muscle: Muscle
 ) -> tuple[Plant, Mapping[str, float], float]:
-    """The plant of a fitted record with the whole muscle, its initial conditions and its start [s] in the record."""
+    """The plant of a fitted record with the whole muscle, its initial conditions and its start [s]
+    in the record.
+    """
     number = stage.records.index(record)
     fitted = stage.fit.plant(number)
     assert isinstance(fitted, Plant)
@@ -147,15 +200,20 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
 
 
 def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
-    """Time from the start [s], pressure [Pa] and displacement [m] at points that are dense where the muscle moves."""
+    """Time from the start [s], pressure [Pa] and displacement [m] at points that are dense where
+    the muscle moves.
+    """
     time = recording["time"] - recording["time"][0]
     path = running_median(recording["contraction"] * length, MEDIAN_ROWS)
     pressure = running_median(recording["pressure"], MEDIAN_ROWS)
     coarse = slice(None, None, max(1, path.size // 400))
     travelled = np.append(0.0, np.cumsum(np.abs(np.diff(path[coarse]))))
     by_path = np.interp(np.linspace(0.0, travelled[-1], POINTS // 2), travelled, time[coarse])
-    first, *between, last = np.unique(np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path])).tolist()
-    kept, distance = [first], float(time[-1]) / (8 * POINTS)
+    first, *between, last = np.unique(
+        np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path])
+    ).tolist()
+    kept = [first]
+    distance = float(time[-1]) / (8 * POINTS)
     for instant in between:  # without those that follow another one too closely
         if instant - kept[-1] >= distance and last - instant >= distance:
             kept.append(instant)
@@ -164,51 +222,71 @@ def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
 
 
 def scenario_text(scenario: Scenario) -> str:
-    """The text of the file of a scenario: the plant, the input or the control loop, and the run, in SI units.
+    """The text of the file of a scenario: the plant, the input or the control loop, and the run, in
+    SI units.
 
-    All parameters are written with all digits and the initial state by all states of the plant, so that the text is
-    read back as an equal scenario. Raises ParameterError for a controller that is no ControlLaw, an input signal that
-    has no form in a file, or a plant, an integrator or a law that no file describes.
+    All parameters are written with all digits and the initial state by all states of the plant, so
+    that the text is read back as an equal scenario. Raises ParameterError for a controller that is
+    no ControlLaw, an input signal that has no form in a file, or a plant, an integrator or a law
+    that no file describes.
     """
     tables = _tables(scenario)
     text = tables_toml(tables)
     if _tables(build_scenario(tomllib.loads(text), Location(scenario.title, "", Path()))) != tables:
-        raise ParameterError(f"scenario '{scenario.title}': a file does not describe it all; write a Python program.")
+        raise ParameterError(
+            f"scenario '{scenario.title}': a file does not describe it all; write a Python program."
+        )
     return text
 
 
 def save_scenario(scenario: Scenario, path: str | Path) -> Path:
-    """Write a scenario to a file that `load_scenario` reads. Raises FileError, ParameterError as `scenario_text`."""
+    """Write a scenario to a file that `load_scenario` reads. Raises FileError, ParameterError as
+    `scenario_text`.
+    """
     return write_text(Path(path), scenario_text(scenario))
 
 
 def _tables(scenario: Scenario) -> dict[str, Any]:
     """The tables of a scenario, whose values may be models."""
     problem = scenario.problem
-    if problem.control_state is not None or not isinstance(problem.output_times, float | int | None):
+    if problem.control_state is not None or not isinstance(
+        problem.output_times, float | int | None
+    ):
         raise ParameterError(
-            f"scenario '{scenario.title}': a file does not describe a continued run, or output times that are not "
-            "equidistant; write it as a program in Python."
+            f"scenario '{scenario.title}': a file does not describe a continued run, or output"
+            " times that are not equidistant; write it as a program in Python."
         )
     run: dict[str, Any] = {
-        "duration": problem.duration, "start_time": problem.start_time, "output_times": problem.output_times,
-        "initial_state": dict(scenario.initial_state), "integrator": problem.integrator,
-    }  # fmt: skip
+        "duration": problem.duration,
+        "start_time": problem.start_time,
+        "output_times": problem.output_times,
+        "initial_state": dict(scenario.initial_state),
+        "integrator": problem.integrator,
+    }
     signal = problem.input
     return {
         "title": scenario.title,
-        "plant": {key: value for key, value in model_table(scenario.plant).items() if key != "model"},
-        "input": _loop_table(signal, scenario.plant) if isinstance(signal, ControlLoop) else _signal_table(signal),
+        "plant": {
+            key: value for key, value in model_table(scenario.plant).items() if key != "model"
+        },
+        "input": (
+            _loop_table(signal, scenario.plant)
+            if isinstance(signal, ControlLoop)
+            else _signal_table(signal)
+        ),
         "run": {key: value for key, value in run.items() if value is not None},
         **({"output": {"columns": list(scenario.columns)}} if scenario.columns else {}),
     }
 
 
 def _loop_table(loop: ControlLoop, plant: Plant) -> dict[str, Any]:
-    """The table [input] of a control loop; a controller that contains the plant has it from [plant]."""
+    """The table [input] of a control loop; a controller that contains the plant has it from
+    [plant].
+    """
     if not getattr(loop.controller, "from_file", False):
         raise ParameterError(
-            f"scenario: {type(loop.controller).__name__} has no form in a file; write the loop as a program in Python."
+            f"scenario: {type(loop.controller).__name__} has no form in a file; write the loop as a"
+            " program in Python."
         )
     controller = {
         **{name: value for name, value in model_table(loop.controller).items() if value != plant},
@@ -230,8 +308,8 @@ def _signal_table(signal: InputSignal) -> dict[str, Any]:
     if isinstance(signal, SampledSignal):
         return {"model": "SampledSignal", **_rows(signal.points)}
     raise ParameterError(
-        f"scenario: the input signal {type(signal).__name__} has no form in a file; use Schedule, SampledSignal, "
-        "Periodic or WithDrivers."
+        f"scenario: the input signal {type(signal).__name__} has no form in a file; use Schedule,"
+        " SampledSignal, Periodic or WithDrivers."
     )
 
 

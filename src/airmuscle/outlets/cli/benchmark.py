@@ -17,7 +17,10 @@ from .terminal import counted_progress
 
 DEFAULT_BUDGET = 60
 """Sets of gains for each gain (chosen)."""
-JOINTS: Mapping[str, Callable[..., BenchmarkJoint]] = {"proportional": proportional_joint, "on-off": on_off_joint}
+JOINTS: Mapping[str, Callable[..., BenchmarkJoint]] = {
+    "proportional": proportional_joint,
+    "on-off": on_off_joint,
+}
 """The joints of the benchmark, by their valves."""
 LEARNED = "feed-forward + PID"
 """The controller whose feed-forward is learned from trial to trial."""
@@ -30,59 +33,89 @@ class BenchmarkRequest:
     valves: Callable[..., BenchmarkJoint] = option(
         "Valves of the joint.", choices=JOINTS, default="proportional", metavar="|".join(JOINTS)
     )
-    controller: tuple[str, ...] = many("A controller, or a scenario file with one; repeat it for more. Default: all.")
+    controller: tuple[str, ...] = many(
+        "A controller, or a scenario file with one; repeat it for more. Default: all."
+    )
     task: tuple[str, ...] = many("A task; repeat it for several. Default: all.")
     truths: int = option(
-        "Plants on which controllers are judged.", default=len(TRUTH_SEEDS), bounds=(1, len(TRUTH_SEEDS))
+        "Plants on which controllers are judged.",
+        default=len(TRUTH_SEEDS),
+        bounds=(1, len(TRUTH_SEEDS)),
     )
     searches: int = option("Searches of gains with different seeds.", default=1, bounds=(1, 100))
-    budget: int = option("Most sets of gains for each gain; 0: no search.", default=DEFAULT_BUDGET, bounds=(0, 100_000))
+    budget: int = option(
+        "Most sets of gains for each gain; 0: no search.",
+        default=DEFAULT_BUDGET,
+        bounds=(0, 100_000),
+    )
     runs: int = option(
-        "Runs to commission a controller on a plant; 0: none.", default=COMMISSIONING_RUNS, bounds=(0, 1000)
+        "Runs to commission a controller on a plant; 0: none.",
+        default=COMMISSIONING_RUNS,
+        bounds=(0, 1000),
     )
     seed: int = option("Seed of the optimiser and of the noise.", default=1, bounds=(0, 1_000_000))
-    trials: int = option("Trials of iterative learning at 2 Hz; 0: none.", default=0, bounds=(0, 1000))
+    trials: int = option(
+        "Trials of iterative learning at 2 Hz; 0: none.", default=0, bounds=(0, 1000)
+    )
 
 
 @with_requests
 def benchmark(
-    request: BenchmarkRequest, execution: Execution, out: Folder = Path("benchmark"), json: Json = False
+    request: BenchmarkRequest,
+    execution: Execution,
+    out: Folder = Path("benchmark"),
+    json: Json = False,
 ) -> None:
     """Benchmark controllers of a joint on common tasks.
 
     \b
-    Every controller is tuned by the same optimiser for perturbed models, and judged on plants of other kinds, drawn at
-    random: characteristic, friction, valves, tubes and heat differ, and the sensors have resolution, noise and dead
-    time. Group "commissioned": the same number of runs on each plant before. Writes DIR/report.html with the rankings,
-    DIR/figures/ and DIR/data/ with all metrics.
+    Every controller is tuned by the same optimiser for perturbed models, and judged on plants of
+    other kinds, drawn at random: characteristic, friction, valves, tubes and heat differ, and the
+    sensors have resolution, noise and dead time. Group "commissioned": the same number of runs on
+    each plant before. Writes DIR/report.html with the rankings, DIR/figures/ and DIR/data/ with all
+    metrics.
 
     \b
     Examples:
       airmuscle benchmark --out benchmark
-      airmuscle benchmark --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
-      airmuscle benchmark --valves on-off --truths 2 --budget 40
-      airmuscle benchmark --controller PID --controller examples/joint_cascade.toml --runs 0
-      airmuscle benchmark --join /shared/benchmark    (on each machine)
+      airmuscle benchmark --controller PID --controller "feed-forward + PID" --task "sine 1 Hz"
+      --trials 10 airmuscle benchmark --valves on-off --truths 2 --budget 40 airmuscle benchmark
+      --controller PID --controller examples/joint_cascade.toml --runs 0 airmuscle benchmark --join
+      /shared/benchmark    (on each machine)
     """
-    joint, trials = request.valves(TRUTH_SEEDS[: request.truths]), request.trials
-    known, names = {each.name: each for each in standard_contenders(joint)}, dict.fromkeys(request.controller)
+    joint = request.valves(TRUTH_SEEDS[: request.truths])
+    trials = request.trials
+    known = {each.name: each for each in standard_contenders(joint)}
+    names = dict.fromkeys(request.controller)
     for name in names:
         if name not in known and is_path(name):
             known[name] = scenario_contender(joint, name)
         check_known("there is no controller", name, known, error=InputError)
-    contenders, tasks = [known[name] for name in names or known], find_tasks(request.task)
+    contenders = [known[name] for name in names or known]
+    tasks = find_tasks(request.task)
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
-    writes, seeds = execution.writes(out), range(request.seed, request.seed + request.searches)
+    writes = execution.writes(out)
+    seeds = range(request.seed, request.seed + request.searches)
     with execution.executor(alone=True) as workers, counted_progress("control benchmark") as show:
         result = benchmark_controllers(
-            joint, contenders, tasks, seeds=seeds, sets_per_gain=request.budget, commissioning_runs=request.runs,
-            progress=show, workers=workers,
-        )  # fmt: skip
+            joint,
+            contenders,
+            tasks,
+            seeds=seeds,
+            sets_per_gain=request.budget,
+            commissioning_runs=request.runs,
+            progress=show,
+            workers=workers,
+        )
     curves = []
     if trials:
         tuned = next(each for each in result.results if each.name == LEARNED)
-        curves = [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=request.seed)]
+        curves = [
+            learn(
+                result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=request.seed
+            )
+        ]
     chapter = result.chapter(curves)
     writes = writes or execution.takes_over(out)
     deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)

@@ -1,7 +1,8 @@
-"""`airmuscle campaign`: identification of one muscle from all files of a test rig, resumed at its finished stages.
+"""`airmuscle campaign`: identification of one muscle from all files of a test rig, resumed at its
+finished stages.
 
-A stage is found by a fingerprint of the recordings, the geometry and the program; other data or another version of the
-program are fitted anew. The files are removed at the end of the campaign.
+A stage is found by a fingerprint of the recordings, the geometry and the program; other data or
+another version of the program are fitted anew. The files are removed at the end of the campaign.
 """
 
 import contextlib
@@ -15,7 +16,14 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, ValidationRow, identify_campaign
+from ...bench.identify.campaign import (
+    STAGES,
+    Campaign,
+    LeftOutStage,
+    StaticStage,
+    ValidationRow,
+    identify_campaign,
+)
 from ...bench.identify.campaign.campaign_chapters import campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
@@ -28,7 +36,15 @@ from ...files.scenario.write import campaign_scenarios
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
 from ...report.data import as_json
-from ..requests import ReadingRequest, braid_of_length, check_one_length, many, optional, read_braid, request
+from ..requests import (
+    ReadingRequest,
+    braid_of_length,
+    check_one_length,
+    many,
+    optional,
+    read_braid,
+    request,
+)
 from .delivery import Execution, deliver
 from .measurements import print_row_notes, reading_chapters
 from .options import Folder, Json, argument, with_requests
@@ -39,8 +55,11 @@ OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
 MAX_AGE = 30 * 86400.0
 """Age from which the stages of a campaign that was never continued are removed [s] (chosen)."""
 _HASH = hashlib.sha256().digest_size
-STAGES_FILE, SCENARIOS = "stages.json", "scenarios"
-"""File of the finished stages, which is replaced at the end of each stage, and folder of the scenarios."""
+STAGES_FILE = "stages.json"
+SCENARIOS = "scenarios"
+"""File of the finished stages, which is replaced at the end of each stage, and folder of the
+scenarios.
+"""
 
 FOLDER = "Folder with the files of one rig; or its files, or a glob pattern."
 CampaignFolder = Annotated[list[Path], argument("FOLDER", FOLDER)]
@@ -86,33 +105,45 @@ class KeptStages:
     def _paths(self, names: Sequence[str]) -> dict[str, Path]:
         if self._folder is None:
             return {}
-        return {name: self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage" for name in names}
+        return {
+            name: self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage"
+            for name in names
+        }
 
 
 @request
 class CampaignRequest:
     """What a campaign is asked for."""
 
-    validate: tuple[Path, ...] = many("Record that is kept aside and predicted; repeatable.", metavar="FILE")
+    validate: tuple[Path, ...] = many(
+        "Record that is kept aside and predicted; repeatable.", metavar="FILE"
+    )
     braid: Braid | None = optional(
-        "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from the static law and "
-        "fills at several lengths.", metavar="SIZE", read=read_braid,
-    )  # fmt: skip
+        "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from"
+        " the static law and fills at several lengths.",
+        metavar="SIZE",
+        read=read_braid,
+    )
 
 
 @with_requests
 def campaign(
-    folder: CampaignFolder, request: CampaignRequest, reading: ReadingRequest, execution: Execution,
-    out: Folder = Path("campaign"), json: Json = False,
-) -> None:  # fmt: skip
+    folder: CampaignFolder,
+    request: CampaignRequest,
+    reading: ReadingRequest,
+    execution: Execution,
+    out: Folder = Path("campaign"),
+    json: Json = False,
+) -> None:
     """Identify a muscle from all files of a test rig.
 
     \b
-    The records are sorted by kind: slow runs (isobaric, isometric, isotonic), fills, releases and creep. Creep,
-    hysteresis, static characteristic, valve and volume, and damping are identified in this order; a stage that the
-    records do not allow is left out, and the report states what to measure.
-    Writes DIR/report.html, DIR/muscle.toml with standard errors and correlations, and DIR/scenarios/*.toml, which
-    reproduce the records. The same command after an interruption does not fit the finished stages again.
+    The records are sorted by kind: slow runs (isobaric, isometric, isotonic), fills, releases and
+    creep. Creep, hysteresis, static characteristic, valve and volume, and damping are identified in
+    this order; a stage that the records do not allow is left out, and the report states what to
+    measure. Writes DIR/report.html, DIR/muscle.toml with standard errors and correlations, and
+    DIR/scenarios/*.toml, which reproduce the records. The same command after an interruption does
+    not fit the finished stages again.
 
     \b
     Examples:
@@ -121,41 +152,75 @@ def campaign(
       airmuscle campaign bench --validate later/isobar_250kPa.csv --mapping rig.toml
       airmuscle simulate campaign/scenarios/fill_1.toml
     """
-    columns, size = reading.column_mapping(), request.braid
+    columns = reading.column_mapping()
+    size = request.braid
     kept_aside = {path.resolve() for path in request.validate}
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
     recordings, unread = _read_each(files, columns)
-    aside = [recording for path in find_files(request.validate) for recording in read_file(path, columns)]
+    aside = [
+        recording for path in find_files(request.validate) for recording in read_file(path, columns)
+    ]
     complete = complete_bench([*recordings, *aside], columns)
     print_row_notes(complete)
     recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
-    geometry = None if size is None else braid_of_length(size, check_one_length(resting_lengths(recordings)))
+    geometry = (
+        None
+        if size is None
+        else braid_of_length(size, check_one_length(resting_lengths(recordings)))
+    )
     writes = execution.writes(out)
     result = _identify(recordings, geometry, out if writes else None, execution)
     validation = [row for recording in aside for row in _validation(result, recording)]
-    scenarios, entry = campaign_scenarios(result), _entry(result)
+    scenarios = campaign_scenarios(result)
+    entry = _entry(result)
     named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
-    chapters, notes = [result.chapter(unread, named, validation), *campaign_chapters(result, entry)], []
+    chapters = [result.chapter(unread, named, validation), *campaign_chapters(result, entry)]
+    notes = []
     if entry is None and isinstance(result.static, LeftOutStage):
         reason = f"{result.static.reason}; {result.static.remedy}"
         notes.append(f"muscle: not written, because it needs a static law: {reason}")
     if scenarios and not any(scenario.text for scenario in scenarios):
-        notes.append(f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}")
+        notes.append(
+            f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}"
+        )
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
     contents = {f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}
     if entry is not None:  # and the muscles of the other resting lengths
-        lengths = {r.resting_length for r in result.records if r.kind.is_static and r.resting_length is not None}
-        others = {length: _entry(result, length) for length in sorted(lengths - {result.resting_length})}
-        named_muscles = {f"muscle-{1e3 * length:.0f}mm.toml": to_toml(each) for length, each in others.items() if each}
+        lengths = {
+            r.resting_length
+            for r in result.records
+            if r.kind.is_static and r.resting_length is not None
+        }
+        others = {
+            length: _entry(result, length) for length in sorted(lengths - {result.resting_length})
+        }
+        named_muscles = {
+            f"muscle-{1e3 * length:.0f}mm.toml": to_toml(each)
+            for length, each in others.items()
+            if each
+        }
         contents = {"muscle.toml": to_toml(entry), **named_muscles, **contents}
     chapters += reading_chapters(complete)
     writes = writes or execution.takes_over(out)
-    deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
+    deliver(
+        "campaign",
+        chapters,
+        json=json,
+        out=out,
+        title="Bench campaign",
+        files=contents,
+        writes=writes,
+    )
 
 
-def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[tuple[str, str]]]:
-    """The recordings, and the files that cannot be read with the reason. Raises FileError if none can be read."""
-    recordings, unread = list[Recording](), list[tuple[str, str]]()
+def _read_each(
+    files: Sequence[Path], mapping: ColumnMapping
+) -> tuple[list[Recording], list[tuple[str, str]]]:
+    """The recordings, and the files that cannot be read with the reason. Raises FileError if none
+    can be read.
+    """
+    recordings = list[Recording]()
+    unread = list[tuple[str, str]]()
     with progress_bars("reading") as show:
         for i, path in enumerate(files):
             show("files", i / len(files))
@@ -170,9 +235,14 @@ def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Reco
 
 
 def _identify(
-    recordings: Sequence[Recording], geometry: Geometry | None, out: Path | None, execution: Execution
+    recordings: Sequence[Recording],
+    geometry: Geometry | None,
+    out: Path | None,
+    execution: Execution,
 ) -> Campaign:
-    """The campaign, continued from an interrupted one; each finished stage is kept, and written to a given folder."""
+    """The campaign, continued from an interrupted one; each finished stage is kept, and written to
+    a given folder.
+    """
     kept, stages, names = KeptStages(recordings, geometry), list[dict[str, Any]](), STAGES[1:-1]
     known = kept.load(names)
     if known:
@@ -188,24 +258,36 @@ def _identify(
 
     with execution.executor(alone=True) as workers, progress_bars("campaign") as show:
         result = identify_campaign(
-            recordings, geometry=geometry, progress=lambda _, fraction: show("", fraction), finished=keep, known=known,
+            recordings,
+            geometry=geometry,
+            progress=lambda _, fraction: show("", fraction),
+            finished=keep,
+            known=known,
             workers=workers,
-        )  # fmt: skip
+        )
     kept.remove(names)
     return result
 
 
 def _validation(result: Campaign, recording: Recording) -> list[ValidationRow]:
-    """The error of the prediction of a record that was kept aside; empty without a static characteristic."""
+    """The error of the prediction of a record that was kept aside; empty without a static
+    characteristic.
+    """
     if not isinstance(result.static, StaticStage):
         return []
     for name in ("pressure", "contraction", "force"):
         if name not in recording:
-            raise ColumnError(f"{recording.origin}: --validate needs pressure, length or contraction, and force.")
+            raise ColumnError(
+                f"{recording.origin}: --validate needs pressure, length or contraction, and force."
+            )
     prediction = result.predict(recording)
-    force, rows = recording["force"], recording["force"] > 0.0
+    force = recording["force"]
+    rows = recording["force"] > 0.0
     if not rows.any():
-        raise ColumnError(f"{recording.origin}: no row has a positive force, so that no prediction can be compared.")
+        raise ColumnError(
+            f"{recording.origin}: no row has a positive force, so that no prediction can be"
+            " compared."
+        )
     inside = (force >= prediction.low) & (force <= prediction.high)
     half = 0.5 * float(np.median(prediction.high - prediction.low))
     rms = float(np.sqrt(np.mean((prediction.force - force)[rows] ** 2)))
@@ -214,7 +296,13 @@ def _validation(result: Campaign, recording: Recording) -> list[ValidationRow]:
 
 def _entry(result: Campaign, length: float | None = None) -> Entry | None:
     try:
-        text = "" if result.resting_length is None else f", {1e3 * (length or result.resting_length):.4g} mm"
-        return campaign_entry(result, f"Muscle identified from {len(result.records)} records{text}", length)
+        text = (
+            ""
+            if result.resting_length is None
+            else f", {1e3 * (length or result.resting_length):.4g} mm"
+        )
+        return campaign_entry(
+            result, f"Muscle identified from {len(result.records)} records{text}", length
+        )
     except IdentificationError:
         return None  # the overview of the report states why

@@ -1,6 +1,7 @@
 """The command `airmuscle`: table of its commands, errors and exit codes.
 
-Exit code 0: success. 1: failure, with one line on stderr that gives the reason. 2: wrong usage. 130: interrupted.
+Exit code 0: success. 1: failure, with one line on stderr that gives the reason. 2: wrong usage.
+130: interrupted.
 """
 
 import contextlib
@@ -26,7 +27,9 @@ SETTINGS: dict[str, Any] = {
 
 
 class CommandRow(NamedTuple):
-    """A command: its module in this package and its function there, imported on use; its summary for --help."""
+    """A command: its module in this package and its function there, imported on use; its summary
+    for --help.
+    """
 
     name: str
     module: str
@@ -35,34 +38,90 @@ class CommandRow(NamedTuple):
 
 
 COMMANDS = (
-    CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
-    CommandRow("list", "library", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
-    CommandRow("show", "library", "show", "Show parameters, sources and checks of a library entry."),
+    CommandRow(
+        "reproduce",
+        "reproduce",
+        "reproduce",
+        "Reproduce three papers and test each of their claims.",
+    ),
+    CommandRow(
+        "list",
+        "library",
+        "list_entries",
+        "List muscles, laws, valves, plants, products and data sets.",
+    ),
+    CommandRow(
+        "show", "library", "show", "Show parameters, sources and checks of a library entry."
+    ),
     CommandRow("cite", "library", "cite", "Print the references of a library entry."),
-    CommandRow("evaluate", "library", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
-    CommandRow("inspect", "measurements", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
+    CommandRow(
+        "evaluate",
+        "library",
+        "evaluate",
+        "Evaluate a law for two of pressure, contraction and force.",
+    ),
+    CommandRow(
+        "inspect",
+        "measurements",
+        "inspect",
+        "Inspect measurement files: columns, runs, sampling, outliers.",
+    ),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("approximate", "fit", "approximate", "Approximate one characteristic by another."),
-    CommandRow("convert", "measurements", "convert", "Write measurement files as CSV, Parquet or HDF5."),
-    CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
-    CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow(
-        "fit-regulator", "fit_dynamic", "fit_regulator_command", "Identify a pressure regulator from its response."
+        "convert", "measurements", "convert", "Write measurement files as CSV, Parquet or HDF5."
     ),
-    CommandRow("fit-joint", "fit_joint", "fit_joint_command", "Identify a joint or an arm from its episodes."),
-    CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
-    CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
-    CommandRow("fit-volume", "fit", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
+    CommandRow(
+        "hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."
+    ),
+    CommandRow(
+        "fit-dynamic",
+        "fit_dynamic",
+        "fit_dynamic",
+        "Identify plant parameters from transient records.",
+    ),
+    CommandRow(
+        "fit-regulator",
+        "fit_dynamic",
+        "fit_regulator_command",
+        "Identify a pressure regulator from its response.",
+    ),
+    CommandRow(
+        "fit-joint",
+        "fit_joint",
+        "fit_joint_command",
+        "Identify a joint or an arm from its episodes.",
+    ),
+    CommandRow(
+        "campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."
+    ),
+    CommandRow(
+        "predict", "predict", "predict", "Predict further records by an identified muscle or plant."
+    ),
+    CommandRow(
+        "fit-volume",
+        "fit",
+        "fit_volume_command",
+        "Fit the volume of a muscle over its contraction.",
+    ),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
-    CommandRow("fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."),
+    CommandRow(
+        "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
+    ),
     CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
-    CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
-    CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),
+    CommandRow(
+        "benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."
+    ),
+    CommandRow(
+        "export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."
+    ),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
-    CommandRow("schema", "simulate", "schema", "Print the JSON schema of scenario or muscle files."),
+    CommandRow(
+        "schema", "simulate", "schema", "Print the JSON schema of scenario or muscle files."
+    ),
 )
 """All commands, in the order of use."""
 _ROWS = {row.name: row for row in COMMANDS}
@@ -105,8 +164,12 @@ class LazyCommands(TyperGroup):
             return super().make_context(*args, **settings)
 
     def invoke(self, ctx: Any) -> Any:
-        def show(message: Warning | str, category: type[Warning], *location: Any, **options: Any) -> None:
-            if issubclass(category, AirmuscleWarning):  # one line, the others with their location in the code
+        def show(
+            message: Warning | str, category: type[Warning], *location: Any, **options: Any
+        ) -> None:
+            if issubclass(
+                category, AirmuscleWarning
+            ):  # one line, the others with their location in the code
                 text = message.args[0] if isinstance(message, Warning) else message
                 warned.add(worded := in_options(text, ctx.invoked_subcommand))
                 echo(f"warning: {worded}", err=True)
@@ -117,7 +180,12 @@ class LazyCommands(TyperGroup):
             show_other: Any = warnings.showwarning
             warnings.simplefilter("always", AirmuscleWarning)
             warnings.showwarning = show
-            with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint(), exclusive_folders():
+            with (
+                _exit_codes(ctx),
+                _printable_usage_errors(),
+                deferred_sigint(),
+                exclusive_folders(),
+            ):
                 return super().invoke(ctx)
 
 
@@ -127,12 +195,18 @@ def _permit(ctx: typer.Context, value: bool) -> None:
         ctx.with_resource(importlib.import_module("...files", __package__).allow_code())
 
 
-CODE_WORDS = 'Run classes that a file names as model = "module:Class"; only for files that you trust.'
-AllowCode = Annotated[bool, typer.Option("--allow-code", help=CODE_WORDS, callback=_permit, is_eager=True)]
+CODE_WORDS = (
+    'Run classes that a file names as model = "module:Class"; only for files that you trust.'
+)
+AllowCode = Annotated[
+    bool, typer.Option("--allow-code", help=CODE_WORDS, callback=_permit, is_eager=True)
+]
 
 
 def _allow_code_option() -> Any:
-    """The flag with which a command reads `model = "module:Class"` in its files, taken from a command without name."""
+    """The flag with which a command reads `model = "module:Class"` in its files, taken from a
+    command without name.
+    """
     bearer = typer.Typer(**SETTINGS)
 
     @bearer.command()
@@ -154,7 +228,10 @@ def _exit_codes(ctx: Any) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:  # a full disk, a closed terminal
-        echo("error: " + quotable(f"{error.filename or 'output'}: {error.strerror or error}."), err=True)
+        echo(
+            "error: " + quotable(f"{error.filename or 'output'}: {error.strerror or error}."),
+            err=True,
+        )
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         echo("interrupted", err=True)
@@ -163,7 +240,9 @@ def _exit_codes(ctx: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _printable_usage_errors() -> Iterator[None]:
-    """Escape control characters of arguments that a usage error quotes; typer prints the error itself."""
+    """Escape control characters of arguments that a usage error quotes; typer prints the error
+    itself.
+    """
     try:
         yield
     except _UsageError as error:
@@ -183,10 +262,14 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
-VERSION, COMPLETION = "Print the version and exit.", "Print the completion script of bash, zsh or fish and exit."
-Version = Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help=VERSION)]
+VERSION = "Print the version and exit."
+COMPLETION = "Print the completion script of bash, zsh or fish and exit."
+Version = Annotated[
+    bool, typer.Option("--version", callback=_print_version, is_eager=True, help=VERSION)
+]
 Shell = Annotated[
-    str | None, typer.Option(metavar="SHELL", callback=print_completion_script, is_eager=True, help=COMPLETION)
+    str | None,
+    typer.Option(metavar="SHELL", callback=print_completion_script, is_eager=True, help=COMPLETION),
 ]
 
 
@@ -195,12 +278,13 @@ def airmuscle(version: Version = False, completion: Shell = None) -> None:
     """Models, identification and simulation of pneumatic artificial muscles.
 
     Pressures are gauge pressures unless the unit is an absolute one (bara, kPa(a), psia).
-    An absolute pressure is converted with the ambient pressure of the plant or file; without one, 101.325 kPa.
+    An absolute pressure is converted with the ambient pressure of the plant or file; without one,
+    101.325 kPa.
 
     \b
     Examples:
       airmuscle reproduce --out report
       airmuscle evaluate dmsp-20-300 --pressure "3 bar" --force "100 N" --out chart
-      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
-      airmuscle simulate scenario.toml --out run
+      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out
+      fit airmuscle simulate scenario.toml --out run
     """

@@ -38,78 +38,114 @@ class ExportRequest:
     to: str = option(f"Target: {', '.join(NAMES)}.", choices=NAMES, metavar="TARGET")
     name: str = option("Name of the program; default: that of the source.", default="")
     law: bool = option("Export only the static characteristic of a muscle.", default=False)
-    controller: bool = option("Export only the controller of a scenario: c, arduino, fmu.", default=False)
-    build: bool = option("Compile the C program with the compiler of this machine, and run it.", default=False)
+    controller: bool = option(
+        "Export only the controller of a scenario: c, arduino, fmu.", default=False
+    )
+    build: bool = option(
+        "Compile the C program with the compiler of this machine, and run it.", default=False
+    )
     tunable: tuple[str, ...] = many(
-        "A parameter that the program can change; repeatable. Default: all, of a controller none.", metavar="PATH",
-    )  # fmt: skip
+        "A parameter that the program can change; repeatable. Default: all, of a controller none.",
+        metavar="PATH",
+    )
     fmi: int | None = optional("Version of FMI for --to fmu and ssp. Default: 3.", metavar="2|3")
     sources_only: bool = option("An FMU without a binary; --to fmu, ssp.", default=False)
     platforms: tuple[str, ...] = many(
-        f"Binaries of an FMU for a platform, by the package ziglang; repeatable: {', '.join(PLATFORMS)}. Default: this "
-        "machine.",
-    )  # fmt: skip
+        "Binaries of an FMU for a platform, by the package ziglang; repeatable:"
+        f" {', '.join(PLATFORMS)}. Default: this machine.",
+    )
     muscle: str = option("One muscle of the plant; --to mujoco, torch, warp, onnx.", default="")
     precision: Precision = option(
-        "Type of the numbers of a controller.", choices=PRECISIONS, default="double", metavar="double|float"
+        "Type of the numbers of a controller.",
+        choices=PRECISIONS,
+        default="double",
+        metavar="double|float",
     )
     processor: Processor | None = optional(
-        f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on this machine.",
+        f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on"
+        " this machine.",
         choices=PROCESSORS,
-    )  # fmt: skip
+    )
 
     def check(self, where: Where) -> None:
         """Raise RequestError for options that do not fit together."""
-        law, controller, to = self.law, self.controller, self.to
+        law = self.law
+        controller = self.controller
+        to = self.to
         of_an_fmu = self.fmi is not None or self.sources_only or bool(self.platforms)
-        check_rules({
-            "--controller: a controller is exported to C, and without --law; write --to c, --to arduino or --to fmu.":
-                controller and (law or to not in ("c", "arduino", "fmu")),
-            "--tunable: all parameters of a controller in an FMU can be changed; leave it out.":
-                controller and to == "fmu" and self.tunable,
-            "--to arduino: an Arduino library contains a controller; add --controller.":
-                to == "arduino" and not controller,
-            "--build: there is a program to compile with --to c and without --law.": self.build and (law or to != "c"),
-            f"--law: {to} contains a plant; leave --law out, or write --to c.": law and to not in TARGETS,
-            "--tunable: all parameters of an actuator can be changed; leave it out.":
-                to in ("mujoco", *WRITERS) and self.tunable,
-            "--tunable: all parameters of a law can be changed; leave it out.": law and self.tunable,
-            "--fmi, --sources-only and --platforms belong to --to fmu and ssp.":
-                of_an_fmu and to not in ("fmu", "ssp"),
-            "--precision belongs to --controller; plants are computed in double precision.":
-                self.precision != PRECISIONS["double"] and not controller,
-            "--processor belongs to --controller --build.": self.processor and not (controller and self.build),
-            "--sources-only and --platforms exclude each other.": self.sources_only and self.platforms,
-            f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.":
-                self.muscle and to not in ("mujoco", "fmu", "ssp", *STACKS),
-        })  # fmt: skip
+        check_rules(
+            {
+                "--controller: a controller is exported to C, and without --law; write --to c, --to arduino or --to fmu.": (  # noqa: E501
+                    controller and (law or to not in ("c", "arduino", "fmu"))
+                ),
+                "--tunable: all parameters of a controller in an FMU can be changed; leave it out.": (  # noqa: E501
+                    controller and to == "fmu" and self.tunable
+                ),
+                "--to arduino: an Arduino library contains a controller; add --controller.": (
+                    to == "arduino" and not controller
+                ),
+                "--build: there is a program to compile with --to c and without --law.": (
+                    self.build and (law or to != "c")
+                ),
+                f"--law: {to} contains a plant; leave --law out, or write --to c.": (
+                    law and to not in TARGETS
+                ),
+                "--tunable: all parameters of an actuator can be changed; leave it out.": (
+                    to in ("mujoco", *WRITERS) and self.tunable
+                ),
+                "--tunable: all parameters of a law can be changed; leave it out.": (
+                    law and self.tunable
+                ),
+                "--fmi, --sources-only and --platforms belong to --to fmu and ssp.": (
+                    of_an_fmu and to not in ("fmu", "ssp")
+                ),
+                "--precision belongs to --controller; plants are computed in double precision.": (
+                    self.precision != PRECISIONS["double"] and not controller
+                ),
+                "--processor belongs to --controller --build.": (
+                    self.processor and not (controller and self.build)
+                ),
+                "--sources-only and --platforms exclude each other.": (
+                    self.sources_only and self.platforms
+                ),
+                f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.": (
+                    self.muscle and to not in ("mujoco", "fmu", "ssp", *STACKS)
+                ),
+            }
+        )
 
 
 @with_requests
-def export(source: Source, request: ExportRequest, out: Folder = Path("export"), json: Json = False) -> None:
+def export(
+    source: Source, request: ExportRequest, out: Folder = Path("export"), json: Json = False
+) -> None:
     """Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.
 
     \b
-    The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV; in C,
-    JavaScript and MATLAB also the controller and its drivers. Nothing of Python or airmuscle is needed to run it. Each
-    file states version, hash of the model, parameters, references and licence; the same scenario gives the same files.
+    The program contains the equations of the plant, the integrator, and a run of the scenario that
+    writes CSV; in C, JavaScript and MATLAB also the controller and its drivers. Nothing of Python
+    or airmuscle is needed to run it. Each file states version, hash of the model, parameters,
+    references and licence; the same scenario gives the same files.
 
     \b
     Examples:
       airmuscle export examples/fill_discharge.toml --to c --out fill_c
-      airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out fill_m
-      airmuscle export dmsp-20-300 --law --to js --out law_js
-      airmuscle export dmsp-20-300 --to torch --out actuator
-      airmuscle export joint-dmsp-20-matrix --to mjcf --out robot
-      airmuscle export examples/pressure_loop.toml --to c --out loop_c
-      airmuscle export examples/pressure_loop.toml --controller --to c --out controller
-      airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build --processor cortex-m4
-      airmuscle export examples/pressure_loop.toml --controller --to arduino --precision float --out pressure_loop
-      airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
-      airmuscle export examples/pressure_loop.toml --controller --to fmu --out controller.fmu
-      airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
+      airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out
+      fill_m airmuscle export dmsp-20-300 --law --to js --out law_js airmuscle export dmsp-20-300
+      --to torch --out actuator airmuscle export joint-dmsp-20-matrix --to mjcf --out robot
+      airmuscle export examples/pressure_loop.toml --to c --out loop_c airmuscle export
+      examples/pressure_loop.toml --controller --to c --out controller airmuscle export
+      examples/pressure_loop.toml --controller --to c --precision float --build --processor
+      cortex-m4 airmuscle export examples/pressure_loop.toml --controller --to arduino --precision
+      float --out pressure_loop airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out
+      fill.fmu airmuscle export examples/pressure_loop.toml --controller --to fmu --out
+      controller.fmu airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
     """
-    request = request if request.name else dataclasses.replace(request, name=make_identifier(Path(source).stem))
+    request = (
+        request
+        if request.name
+        else dataclasses.replace(request, name=make_identifier(Path(source).stem))
+    )
     if request.to not in ("fmu", "ssp"):
         check_writable(out)
     files, lines, more = WRITERS_BY_TARGET.get(request.to, _export_program)(source, out, request)
@@ -128,36 +164,56 @@ class Exported(NamedTuple):
 
 
 def _export_fmu(source: str, out: Path, request: ExportRequest) -> Exported:
-    """The FMU of a plant or of its controller, or both as an SSP package, in a folder or as a file."""
+    """The FMU of a plant or of its controller, or both as an SSP package, in a folder or as a
+    file.
+    """
     platforms = [find_platform(each) for each in dict.fromkeys(request.platforms)]
     fmi = 3 if request.fmi is None else request.fmi
     part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
     suffix = ".ssp" if part == "ssp" else ".fmu"
     path = out if out.suffix == suffix else out / f"{request.name}{suffix}"
-    check_writable(path.parent, shared=path.parent.exists())  # several commands may write into one folder
+    check_writable(
+        path.parent, shared=path.parent.exists()
+    )  # several commands may write into one folder
     scenario = load_scenario(source)
     common: dict[str, Any] = {
-        "fmi": fmi, "name": request.name, "title": scenario.title, "binary": not request.sources_only,
+        "fmi": fmi,
+        "name": request.name,
+        "title": scenario.title,
+        "binary": not request.sources_only,
         "platforms": platforms,
-    }  # fmt: skip
+    }
     if part == "controller":
         written = outlet.write_controller_fmu(scenario.problem, path, **common)
     else:
         write = outlet.write_ssp if part == "ssp" else outlet.write_fmu
         written = write(scenario.problem, path, tunable=request.tunable or None, **common)
     names = ", ".join(written.platforms)
-    binaries = f"with sources and a binary for {names}" if names else f"sources without a binary: {written.remark}"
+    binaries = (
+        f"with sources and a binary for {names}"
+        if names
+        else f"sources without a binary: {written.remark}"
+    )
     uses = {
-        "plant": f"run: fmpy simulate {path}", "controller": f"inputs: fmpy info {path}",
+        "plant": f"run: fmpy simulate {path}",
+        "controller": f"inputs: fmpy info {path}",
         "ssp": "open: SystemStructure.ssd joins plant and controller",
-    }  # fmt: skip
-    kinds = f"FMI {fmi}.0, {'Model Exchange and ' if part == 'plant' else ''}Co-Simulation, {binaries}"
-    return Exported([path], (kinds, uses[part]), {"platforms": list(written.platforms), "remark": written.remark})
+    }
+    kinds = (
+        f"FMI {fmi}.0, {'Model Exchange and ' if part == 'plant' else ''}Co-Simulation, {binaries}"
+    )
+    return Exported(
+        [path],
+        (kinds, uses[part]),
+        {"platforms": list(written.platforms), "remark": written.remark},
+    )
 
 
 def _export_mujoco(source: str, out: Path, request: ExportRequest) -> Exported:
     """A MuJoCo plugin."""
-    made = outlet.write_mujoco_plugin(load_scenario(source).plant, out, name=request.name, muscle=request.muscle)
+    made = outlet.write_mujoco_plugin(
+        load_scenario(source).plant, out, name=request.name, muscle=request.muscle
+    )
     low, high = made.control_range
     size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
     lines = (
@@ -171,7 +227,8 @@ def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
     """The robot description of a joint or an arm, with the plugins of its muscles."""
     written = WRITERS[request.to](load_scenario(source).plant, out, name=request.name)
     plugins = [path for each in written.plugins for path in each.files]
-    remarks, left = list(dict.fromkeys(each.remark for each in written.plugins if each.remark)), list(written.left_out)
+    remarks = list(dict.fromkeys(each.remark for each in written.plugins if each.remark))
+    left = list(written.left_out)
     lines = [f"plugins, source only: {remark}" for remark in remarks]
     lines += [f"left out: {', '.join(left)}"] if left else []
     return Exported([written.path, *plugins], lines, {"remarks": remarks, "left_out": left})
@@ -179,40 +236,60 @@ def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
 
 def _export_actuator(source: str, out: Path, request: ExportRequest) -> Exported:
     """The batched actuator of a muscle of a plant, or of a muscle behind a pressure regulator."""
-    file, stack = Path(source), STACKS[request.to]
+    file = Path(source)
+    stack = STACKS[request.to]
     if source in list_plants() if not file.exists() else "plant" in read_toml(file):
         plant = load_scenario(source).plant
-        return Exported(outlet.write_actuator(plant, out, stack, name=request.name, muscle=request.muscle))
+        return Exported(
+            outlet.write_actuator(plant, out, stack, name=request.name, muscle=request.muscle)
+        )
     entry = load_law(source)
-    about: dict[str, Any] = {"name": request.name, "title": entry.title, "uncertainty": entry.uncertainty}
-    return Exported(outlet.write_actuator(outlet.regulated_plant(entry.muscle), out, stack, **about))
+    about: dict[str, Any] = {
+        "name": request.name,
+        "title": entry.title,
+        "uncertainty": entry.uncertainty,
+    }
+    return Exported(
+        outlet.write_actuator(outlet.regulated_plant(entry.muscle), out, stack, **about)
+    )
 
 
 def _export_modelica(source: str, out: Path, request: ExportRequest) -> Exported:
     """A Modelica package."""
-    scenario, tunable = load_scenario(source), request.tunable or None
-    paths = outlet.write_modelica(scenario.problem, out, name=request.name, title=scenario.title, tunable=tunable)
+    scenario = load_scenario(source)
+    tunable = request.tunable or None
+    paths = outlet.write_modelica(
+        scenario.problem, out, name=request.name, title=scenario.title, tunable=tunable
+    )
     return Exported(paths, (f'Modelica: loadFile("{paths[0]}"); block {request.name}.Plant',))
 
 
 WRITERS_BY_TARGET: Mapping[str, Callable[[str, Path, ExportRequest], Exported]] = {
-    **dict.fromkeys(("fmu", "ssp"), _export_fmu), "mujoco": _export_mujoco, "modelica": _export_modelica,
-    **dict.fromkeys(WRITERS, _export_robot), **dict.fromkeys(STACKS, _export_actuator),
-}  # fmt: skip
+    **dict.fromkeys(("fmu", "ssp"), _export_fmu),
+    "mujoco": _export_mujoco,
+    "modelica": _export_modelica,
+    **dict.fromkeys(WRITERS, _export_robot),
+    **dict.fromkeys(STACKS, _export_actuator),
+}
 """Writers of models for simulators and learning stacks; the other targets are programs."""
 
 
 def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
     """A law, a controller, or a plant with its run, which is built and run if that is asked for."""
     if request.law:
-        entry, target = load_law(source), TARGETS[request.to]
-        paths = outlet.write_law(entry.characteristic, out, target, name=request.name, title=entry.title)
+        entry = load_law(source)
+        target = TARGETS[request.to]
+        paths = outlet.write_law(
+            entry.characteristic, out, target, name=request.name, title=entry.title
+        )
     else:
         scenario = load_scenario(source)
         common: dict[str, Any] = {"name": request.name, "title": scenario.title}
         if request.controller:
             common |= {"precision": request.precision, "arduino": request.to == "arduino"}
-            paths = outlet.write_controller(scenario.problem, out, tunable=request.tunable, **common)
+            paths = outlet.write_controller(
+                scenario.problem, out, tunable=request.tunable, **common
+            )
         else:
             common |= {"tunable": request.tunable or None, "columns": scenario.columns}
             paths = outlet.write_program(scenario.problem, out, TARGETS[request.to], **common)
@@ -220,7 +297,8 @@ def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
     if not request.build:
         return Exported(paths, [instruction])
     built = build_and_run(paths, request.processor)
-    text, size = built.output.strip(), "unknown" if built.code_size is None else f"{built.code_size} bytes"
+    text = built.output.strip()
+    size = "unknown" if built.code_size is None else f"{built.code_size} bytes"
     if not request.controller:  # the output of a run is CSV
         text = f"{len(built.output.splitlines()) - 1} rows; {built.messages.strip()}"
     known = {} if built.stack_size is None else {"stack_bytes": built.stack_size}

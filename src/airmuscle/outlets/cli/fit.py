@@ -1,4 +1,6 @@
-"""`airmuscle fit`, `fit-volume` and `approximate`: a characteristic or volume law from measurements or another law."""
+"""`airmuscle fit`, `fit-volume` and `approximate`: a characteristic or volume law from measurements
+or another law.
+"""
 
 import contextlib
 import dataclasses
@@ -11,7 +13,15 @@ from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
 from ...bench.identify.volume_fit import fit_volume, volume_points
 from ...core import ParameterError, PhysicsError, check_writable
-from ...files.library import find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
+from ...files.library import (
+    find_initial_law,
+    list_files,
+    load_law,
+    part_toml,
+    resting_lengths,
+    save,
+    to_toml,
+)
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
 from ..requests import FitRequest, ReadingRequest, check_one_length, fit_requested
 from ..requests.declaration import RequestError, option, optional, request
@@ -23,39 +33,47 @@ from .terminal import progress_bars
 
 @with_requests
 def fit(
-    files: Files, request: FitRequest, reading: ReadingRequest, execution: Execution, out: Folder = Path("fit"),
+    files: Files,
+    request: FitRequest,
+    reading: ReadingRequest,
+    execution: Execution,
+    out: Folder = Path("fit"),
     json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Fit a characteristic to measured points, or compare several.
 
     \b
-    Writes DIR/muscle.toml, which every command accepts as NAME, and DIR/report.html with figures and data.
-    FILES may also be data sets of the library (see airmuscle list).
+    Writes DIR/muscle.toml, which every command accepts as NAME, and DIR/report.html with figures
+    and data. FILES may also be data sets of the library (see airmuscle list).
 
     \b
     Examples:
-      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
-      airmuscle fit bench.csv --characteristic ContractileSurface --braid "radius=10 mm, angle=24.4 deg"
-      airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix wall_thickness
-      airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
-      airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
-      airmuscle fit bench.csv --characteristic ContractileSurface --shape --free-contraction "3 bar=18 %"
-      airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
-      airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both --length-error "20 cm"
-      airmuscle fit muscles/*.csv --mapping rig.toml --compare --join /shared/fit    (on each machine)
-      airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
-      airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
+      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out
+      fit airmuscle fit bench.csv --characteristic ContractileSurface --braid "radius=10 mm,
+      angle=24.4 deg" airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix
+      wall_thickness airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4
+      --robust "10 N" airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000
+      --profile weak airmuscle fit bench.csv --characteristic ContractileSurface --shape
+      --free-contraction "3 bar=18 %" airmuscle fit runs/*.xlsx --mapping rig.toml --compare
+      --leave-out run airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both
+      --length-error "20 cm" airmuscle fit muscles/*.csv --mapping rig.toml --compare --join
+      /shared/fit    (on each machine) airmuscle fit log_held*.csv --file-name "held{length [mm]}mm"
+      --time uniform --resting-length "200 mm" --compare airmuscle evaluate fit/muscle.toml
+      --pressure "3 bar" --force "100 N"
     """
     processes = (execution.workers, execution.dask, execution.join)
     if processes != (None, None, None) and not (request.compare or request.bootstrap):
         raise RequestError(
-            "--workers, --dask and --join distribute the candidates of --compare and the refits of --bootstrap"
+            "--workers, --dask and --join distribute the candidates of --compare and the refits of"
+            " --bootstrap"
         )
     recordings = read_recordings(files, reading)
     writes = execution.writes(out)
     progress = progress_bars("comparison" if request.compare else "fit")
     with execution.executor() as executor, progress as show:
-        found = fit_requested(request, files, recordings, lambda _, fraction: show("", fraction), executor)
+        found = fit_requested(
+            request, files, recordings, lambda _, fraction: show("", fraction), executor
+        )
     muscle = {"muscle.toml": to_toml(found.entry)}
     writes = writes or execution.takes_over(out)
     deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle, writes=writes)
@@ -66,19 +84,26 @@ class VolumeRequest:
     """What the fit of a volume is asked for."""
 
     muscle: str | None = optional("Muscle whose geometry is replaced, for the Maxwell defect.")
-    temperature: float = option("Temperature of the air at both ends of a fill.", unit="K", default="293.15 K")
+    temperature: float = option(
+        "Temperature of the air at both ends of a fill.", unit="K", default="293.15 K"
+    )
 
 
 @with_requests
 def fit_volume_command(
-    files: Files, request: VolumeRequest, reading: ReadingRequest, out: Folder = Path("volume"), json: Json = False
+    files: Files,
+    request: VolumeRequest,
+    reading: ReadingRequest,
+    out: Folder = Path("volume"),
+    json: Json = False,
 ) -> None:
     """Fit the volume of a muscle over its contraction.
 
     \b
-    FILES are of a water column (volume over contraction or length) or of fills at held lengths (pressure, and
-    air_mass or mass_flow). Of a braid and polynomials, the law chosen by AICc is written, with its standard deviation.
-    With --muscle, DIR/muscle.toml is the muscle with this volume, and the Maxwell defect dF/dp + dV/dL is stated.
+    FILES are of a water column (volume over contraction or length) or of fills at held lengths
+    (pressure, and air_mass or mass_flow). Of a braid and polynomials, the law chosen by AICc is
+    written, with its standard deviation. With --muscle, DIR/muscle.toml is the muscle with this
+    volume, and the Maxwell defect dF/dp + dV/dL is stated.
 
     \b
     Examples:
@@ -88,31 +113,48 @@ def fit_volume_command(
     entry = None if request.muscle is None else load_law(request.muscle)
     check_writable(out)
     recordings = read_recordings(files, reading)
-    points, lengths = volume_points(recordings, request.temperature), resting_lengths(recordings)
+    points = volume_points(recordings, request.temperature)
+    lengths = resting_lengths(recordings)
     own = getattr(getattr(entry, "geometry", None), "resting_length", None)
     others = [] if own is None else [each for each in lengths if abs(each - own) > 1e-6]
     if entry is not None and others:
         raise ParameterError(
-            f"the resting length of the data is {others[0]:.4g} m, that of {entry.name} {own:.4g} m. "
-            "Correct one of them."
+            f"the resting length of the data is {others[0]:.4g} m, that of {entry.name} {own:.4g}"
+            " m. Correct one of them."
         )
-    length = float(own) if own is not None and not lengths else check_one_length(lengths, "a muscle")
+    length = (
+        float(own) if own is not None and not lengths else check_one_length(lengths, "a muscle")
+    )
     fit = fit_volume(points, length)
     if entry is None:
         chapter = fit.chapter(f"Volume fitted to {list_files([f.stem for f in files])}")
         contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
     else:
-        law, limits, defect = entry.characteristic, None, None
-        stated, data = validity_range_of(law, entry.validity_range), fit.points.contraction
+        law = entry.characteristic
+        limits = None
+        defect = None
+        stated = validity_range_of(law, entry.validity_range)
+        data = fit.points.contraction
         if stated is not None:  # within the contractions of the data
-            low, high = max(stated.min_contraction, float(data.min())), min(stated.max_contraction, float(data.max()))
-            limits = ValidityRange(stated.min_pressure, stated.max_pressure, low, high) if low < high else None
+            low = max(stated.min_contraction, float(data.min()))
+            high = min(stated.max_contraction, float(data.max()))
+            limits = (
+                ValidityRange(stated.min_pressure, stated.max_pressure, low, high)
+                if low < high
+                else None
+            )
         with contextlib.suppress(PhysicsError):  # slack everywhere
             defect = None if limits is None else maxwell_defect(law, fit.geometry, limits)
         chapter = fit.chapter(entry.title, None if limits is None else law, limits, defect)
         note = f"Volume fitted to {list_files([f.name for f in files])}: {fit.summary}."
-        fitted = dataclasses.replace(entry, name="muscle", geometry=fit.geometry, provenance="fitted",
-                                     note=" ".join(filter(None, (entry.note, note))), checks=())  # fmt: skip
+        fitted = dataclasses.replace(
+            entry,
+            name="muscle",
+            geometry=fit.geometry,
+            provenance="fitted",
+            note=" ".join(filter(None, (entry.note, note))),
+            checks=(),
+        )
         contents = {"muscle.toml": to_toml(fitted)}
     chapters = [chapter, *reading_chapters(recordings)]
     deliver("fit-volume", chapters, json=json, out=out, title="Volume", files=contents)
@@ -138,13 +180,15 @@ class ApproximateRequest:
 
 
 @with_requests
-def approximate(name: Name, model: Model, request: ApproximateRequest, out: Out = None, json: Json = False) -> None:
+def approximate(
+    name: Name, model: Model, request: ApproximateRequest, out: Out = None, json: Json = False
+) -> None:
     """Approximate one characteristic by another.
 
     \b
-    The error is the difference in force, where the original force is positive, over the validity range of the muscle
-    or the range given by the options. With --out, FILE is the muscle with the other characteristic; its other parts
-    are unchanged.
+    The error is the difference in force, where the original force is positive, over the validity
+    range of the muscle or the range given by the options. With --out, FILE is the muscle with the
+    other characteristic; its other parts are unchanged.
 
     \b
     Examples:
@@ -154,22 +198,37 @@ def approximate(name: Name, model: Model, request: ApproximateRequest, out: Out 
     entry = load_law(name)
     stated: Any = {name: getattr(request, name) for name in LIMITS}
     default = validity_range_of(entry.characteristic, entry.validity_range)
-    stated = {n: getattr(default, n, None) if value is None else value for n, value in stated.items()}
-    if missing := [f"--{name.replace('_', '-')}" for name, value in stated.items() if value is None]:
-        raise ParameterError(f"{entry.name} has no validity range for the approximation; give {', '.join(missing)}.")
+    stated = {
+        n: getattr(default, n, None) if value is None else value for n, value in stated.items()
+    }
+    if missing := [
+        f"--{name.replace('_', '-')}" for name, value in stated.items() if value is None
+    ]:
+        raise ParameterError(
+            f"{entry.name} has no validity range for the approximation; give {', '.join(missing)}."
+        )
     limits = ValidityRange(**stated)
     grid = sample_on_grid(entry.characteristic, limits, GRID_POINTS)
     length = getattr(entry.geometry, "resting_length", None)
     data = grid if length is None else grid.with_constants(resting_length=length)
     initial, _ = find_initial_law(model, [data], request.degree, "MODEL")
     found = approximate_law(entry.characteristic, initial.characteristic, limits)
-    chapter, original = found.chapter(), type(entry.characteristic).__name__
+    chapter = found.chapter()
+    original = type(entry.characteristic).__name__
     if out is not None:
         note = f"Approximated from {entry.name}: {found.summary}. {entry.note}".strip()
         other = dataclasses.replace(
-            entry, name="muscle", title=f"{type(found.model).__name__} in place of {original}: {entry.title}",
-            provenance="fitted", note=note, characteristic=found.model, validity_range=found.validity_range, checks=(),
-        )  # fmt: skip
+            entry,
+            name="muscle",
+            title=f"{type(found.model).__name__} in place of {original}: {entry.title}",
+            provenance="fitted",
+            note=note,
+            characteristic=found.model,
+            validity_range=found.validity_range,
+            checks=(),
+        )
         save(other, out)
     title = f"{entry.name}, {original}, by {chapter.title}"
-    print_result([dataclasses.replace(chapter, title=title)], {} if out is None else {"muscle": out}, json)
+    print_result(
+        [dataclasses.replace(chapter, title=title)], {} if out is None else {"muscle": out}, json
+    )

@@ -17,7 +17,9 @@ from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, argument, with_requests
 from .terminal import echo
 
-Study = Annotated[Path, argument("STUDY.toml", "A file with [plant], [observed], [fit] and [[record]].")]
+Study = Annotated[
+    Path, argument("STUDY.toml", "A file with [plant], [observed], [fit] and [[record]].")
+]
 
 
 @request
@@ -25,22 +27,30 @@ class DynamicFitRequest:
     """What a dynamic fit is asked for beyond its file."""
 
     profile: tuple[str, ...] = many(
-        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.", metavar="PARAMETER",
-    )  # fmt: skip
-    points: int = option("Values of a profile on either side of the estimate.", default=5, bounds=(2, 50))
-    starts: int | None = optional("Number of initial guesses; default: that of the file.", bounds=(1, 10_000))
+        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.",
+        metavar="PARAMETER",
+    )
+    points: int = option(
+        "Values of a profile on either side of the estimate.", default=5, bounds=(2, 50)
+    )
+    starts: int | None = optional(
+        "Number of initial guesses; default: that of the file.", bounds=(1, 10_000)
+    )
 
 
 @with_requests
-def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dynamic"), json: Json = False) -> None:
+def fit_dynamic(
+    study: Study, request: DynamicFitRequest, out: Folder = Path("dynamic"), json: Json = False
+) -> None:
     """Identify plant parameters from transient records.
 
     \b
-    Parameters of valves, gas, volume, damping, friction and mass are estimated from records of filling, discharge and
-    release. Several records are cross-predicted: each by the common parameters of the others, which the output states
-    first. Reports parameter combinations that the records do not determine, and the experiment that would.
-    Writes DIR/report.html and the identified plant as a scenario, DIR/scenario.toml (DIR/scenario-1.toml and so on
-    for several records).
+    Parameters of valves, gas, volume, damping, friction and mass are estimated from records of
+    filling, discharge and release. Several records are cross-predicted: each by the common
+    parameters of the others, which the output states first. Reports parameter combinations that the
+    records do not determine, and the experiment that would. Writes DIR/report.html and the
+    identified plant as a scenario, DIR/scenario.toml (DIR/scenario-1.toml and so on for several
+    records).
 
     \b
     Examples:
@@ -50,11 +60,17 @@ def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dy
     """
     loaded = load_dynamic_fit(study)
     if request.starts is not None:
-        loaded = dataclasses.replace(loaded, search=dataclasses.replace(loaded.search, starts=request.starts))
+        loaded = dataclasses.replace(
+            loaded, search=dataclasses.replace(loaded.search, starts=request.starts)
+        )
     check_writable(out)
     recordings = [experiment.recording for experiment in loaded.experiments]
     notes = row_notes(recordings)
-    findings = [f"{each.origin}: {finding.text}" for each in recordings for finding in inspect(each).findings]
+    findings = [
+        f"{each.origin}: {finding.text}"
+        for each in recordings
+        for finding in inspect(each).findings
+    ]
     if not json:
         counts = ((len(loaded.experiments), "record"), (loaded.search.starts, "start"))
         echo("  " + ", ".join(counted(*each) for each in counts), err=True)
@@ -62,8 +78,14 @@ def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dy
     cross = loaded.cross_predictions(fit)
     fit = fit.with_scatter_of_records([each.common for each in cross])
     weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
-    wanted = [*(weak if WEAK in request.profile else ()), *(name for name in request.profile if name != WEAK)]
-    profiles = [fit.profile(name, request.points) for name in dict.fromkeys(fit[name].name for name in wanted)]
+    wanted = [
+        *(weak if WEAK in request.profile else ()),
+        *(name for name in request.profile if name != WEAK),
+    ]
+    profiles = [
+        fit.profile(name, request.points)
+        for name in dict.fromkeys(fit[name].name for name in wanted)
+    ]
     count = len(loaded.experiments)
     names = ["scenario.toml"] if count == 1 else [f"scenario-{i + 1}.toml" for i in range(count)]
     files = {name: loaded.scenario(fit, i, cross) for i, name in enumerate(names)}
@@ -83,15 +105,19 @@ class RegulatorRequest:
 
 @with_requests
 def fit_regulator_command(
-    files: Files, request: RegulatorRequest, reading: ReadingRequest, out: Folder = Path("regulator"),
+    files: Files,
+    request: RegulatorRequest,
+    reading: ReadingRequest,
+    out: Folder = Path("regulator"),
     json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Identify a pressure regulator from its response.
 
     \b
-    FILES have the columns time, setpoint (the command as a pressure) and pressure (at the outlet). The parameters of a
-    PressureRegulator are estimated as by fit-dynamic. What the records excite too little is named, with the command
-    that would determine it. Writes DIR/report.html, DIR/regulator.toml (the circuit) and DIR/scenario.toml.
+    FILES have the columns time, setpoint (the command as a pressure) and pressure (at the outlet).
+    The parameters of a PressureRegulator are estimated as by fit-dynamic. What the records excite
+    too little is named, with the command that would determine it. Writes DIR/report.html,
+    DIR/regulator.toml (the circuit) and DIR/scenario.toml.
 
     \b
     Examples:
@@ -100,7 +126,11 @@ def fit_regulator_command(
     check_writable(out)
     recordings = read_recordings(files, reading)
     result = fit_regulator(
-        recordings, supply_pressure=request.supply, starts=request.starts, volume=request.volume, noise=request.noise
+        recordings,
+        supply_pressure=request.supply,
+        starts=request.starts,
+        volume=request.volume,
+        noise=request.noise,
     )
     title = f"Regulator fitted to {list_files([f.name for f in files])}"
     low, high = (float(edge(recordings[0]["setpoint"])) for edge in (min, max))
@@ -112,4 +142,6 @@ def fit_regulator_command(
         "scenario.toml": scenario_toml(title, result.plant, step, run, of_scenario),
     }
     chapters = [*regulator_chapters(result, title), *reading_chapters(recordings)]
-    deliver("fit-regulator", chapters, json=json, out=out, title="Pressure regulator", files=contents)
+    deliver(
+        "fit-regulator", chapters, json=json, out=out, title="Pressure regulator", files=contents
+    )

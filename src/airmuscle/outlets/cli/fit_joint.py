@@ -9,7 +9,9 @@ from .delivery import deliver
 from .options import Folder, Json, argument, with_requests
 from .terminal import echo
 
-Episodes = Annotated[Path, argument("EPISODES", "A folder of episodes or bags, or one file with all.")]
+Episodes = Annotated[
+    Path, argument("EPISODES", "A folder of episodes or bags, or one file with all.")
+]
 
 
 @with_requests
@@ -19,18 +21,20 @@ def fit_joint_command(
     """Identify a joint or an arm from its episodes.
 
     \b
-    Episodes are short records with angles of the joints and pressures of their muscles: CSV, NPZ, JSON, HDF5,
-    Parquet, ROS bags or RLDS-like steps, one file each or one for all. The mapping file says which column is what,
-    in which unit, and may state the muscles of each joint and the axes of the joints; without one it is proposed.
-    The free run is judged on the last episodes, beside persistence and a linear ARX model. Writes DIR/report.html,
-    DIR/scenario.toml, the arm with a pressure regulator for each muscle and the covariance of its parameters, and
+    Episodes are short records with angles of the joints and pressures of their muscles: CSV, NPZ,
+    JSON, HDF5, Parquet, ROS bags or RLDS-like steps, one file each or one for all. The mapping file
+    says which column is what, in which unit, and may state the muscles of each joint and the axes
+    of the joints; without one it is proposed. The free run is judged on the last episodes, beside
+    persistence and a linear ARX model. Writes DIR/report.html, DIR/scenario.toml, the arm with a
+    pressure regulator for each muscle and the covariance of its parameters, and
     DIR/controlled.toml, the same with a controller of each angle to be tuned.
 
     \b
     Examples:
       airmuscle fit-joint episodes/ --mapping arm.toml --inspect
       airmuscle fit-joint episodes.npz --mapping arm.toml --out arm
-      airmuscle fit-joint episodes --mapping arm.toml --known joint.toml --free mechanism.inertia --free zeros
+      airmuscle fit-joint episodes --mapping arm.toml --known joint.toml --free mechanism.inertia
+      --free zeros
     """
     if request.inspect:
         echo(str(inspect_requested(source, request)))

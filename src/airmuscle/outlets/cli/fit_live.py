@@ -9,7 +9,14 @@ from typing import Any
 
 from ...bench.identify import BenchLimits, RecursiveFit
 from ...bench.readers import RowReader, follow_lines
-from ...core import ColumnError, IdentificationError, atomic_folder, check_writable, contraction_text, quantity_text
+from ...core import (
+    ColumnError,
+    IdentificationError,
+    atomic_folder,
+    check_writable,
+    contraction_text,
+    quantity_text,
+)
 from ...files.library import Entry, save
 from ...physics.muscle.characteristic import ValidityRange
 from ..requests.declaration import option, request
@@ -30,7 +37,9 @@ def same(name: str) -> Any:
 class LiveRequest:
     """Limits of the test rig, how the rows are read, and the surface."""
 
-    follow: str = option("Growing file, pipe or serial port; '-' for standard input.", metavar="FILE")
+    follow: str = option(
+        "Growing file, pipe or serial port; '-' for standard input.", metavar="FILE"
+    )
     max_pressure: float = option("Maximum pressure, such as '6 bar'.", unit="Pa")
     max_force: float = option("Maximum force of the test rig, such as '1 kN'.", unit="N")
     min_pressure: float = option("Minimum pressure.", unit="Pa", default="0 kPa")
@@ -44,11 +53,18 @@ class LiveRequest:
     skip_rows: int | None = same("skip_rows")
     degree: int = option("Degree of the polynomial surface.", default=5, bounds=(1, 9))
     forgetting: float = option(
-        "Weight of the former samples at each sample; 1: none is forgotten.", default=1.0, metavar="FACTOR"
+        "Weight of the former samples at each sample; 1: none is forgotten.",
+        default=1.0,
+        metavar="FACTOR",
     )
-    every: int = option("Samples between two lines of the output.", default=1000, bounds=(1, math.inf))
+    every: int = option(
+        "Samples between two lines of the output.", default=1000, bounds=(1, math.inf)
+    )
     idle: float = option(
-        "End when no row has come for so long.", default=10.0, bounds=(0.0, math.inf), metavar="SECONDS"
+        "End when no row has come for so long.",
+        default=10.0,
+        bounds=(0.0, math.inf),
+        metavar="SECONDS",
     )
 
 
@@ -57,25 +73,31 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
     """Fit a surface while rows arrive; name the next point.
 
     \b
-    Each row (pressure, contraction or length, force) updates the surface by recursive least squares. The next point is
-    the most informative one (D-optimal) within the limits of the test rig.
-    With --out, DIR/muscle.toml contains the surface at the end of the stream.
+    Each row (pressure, contraction or length, force) updates the surface by recursive least
+    squares. The next point is the most informative one (D-optimal) within the limits of the test
+    rig. With --out, DIR/muscle.toml contains the surface at the end of the stream.
 
     \b
     Examples:
       airmuscle fit-live --follow log.csv --max-pressure "6 bar" --max-force "1 kN" --out live
-      cat /dev/ttyUSB0 | airmuscle fit-live --follow - --column "1=pressure [kPa]" --column "2=contraction [%]"
-      --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
+      cat /dev/ttyUSB0 | airmuscle fit-live --follow - --column "1=pressure [kPa]" --column
+      "2=contraction [%]" --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
     """
     pressures = request.min_pressure, request.max_pressure
     limits = ValidityRange(*pressures, request.min_contraction, request.max_contraction)
     if out is not None:
         check_writable(out)
-    given = {name: value for name, value in vars(request).items() if name in ReadingRequest.__dataclass_fields__}
+    given = {
+        name: value
+        for name, value in vars(request).items()
+        if name in ReadingRequest.__dataclass_fields__
+    }
     reading = ReadingRequest(**given)
     origin = "standard input" if request.follow == "-" else Path(request.follow).name
     reader = RowReader(origin, reading.column_mapping())
-    fit = RecursiveFit(BenchLimits(limits, request.max_force), request.degree, forgetting=request.forgetting)
+    fit = RecursiveFit(
+        BenchLimits(limits, request.max_force), request.degree, forgetting=request.forgetting
+    )
     _finish(_follow(fit, reader, request, json), reader, out, json)
 
 
@@ -83,7 +105,9 @@ def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bo
     """The fit to all rows until the stream ends or the user interrupts it."""
     printed = 0
     try:
-        for line in follow_lines(sys.stdin if request.follow == "-" else request.follow, idle=request.idle):
+        for line in follow_lines(
+            sys.stdin if request.follow == "-" else request.follow, idle=request.idle
+        ):
             row = reader.read(line)
             if row is None:
                 continue
@@ -93,8 +117,8 @@ def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bo
                 if name := next((each for each in QUANTITIES if each not in row), ""):
                     remedy = " or a length with --resting-length" if name == "contraction" else ""
                     raise ColumnError(
-                        f"{reader.origin}: there is no {name}{remedy}; the columns are {', '.join(row)}. Name it with "
-                        f"--column 'NUMBER={name} [unit]'."
+                        f"{reader.origin}: there is no {name}{remedy}; the columns are"
+                        f" {', '.join(row)}. Name it with --column 'NUMBER={name} [unit]'."
                     )
             fit = fit.updated(*(row[name] for name in QUANTITIES))
             if fit.samples >= printed + request.every:
@@ -109,32 +133,46 @@ def _report(fit: RecursiveFit, json: bool) -> None:
     """One line on the fit and the next point."""
     point = fit.next_point()
     if json:
-        report = {"samples": fit.samples, "rmse": fit.rmse, "determined": fit.determined, "next": point._asdict()}
+        report = {
+            "samples": fit.samples,
+            "rmse": fit.rmse,
+            "determined": fit.determined,
+            "next": point._asdict(),
+        }
         echo(dumps(report))  # one line for each report, for a program that reads them as they come
         return
     echo(
-        f"{fit.samples} samples, rms residual {fit.rmse:.4g} N, force determined on {100 * fit.determined:.0f} % of "
-        f"the range; next: {quantity_text(point.pressure, 'Pa', 'kPa')}, {contraction_text(point.contraction)} "
-        f"(expected {point.force:.4g} ± {2 * point.standard_error:.2g} N)"
+        f"{fit.samples} samples, rms residual {fit.rmse:.4g} N, force determined on"
+        f" {100 * fit.determined:.0f} % of the range; next:"
+        f" {quantity_text(point.pressure, 'Pa', 'kPa')}, {contraction_text(point.contraction)}"
+        f" (expected {point.force:.4g} ± {2 * point.standard_error:.2g} N)"
     )
 
 
 def _finish(fit: RecursiveFit, reader: RowReader, out: Path | None, json: bool) -> None:
-    """The result at the end of the stream. Raises IdentificationError if there are no samples within the limits."""
+    """The result at the end of the stream. Raises IdentificationError if there are no samples
+    within the limits.
+    """
     if not fit.samples:
         raise IdentificationError(
-            f"{reader.origin}: no row lies within the limits of the test rig ({fit.outside} outside, {reader.skipped} "
-            "unreadable). Check the units and the limits."
+            f"{reader.origin}: no row lies within the limits of the test rig ({fit.outside}"
+            f" outside, {reader.skipped} unreadable). Check the units and the limits."
         )
     _report(fit, json)
     if fit.outside or reader.skipped:
-        echo(f"note: left out: {fit.outside} rows outside the limits, {reader.skipped} unreadable rows", err=True)
+        echo(
+            f"note: left out: {fit.outside} rows outside the limits, {reader.skipped} unreadable"
+            " rows",
+            err=True,
+        )
     if out is None:
         return
     model = fit.model
     title = f"Surface fitted while {reader.origin} was measured"
     note = f"{fit.samples} samples, rms residual {fit.rmse:.4g} N; recursive least squares."
     with atomic_folder(out) as folder:
-        save(Entry("muscle", title, "fitted", model, note=note, validity_range=model.validity_range),
-             folder / "muscle.toml")  # fmt: skip
+        save(
+            Entry("muscle", title, "fitted", model, note=note, validity_range=model.validity_range),
+            folder / "muscle.toml",
+        )
     echo(f"muscle: {out / 'muscle.toml'}", err=json)

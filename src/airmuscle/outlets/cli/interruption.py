@@ -1,4 +1,6 @@
-"""Deferred handling of SIGINT (Ctrl-C), so that no interruption of the command `airmuscle` is lost."""
+"""Deferred handling of SIGINT (Ctrl-C), so that no interruption of the command `airmuscle` is
+lost.
+"""
 
 import contextlib
 import signal
@@ -15,20 +17,28 @@ _received = threading.Event()
 
 @contextlib.contextmanager
 def deferred_sigint() -> Iterator[None]:
-    """Within the block SIGINT raises KeyboardInterrupt; if that exception is lost, the end of the block raises it.
+    """Within the block SIGINT raises KeyboardInterrupt; if that exception is lost, the end of the
+    block raises it.
 
-    Python discards exceptions raised in a destructor or in the callback of a weak reference, and imports run many of
-    these; an extension module whose import is interrupted raises ImportError instead. Blocks may be nested. Outside
-    the main thread, and where SIGINT is ignored (a background job of a shell) or has another handler, the block
-    changes nothing.
+    Python discards exceptions raised in a destructor or in the callback of a weak reference, and
+    imports run many of these; an extension module whose import is interrupted raises ImportError
+    instead. Blocks may be nested. Outside the main thread, and where SIGINT is ignored (a
+    background job of a shell) or has another handler, the block changes nothing.
     """
-    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    handler = (
+        signal.getsignal(signal.SIGINT)
+        if threading.current_thread() is threading.main_thread()
+        else None
+    )
     if handler not in (signal.default_int_handler, _receive):
         yield
         return
-    outermost, report_unraisable = handler is not _receive, sys.unraisablehook
+    outermost = handler is not _receive
+    report_unraisable = sys.unraisablehook
 
-    def report_others(discarded: Any) -> None:  # but no interruption, which the end of the block raises
+    def report_others(
+        discarded: Any,
+    ) -> None:  # but no interruption, which the end of the block raises
         if not issubclass(discarded.exc_type, KeyboardInterrupt):
             report_unraisable(discarded)
 
@@ -50,7 +60,9 @@ def deferred_sigint() -> Iterator[None]:
 
 
 def check_interrupted() -> None:
-    """Raise KeyboardInterrupt if SIGINT was received within a block; long computations call this repeatedly."""
+    """Raise KeyboardInterrupt if SIGINT was received within a block; long computations call this
+    repeatedly.
+    """
     if _received.is_set():
         raise KeyboardInterrupt
 

@@ -1,4 +1,6 @@
-"""Entries of the library: `airmuscle list`, `show`, `cite`, and `evaluate` at an operating point."""
+"""Entries of the library: `airmuscle list`, `show`, `cite`, and `evaluate` at an operating
+point.
+"""
 
 import dataclasses
 import itertools
@@ -27,12 +29,18 @@ from .terminal import echo, print_json, print_table
 class EntryRequest:
     """How an entry differs from its file."""
 
-    resting_length: str | None = optional("Scale the muscle to this resting length: '200 mm'.", metavar="QUANTITY")
-    diameter: str | None = optional("Scale a McKibben muscle to this braid diameter at rest.", metavar="QUANTITY")
+    resting_length: str | None = optional(
+        "Scale the muscle to this resting length: '200 mm'.", metavar="QUANTITY"
+    )
+    diameter: str | None = optional(
+        "Scale a McKibben muscle to this braid diameter at rest.", metavar="QUANTITY"
+    )
     set: tuple[Any, ...] = many(
-        "Another value of a parameter, by its path: characteristic.slope_factor=2, 'geometry.radius=10 mm'. "
-        "Repeatable.", metavar="PATH=VALUE", read=read_pair,
-    )  # fmt: skip
+        "Another value of a parameter, by its path: characteristic.slope_factor=2,"
+        " 'geometry.radius=10 mm'. Repeatable.",
+        metavar="PATH=VALUE",
+        read=read_pair,
+    )
 
     def load(self, name: str, find: Callable[[str], Any] = load_law) -> Any:
         """The entry of a name or file, as changed. Raises ParameterError or UnitError."""
@@ -43,15 +51,22 @@ class EntryRequest:
 
 
 def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
-    """The entry with other values, [SI] or texts, by path; a law loses standard errors, error band and checks."""
+    """The entry with other values, [SI] or texts, by path; a law loses standard errors, error band
+    and checks.
+    """
     if not changes:
         return entry
     parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
     known = {f"{name}.{leaf.path}": leaf for name, part in parts.items() for leaf in leaves(part)}
     check_known(f"{entry.name} has no parameter", changes, known, "its parameters are")
-    values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
+    values = {
+        path: quantity(value, known[path].declared.unit, where=path)
+        for path, value in changes.items()
+    }
     changed = {
-        name: with_parameters(part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)])
+        name: with_parameters(
+            part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)]
+        )
         for name, part in parts.items()
         if any(path.startswith(f"{name}.") for path in values)
     }
@@ -62,9 +77,15 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
         return dataclasses.replace(entry, **changed)
     stated = ", ".join(f"{path} = {value:.6g}" for path, value in values.items())
     return dataclasses.replace(
-        entry, **changed, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(),
-        error_band=None, note=f"Changed (SI): {stated}. {entry.note}".strip(),
-    )  # fmt: skip
+        entry,
+        **changed,
+        title=f"{entry.title}, parameters changed",
+        provenance="chosen",
+        uncertainty=None,
+        checks=(),
+        error_band=None,
+        note=f"Changed (SI): {stated}. {entry.note}".strip(),
+    )
 
 
 @request
@@ -72,7 +93,8 @@ class EvaluateRequest:
     """Two of pressure, contraction and force."""
 
     pressure: float | None = optional(
-        "Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara' (at 101.325 kPa ambient).", unit="Pa"
+        "Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara' (at 101.325 kPa ambient).",
+        unit="Pa",
     )
     contraction: float | None = optional("Contraction: 0.12 or '12 %'.", unit="1")
     force: float | None = optional("Tension with unit: '100 N', '0.1 kN'.", unit="N")
@@ -81,7 +103,9 @@ class EvaluateRequest:
         """Raise RequestError unless two quantities are given."""
         if len(self.given) != 2:
             pressure, contraction, force = map(where, UNITS)
-            raise RequestError(f"give two of {pressure}, {contraction} and {force}, not {len(self.given)}")
+            raise RequestError(
+                f"give two of {pressure}, {contraction} and {force}, not {len(self.given)}"
+            )
 
     @property
     def given(self) -> dict[str, float]:
@@ -91,32 +115,49 @@ class EvaluateRequest:
 
 @with_requests
 def evaluate(
-    name: Name, point: EvaluateRequest, variant: EntryRequest, out: OptionalFolder = None, json: Json = False
+    name: Name,
+    point: EvaluateRequest,
+    variant: EntryRequest,
+    out: OptionalFolder = None,
+    json: Json = False,
 ) -> None:
     """Evaluate a law for two of pressure, contraction and force.
 
     \b
     If several solutions exist, the result is the one reached from the state of rest.
-    A point that the maker does not permit is refused, or, where it was measured, reported with a warning.
-    With --out, DIR/isobars.png and DIR/isobars.csv show force over contraction, with the operating point.
+    A point that the maker does not permit is refused, or, where it was measured, reported with a
+    warning. With --out, DIR/isobars.png and DIR/isobars.csv show force over contraction, with the
+    operating point.
 
     \b
     Examples:
       airmuscle evaluate dmsp-20-300 --pressure "3 bar" --force "100 N"
       airmuscle evaluate dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
-      airmuscle evaluate tondu-lopez --diameter "30 mm" --resting-length "200 mm" --pressure "3 bar" --force "100 N"
-      airmuscle evaluate saga2007 --set characteristic.slope_factor=2 --pressure "1 bar" --contraction "5 %"
-      airmuscle evaluate my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
+      airmuscle evaluate tondu-lopez --diameter "30 mm" --resting-length "200 mm" --pressure "3 bar"
+      --force "100 N" airmuscle evaluate saga2007 --set characteristic.slope_factor=2 --pressure "1
+      bar" --contraction "5 %" airmuscle evaluate my/muscle.toml --pressure "400 kPa" --contraction
+      0.1 --json
     """
     found = evaluate_entry(variant.load(name), point.given)
     chapter = found.chapter()
     print_result([chapter], {}, json)
     if out is not None:
-        write_result(out, [], "", {
-            "isobars.csv": lambda path: save_table(found.isobar_table(), path),
-            "isobars.png": lambda path: path.write_bytes(rendered_figure(chapter.plots[0])["png"]),
-        })  # fmt: skip
-        echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({describe_point(found.point)})", err=json)
+        write_result(
+            out,
+            [],
+            "",
+            {
+                "isobars.csv": lambda path: save_table(found.isobar_table(), path),
+                "isobars.png": lambda path: path.write_bytes(
+                    rendered_figure(chapter.plots[0])["png"]
+                ),
+            },
+        )
+        echo(
+            f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'}"
+            f" ({describe_point(found.point)})",
+            err=json,
+        )
 
 
 @with_requests
@@ -141,11 +182,12 @@ def show(name: Name, variant: EntryRequest, json: Json = False) -> None:
 def list_entries(json: Json = False) -> None:
     """List muscles, laws, valves, plants, products and data sets.
 
-    A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
-    A product states the values that the maker of a muscle permits. A valve is used in a scenario as { library = NAME },
-    and a plant as [plant] library = NAME; `airmuscle simulate NAME` runs its example. A data set is used as FILES of
-    `airmuscle fit`; that of a specimen is listed with its law. The provenance is the origin of the numbers: printed,
-    measured, data sheet, secondary source, fitted or chosen.
+    A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved
+    for the force. A product states the values that the maker of a muscle permits. A valve is used
+    in a scenario as { library = NAME }, and a plant as [plant] library = NAME; `airmuscle simulate
+    NAME` runs its example. A data set is used as FILES of `airmuscle fit`; that of a specimen is
+    listed with its law. The provenance is the origin of the numbers: printed, measured, data sheet,
+    secondary source, fitted or chosen.
 
     \b
     Examples:
@@ -160,23 +202,31 @@ def list_entries(json: Json = False) -> None:
 
 
 def _library_rows() -> list[dict[str, str]]:
-    """All library entries, valves, plants and data sets, read from the files without building any model."""
+    """All library entries, valves, plants and data sets, read from the files without building any
+    model.
+    """
     kinds: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "muscle or law": _law_kind,
         "valve": lambda tables: f"valve, {tables['valve']['model']}",
         "plant": lambda tables: f"plant, {tables['plant']['mechanism']['model']}",
         "product": lambda _: "product, Ratings",
     }
-    data, rows = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}, []
+    data = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}
+    rows = []
     for noun, kind_of in kinds.items():
         for name in list_names(FOLDERS[noun]):
             tables = tomllib.loads((FOLDERS[noun] / f"{name}.toml").read_text(encoding="utf-8"))
-            kind, provenance = kind_of(tables), tables["provenance"]
+            kind = kind_of(tables)
+            provenance = tables["provenance"]
             if kind_of is _law_kind and name in data:  # one row with the data set of the same name
                 measured = data.pop(name)
                 kind = f"{kind}; {measured['kind']}"
-                provenance = "; ".join(filter(None, dict.fromkeys((provenance, measured["provenance"]))))
-            rows.append({"name": name, "title": tables["title"], "kind": kind, "provenance": provenance})
+                provenance = "; ".join(
+                    filter(None, dict.fromkeys((provenance, measured["provenance"])))
+                )
+            rows.append(
+                {"name": name, "title": tables["title"], "kind": kind, "provenance": provenance}
+            )
     return [*rows, *data.values()]
 
 
@@ -222,7 +272,9 @@ def cite(name: Name, json: Json = False, bibtex: Bibtex = False) -> None:
 
 
 def as_bibtex(source: Reference) -> str:
-    """A BibTeX entry of type @misc, which every bibliography style supports, with `and` between its authors."""
+    """A BibTeX entry of type @misc, which every bibliography style supports, with `and` between its
+    authors.
+    """
     separated = re.sub(r"(?:(?<=\.),|;) ", " and ", source.authors)
     fields = {
         "author": _escape(re.sub(r",? et al\.?", " and others", separated)),

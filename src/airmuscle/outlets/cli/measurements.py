@@ -1,5 +1,5 @@
-"""Measurement files as arguments of a command, with the options that complete them; `airmuscle inspect` and `airmuscle
-convert`: such files before a fit, and in another file format."""
+"""Measurement files as arguments of a command, with the options that complete them; `airmuscle
+inspect` and `airmuscle convert`: such files before a fit, and in another file format."""
 
 import dataclasses
 import math
@@ -24,9 +24,16 @@ from .delivery import deliver
 from .options import Json, OptionalFolder, argument, complete_data, with_requests
 from .terminal import echo, print_json, progress_bars
 
-MEASURED = "CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
+MEASURED = (
+    "CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
+)
 Files = Annotated[list[Path], argument("FILES", MEASURED, complete_data)]
-_OPTIONS = {"units": "unit", "columns": "column", "constants": "constant", "drop_outliers": "outliers"}
+_OPTIONS = {
+    "units": "unit",
+    "columns": "column",
+    "constants": "constant",
+    "drop_outliers": "outliers",
+}
 """Options by the names of their fields, where these differ."""
 
 
@@ -37,22 +44,28 @@ def print_row_notes(recordings: Iterable[Recording]) -> None:
 
 
 def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recording]:
-    """The recordings of the files, read together so that their units can be compared, then library data sets.
+    """The recordings of the files, read together so that their units can be compared, then library
+    data sets.
 
-    A name without suffix and folder that is not in the working directory is a data set of the library. Raises
-    ParameterError for options that a data set does not take.
+    A name without suffix and folder that is not in the working directory is a data set of the
+    library. Raises ParameterError for options that a data set does not take.
     """
     mapping = reading.column_mapping()
     local = {entry.name for entry in Path().iterdir()}
     names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
     paths = [f for f in files if f not in names]
     default = ColumnMapping()
-    fields = [f.name for f in dataclasses.fields(mapping) if getattr(mapping, f.name) != getattr(default, f.name)]
+    fields = [
+        f.name
+        for f in dataclasses.fields(mapping)
+        if getattr(mapping, f.name) != getattr(default, f.name)
+    ]
     named = dict.fromkeys([*fields, *mapping.constants])
     set_options = [f"--{_OPTIONS.get(name, name).replace('_', '-')}" for name in named]
     if names and set_options:
         raise ParameterError(
-            f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
+            f"{names[0]}: a data set of the library contains its units and constants; omit"
+            f" {', '.join(set_options)}."
         )
     with progress_bars() as progress:
         recordings = read(paths, mapping, progress=progress) if paths else ()
@@ -62,23 +75,31 @@ def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recordin
 
 
 def reading_chapters(recordings: Iterable[Recording]) -> list[Chapter]:
-    """One chapter with the notes on the rows that were left out or filled; none if all rows are as measured."""
+    """One chapter with the notes on the rows that were left out or filled; none if all rows are as
+    measured.
+    """
     notes = row_notes(recordings)
     return [Chapter("reading", "Rows left out or filled", "\n\n".join(notes))] if notes else []
 
 
-INSPECTED = "Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard input."
+INSPECTED = (
+    "Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard"
+    " input."
+)
 AnyFiles = Annotated[list[str], argument("FILES", INSPECTED)]
 
 
 @with_requests
-def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: OptionalFolder = None) -> None:
+def inspect(
+    files: AnyFiles, reading: ReadingRequest, json: Json = False, out: OptionalFolder = None
+) -> None:
     """Inspect measurement files: columns, runs, sampling, outliers.
 
     \b
-    Shows how the files are interpreted: columns and units, sampling, runs, branches, plateaus and suspected outliers.
-    The data are not changed. With --out, DIR/report.html shows all of each recording, with a figure.
-    Sensor properties are estimated from all files together, as from one test rig.
+    Shows how the files are interpreted: columns and units, sampling, runs, branches, plateaus and
+    suspected outliers. The data are not changed. With --out, DIR/report.html shows all of each
+    recording, with a figure. Sensor properties are estimated from all files together, as from one
+    test rig.
 
     \b
     Examples:
@@ -88,10 +109,18 @@ def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: O
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
-    unordered = ColumnMapping(time=RecordedTime(ordered=False))  # stamps that repeat or decrease are shown
+    unordered = ColumnMapping(
+        time=RecordedTime(ordered=False)
+    )  # stamps that repeat or decrease are shown
     with progress_bars() as progress:
         recordings = read(files, reading.column_mapping(unordered), progress=progress)
-    deliver("inspect", inspection_chapters(inspect_all(recordings)), json=json, out=out, title="Inspection")
+    deliver(
+        "inspect",
+        inspection_chapters(inspect_all(recordings)),
+        json=json,
+        out=out,
+        title="Inspection",
+    )
 
 
 Source = Annotated[str, argument("FILE", "A file, folder or glob pattern, as for inspect.")]
@@ -102,19 +131,27 @@ Target = Annotated[Path, argument("TARGET", f"The file to write: {', '.join(EXTE
 class ConvertRequest:
     """Form of the files that are written."""
 
-    plain: bool = option("CSV without comments, as pandas and spreadsheets expect it.", default=False)
-    max_rows: int | None = optional("Keep every n-th row, N at most; default: all rows.", bounds=(1, math.inf))
+    plain: bool = option(
+        "CSV without comments, as pandas and spreadsheets expect it.", default=False
+    )
+    max_rows: int | None = optional(
+        "Keep every n-th row, N at most; default: all rows.", bounds=(1, math.inf)
+    )
 
 
 @with_requests
 def convert(
-    source: Source, target: Target, request: ConvertRequest, reading: ReadingRequest, json: Json = False
+    source: Source,
+    target: Target,
+    request: ConvertRequest,
+    reading: ReadingRequest,
+    json: Json = False,
 ) -> None:
     """Write measurement files as CSV, Parquet or HDF5.
 
     \b
-    Values are in SI units, and all rows are kept. One recording becomes TARGET; several become files with a number
-    before the extension.
+    Values are in SI units, and all rows are kept. One recording becomes TARGET; several become
+    files with a number before the extension.
 
     \b
     Examples:
@@ -128,17 +165,31 @@ def convert(
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
     all_rows = 2**62  # no file has as many
-    recordings = read(source, reading.column_mapping(), downsampling=Decimation(request.max_rows or all_rows))
+    recordings = read(
+        source, reading.column_mapping(), downsampling=Decimation(request.max_rows or all_rows)
+    )
     print_row_notes(recordings)
-    numbered = [target.with_name(f"{target.stem}_{i:03d}{target.suffix}") for i in range(1, len(recordings) + 1)]
-    paths, sources = numbered if len(recordings) > 1 else [target], {path.resolve() for path in find_files(source)}
+    numbered = [
+        target.with_name(f"{target.stem}_{i:03d}{target.suffix}")
+        for i in range(1, len(recordings) + 1)
+    ]
+    paths = numbered if len(recordings) > 1 else [target]
+    sources = {path.resolve() for path in find_files(source)}
     for path in paths:
         if path.resolve() in sources:
-            raise FileError(f"{path}: is a file to be converted and would be lost. Choose another target.")
+            raise FileError(
+                f"{path}: is a file to be converted and would be lost. Choose another target."
+            )
     for recording, path in zip(recordings, paths, strict=True):
         write(recording, path, comments=not request.plain)
     if json:
-        print_json({"files": [{"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)]})
+        print_json(
+            {
+                "files": [
+                    {"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)
+                ]
+            }
+        )
         return
     for recording, path in zip(recordings, paths, strict=True):
         echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")

@@ -1,4 +1,6 @@
-"""Arguments and options of commands: shared ones, those of declared requests, and completion of names by the shell."""
+"""Arguments and options of commands: shared ones, those of declared requests, and completion of
+names by the shell.
+"""
 
 import functools
 import inspect
@@ -39,26 +41,35 @@ complete_model = _beginning_with(lambda: (*list_laws(), *list_plants()))
 
 
 def argument(metavar: str, meaning: str, complete: Callable[[str], list[str]] | None = None) -> Any:
-    """Declare an argument of a command: its placeholder, its help text, and the completion of its names."""
+    """Declare an argument of a command: its placeholder, its help text, and the completion of its
+    names.
+    """
     return typer.Argument(metavar=metavar, help=meaning, autocompletion=complete)
 
 
 NAME = "A library entry, a unique prefix of its name, or a muscle file (TOML)."
 Name = Annotated[str, argument("NAME", NAME, complete_entry)]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in SI units instead of a table.")]
-Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Output folder; created if it does not exist.")]
+Folder = Annotated[
+    Path, typer.Option("--out", metavar="DIR", help="Output folder; created if it does not exist.")
+]
 """An output folder that the command always writes."""
 OptionalFolder = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Output folder for figures and data; default: none.")
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Output folder for figures and data; default: none."),
 ]
 
 
 def print_completion_script(shell: str | None) -> None:
-    """Print the completion script of a shell and exit; nothing happens without a shell. Raises BadParameter."""
+    """Print the completion script of a shell and exit; nothing happens without a shell. Raises
+    BadParameter.
+    """
     if shell is None:
         return
     if shell not in SHELLS:
-        raise typer.BadParameter(f"'{shell}' is not supported{alternatives(shell, SHELLS, 'allowed are')}")
+        raise typer.BadParameter(
+            f"'{shell}' is not supported{alternatives(shell, SHELLS, 'allowed are')}"
+        )
     from typer._completion_shared import get_completion_script
 
     echo(get_completion_script(prog_name=PROGRAM, complete_var=REQUEST, shell=shell))
@@ -66,7 +77,9 @@ def print_completion_script(shell: str | None) -> None:
 
 
 def install_completion_classes() -> None:
-    """Prepare typer for the completion requests of these scripts, which arrive in environment variables."""
+    """Prepare typer for the completion requests of these scripts, which arrive in environment
+    variables.
+    """
     if REQUEST in os.environ:
         from typer._completion_classes import completion_init
 
@@ -78,26 +91,32 @@ _METAVARS: dict[type[Any], str] = {int: "N", float: "NUMBER", str: "NAME", Path:
 
 
 def with_requests(command: Command) -> Command:
-    """A command each of whose parameters that is a request is replaced by the options that the request declares.
+    """A command each of whose parameters that is a request is replaced by the options that the
+    request declares.
 
     A request that is not possible ends the command with a message on its usage.
     """
     hints = get_type_hints(command, include_extras=True)
-    parameters, classes = list[inspect.Parameter](), dict[str, type[Any]]()
+    parameters = list[inspect.Parameter]()
+    classes = dict[str, type[Any]]()
     for parameter in inspect.signature(command).parameters.values():
         hint = hints[parameter.name]
         if isinstance(hint, type) and "__dataclass_fields__" in hint.__dict__ and options_of(hint):
             classes[parameter.name] = hint
             parameters += map(_parameter, options_of(hint))
         else:
-            parameters.append(parameter.replace(annotation=hint, kind=inspect.Parameter.KEYWORD_ONLY))
+            parameters.append(
+                parameter.replace(annotation=hint, kind=inspect.Parameter.KEYWORD_ONLY)
+            )
 
     @functools.wraps(command)
     def expanded(**values: Any) -> None:
         try:
             for name, cls in classes.items():
                 flags = {each.name: flag_of(each) for each in options_of(cls)}
-                values[name] = build(cls, {each: values.pop(each) for each in flags}, flags.__getitem__)
+                values[name] = build(
+                    cls, {each: values.pop(each) for each in flags}, flags.__getitem__
+                )
             command(**values)
         except RequestError as error:
             raise typer.BadParameter(str(error)) from None
@@ -119,7 +138,9 @@ def _parameter(declared: Option) -> inspect.Parameter:
     if declared.repeated:
         kind = list[kind]
     settings: dict[str, Any] = {
-        "metavar": declared.metavar or ("QUANTITY" if declared.unit else _METAVARS.get(declared.kind)),
+        "metavar": (
+            declared.metavar or ("QUANTITY" if declared.unit else _METAVARS.get(declared.kind))
+        ),
         "help": declared.meaning,
     }
     if declared.complete is not None:
@@ -130,4 +151,6 @@ def _parameter(declared: Option) -> inspect.Parameter:
     default = inspect.Parameter.empty if declared.needed else declared.default
     taken: Any = kind if default is not None else kind | None
     annotation = Annotated[taken, typer.Option(flag_of(declared), **settings)]
-    return inspect.Parameter(declared.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    return inspect.Parameter(
+        declared.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
+    )

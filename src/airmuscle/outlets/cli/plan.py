@@ -20,9 +20,13 @@ PLAN_FILE = "plan.csv"
 
 @request
 class PlanRequest:
-    """Limits of a test bench and of its plan, or the parameters that a further record is to separate."""
+    """Limits of a test bench and of its plan, or the parameters that a further record is to
+    separate.
+    """
 
-    max_pressure: float | None = optional("Maximum pressure, such as '6 bar'; needed for static runs.", unit="Pa")
+    max_pressure: float | None = optional(
+        "Maximum pressure, such as '6 bar'; needed for static runs.", unit="Pa"
+    )
     max_force: float | None = optional(
         "Maximum force of the load cell or frame, such as '1 kN'; needed for static runs.", unit="N"
     )
@@ -34,11 +38,15 @@ class PlanRequest:
     runs: int = option("Number of runs.", default=6, bounds=(1, 100))
     points: int = option("Number of points per run.", default=15, bounds=(3, 1000))
     sigma: float = option(
-        "Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).", default=1.0
+        "Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).",
+        default=1.0,
     )
-    fix: tuple[str, ...] = many("Parameter that the fit will keep fixed; repeatable.", metavar="PARAMETER")
+    fix: tuple[str, ...] = many(
+        "Parameter that the fit will keep fixed; repeatable.", metavar="PARAMETER"
+    )
     separate: tuple[str, ...] = many(
-        "Study of fit-dynamic: one of the two parameters to separate; give two.", metavar="PARAMETER"
+        "Study of fit-dynamic: one of the two parameters to separate; give two.",
+        metavar="PARAMETER",
     )
 
 
@@ -47,11 +55,12 @@ def plan(name: Name, request: PlanRequest, out: OptionalFolder = None, json: Jso
     """Design the most informative experiments.
 
     \b
-    The runs are isobaric or isometric, within the limits of the test bench. They are D-optimal for fitting the
-    characteristic of the muscle, linearised at its present parameter values.
-    With --out, DIR/plan.csv contains the points in order, with the expected force.
-    For a study of fit-dynamic in place of NAME, fills, discharges and other records of the same rig are ranked by the
-    precision with which they separate a parameter of the valve from one of the wall, or the pair of --separate.
+    The runs are isobaric or isometric, within the limits of the test bench. They are D-optimal for
+    fitting the characteristic of the muscle, linearised at its present parameter values. With
+    --out, DIR/plan.csv contains the points in order, with the expected force. For a study of
+    fit-dynamic in place of NAME, fills, discharges and other records of the same rig are ranked by
+    the precision with which they separate a parameter of the valve from one of the wall, or the
+    pair of --separate.
 
     \b
     Examples:
@@ -76,11 +85,17 @@ def plan(name: Name, request: PlanRequest, out: OptionalFolder = None, json: Jso
         raise RequestError("--separate is for a study of fit-dynamic; NAME is a muscle or a law")
     if request.max_pressure is None or request.max_force is None:
         raise RequestError("give the limits of the test bench with --max-pressure and --max-force")
-    limits = ValidityRange(request.min_pressure, request.max_pressure, request.min_contraction, request.max_contraction)
+    limits = ValidityRange(
+        request.min_pressure, request.max_pressure, request.min_contraction, request.max_contraction
+    )
     design = optimal_design(
-        load_law(name).characteristic, BenchLimits(limits, request.max_force), runs=request.runs,
-        points=request.points, sigma=request.sigma, fixed=request.fix,
-    )  # fmt: skip
+        load_law(name).characteristic,
+        BenchLimits(limits, request.max_force),
+        runs=request.runs,
+        points=request.points,
+        sigma=request.sigma,
+        fixed=request.fix,
+    )
     if out is not None:
         check_writable(out)
     files = {PLAN_FILE: lambda path: write(design.recording(), path)}

@@ -13,7 +13,10 @@ from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
 from .options import Folder, Json, argument, complete_model, with_requests
 
-MODEL = "A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the library."
+MODEL = (
+    "A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the"
+    " library."
+)
 Model = Annotated[str, argument("MODEL", MODEL, complete_model)]
 RECORDS = "Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic."
 Records = Annotated[list[Path], argument("FILES", RECORDS)]
@@ -26,7 +29,9 @@ class PredictRequest:
     start_time: float | None = optional(
         "Scenario: time of the record at which its input begins; default 0 s.", unit="s"
     )
-    start_margin: float | None = optional("Scenario: estimate the start time within this margin, '50 ms'.", unit="s")
+    start_margin: float | None = optional(
+        "Scenario: estimate the start time within this margin, '50 ms'.", unit="s"
+    )
     own: tuple[str, ...] = many(
         "Scenario: parameter that is estimated from each record; repeatable.", metavar="PARAMETER"
     )
@@ -34,21 +39,27 @@ class PredictRequest:
     def check(self, where: Where) -> None:
         """Raise RequestError for a margin that is not positive."""
         if self.start_margin is not None and not self.start_margin > 0.0:
-            raise RequestError(f"{where('start_margin')} is {self.start_margin:g} s; it must be greater than zero")
+            raise RequestError(
+                f"{where('start_margin')} is {self.start_margin:g} s; it must be greater than zero"
+            )
 
 
 @with_requests
 def predict(
-    model: Model, files: Records, request: PredictRequest, reading: ReadingRequest, out: Folder = Path("prediction"),
+    model: Model,
+    files: Records,
+    request: PredictRequest,
+    reading: ReadingRequest,
+    out: Folder = Path("prediction"),
     json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Predict further records by an identified muscle or plant.
 
     \b
-    A muscle predicts slow records from pressure and contraction, with its friction and creep along the motion. A
-    scenario of fit-dynamic or campaign predicts transient records by simulation of its input.
-    Prints rms error, maximum error and the share of rows within the stated 95 % band. Writes DIR/report.html with
-    figures and data.
+    A muscle predicts slow records from pressure and contraction, with its friction and creep along
+    the motion. A scenario of fit-dynamic or campaign predicts transient records by simulation of
+    its input. Prints rms error, maximum error and the share of rows within the stated 95 % band.
+    Writes DIR/report.html with figures and data.
 
     \b
     Examples:
@@ -63,20 +74,30 @@ def predict(
     measured = [path for path in files if path not in tables]
     thing: Any
     if kind_of(read_toml(Path(model))) is PlantEntry if is_file else model in list_plants():
-        loaded, margin = load_plant_model(model), request.start_margin
+        loaded = load_plant_model(model)
+        margin = request.start_margin
         recordings = read_recordings(measured, reading) if measured else []
         own: list[Any] = [*request.own, *([] if margin is None else [StartTime(margin)])]
-        predictions = [loaded.predict_recording(each, request.start_time or 0.0, own) for each in recordings]
+        predictions = [
+            loaded.predict_recording(each, request.start_time or 0.0, own) for each in recordings
+        ]
         predictions += (each for path in tables for each in loaded.predict_file(path))
         thing = loaded.scenario.plant
-    elif given := [name for name in ("start_time", "start_margin", "own") if getattr(request, name)]:
+    elif given := [
+        name for name in ("start_time", "start_margin", "own") if getattr(request, name)
+    ]:
         options = ", ".join(f"--{name.replace('_', '-')}" for name in given)
         raise RequestError(f"{options} is for a scenario; MODEL is a muscle or a law")
     else:
         thing = load_law(model)
         if tables:
-            raise FileError(f"{tables[0]}: a file of records is for a scenario; give measurement files for a muscle.")
-        predictions = [predict_with_entry(thing, recording) for recording in read_recordings(files, reading)]
+            raise FileError(
+                f"{tables[0]}: a file of records is for a scenario; give measurement files for a"
+                " muscle."
+            )
+        predictions = [
+            predict_with_entry(thing, recording) for recording in read_recordings(files, reading)
+        ]
     chapters = prediction_chapters(Path(model).name, thing, predictions)
     chapters += reading_chapters(each.recording for each in predictions)
     deliver("predict", chapters, json=json, out=out, title="Prediction")

@@ -9,7 +9,14 @@ from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
 from ...report.chapter import Chapter
-from ...report.claims import MARKS, Kind, count_verdicts, format_published, format_reproduced, statements
+from ...report.claims import (
+    MARKS,
+    Kind,
+    count_verdicts,
+    format_published,
+    format_reproduced,
+    statements,
+)
 from ...report.formatting import to_plain
 from ...report.text import GAP
 from .options import Folder, argument
@@ -17,7 +24,9 @@ from .terminal import echo, print_table, terminal_width
 
 HEADERS = ("claim", "expected", "reproduced", "verdict")
 MIN_CLAIM = 28
-"""Smallest number of characters of a statement in the terminal, where the others are cut (chosen)."""
+"""Smallest number of characters of a statement in the terminal, where the others are cut
+(chosen).
+"""
 PREFIXES = {Kind.CLAIM: "", Kind.FINDING: "comparison: ", Kind.CHECK: "check: "}
 
 
@@ -57,7 +66,9 @@ def reproduce(papers: Papers = None, out: Folder = Path("report")) -> None:
     echo()
     claims = [claim for chapter in chapters.values() for claim in chapter.claims]
     for kind in Kind:  # the readings of a statement count once
-        counts = {verdict: count for verdict, count in count_verdicts(claims, kind).items() if count}
+        counts = {
+            verdict: count for verdict, count in count_verdicts(claims, kind).items() if count
+        }
         if counts:
             listed = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
             echo(f"{counted(sum(counts.values()), kind.value)}: {listed}")
@@ -73,11 +84,20 @@ def _print_chapter(chapter: Chapter) -> None:
     found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
     values = []
     for _, s in found:
-        published, unit = format_published(s.cases[0], with_tolerance=False), s.cases[0].unit
-        reproduced = f"{format_reproduced(s, 3)} {unit if s.reproduced and unit != '1' else ''}".rstrip()
+        published = format_published(s.cases[0], with_tolerance=False)
+        unit = s.cases[0].unit
+        reproduced = (
+            f"{format_reproduced(s, 3)} {unit if s.reproduced and unit != '1' else ''}".rstrip()
+        )
         values.append((published, reproduced, f"{MARKS[s.verdict]} {s.verdict}"))
     columns = zip(HEADERS[1:], *values, strict=True)
-    room = max(MIN_CLAIM, terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns))
+    room = max(
+        MIN_CLAIM,
+        terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns),
+    )
     texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
-    rows = [(textwrap.shorten(text, room, placeholder=" …"), *row) for text, row in zip(texts, values, strict=True)]
+    rows = [
+        (textwrap.shorten(text, room, placeholder=" …"), *row)
+        for text, row in zip(texts, values, strict=True)
+    ]
     print_table(dict(zip(HEADERS, zip(*rows, strict=True), strict=True)))

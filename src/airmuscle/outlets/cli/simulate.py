@@ -27,27 +27,34 @@ class SimulateRequest:
     """How a simulation differs from its scenario file."""
 
     set: tuple[Any, ...] = many(
-        "Another value of a number of the scenario, by its path as in a study: 'mechanism.mass=12 kg', "
-        "run.duration=10. Repeatable.", metavar="PATH=VALUE", read=read_pair,
-    )  # fmt: skip
+        "Another value of a number of the scenario, by its path as in a study: 'mechanism.mass=12"
+        " kg', run.duration=10. Repeatable.",
+        metavar="PATH=VALUE",
+        read=read_pair,
+    )
 
 
 @with_requests
-def simulate(scenario: ScenarioFile, request: SimulateRequest, out: Folder = Path("run"), json: Json = False) -> None:
+def simulate(
+    scenario: ScenarioFile, request: SimulateRequest, out: Folder = Path("run"), json: Json = False
+) -> None:
     """Simulate the plant of a scenario file.
 
     \b
-    Writes DIR/recording.csv, which has the format of a measurement file, DIR/report.html and DIR/figures/.
-    If a run is aborted, the partial results are written and the exit code is 1; the error states time, reason, state
-    and remedy.
+    Writes DIR/recording.csv, which has the format of a measurement file, DIR/report.html and
+    DIR/figures/. If a run is aborted, the partial results are written and the exit code is 1; the
+    error states time, reason, state and remedy.
 
     \b
     Examples:
       airmuscle simulate examples/fill_discharge.toml --out run
       airmuscle simulate joint-dmsp-20-matrix --out run
-      airmuscle simulate examples/fill_discharge.toml --set "mechanism.mass=12 kg" --set run.duration=10 --out run
+      airmuscle simulate examples/fill_discharge.toml --set "mechanism.mass=12 kg" --set
+      run.duration=10 --out run
     """
-    loaded = changed_scenario(scenario, dict(request.set)) if request.set else load_scenario(scenario)
+    loaded = (
+        changed_scenario(scenario, dict(request.set)) if request.set else load_scenario(scenario)
+    )
     check_writable(out)
     try:
         recording = loaded.simulate()
@@ -68,7 +75,9 @@ def _results(scenario: Scenario, recording: Recording) -> tuple[list[Chapter], s
     return [run_chapter(scenario, recording)], "Simulation", files
 
 
-OfMuscles = Annotated[bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")]
+OfMuscles = Annotated[
+    bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")
+]
 WRITTEN = "Output file; default: print to stdout."
 SchemaFile = Annotated[Path | None, typer.Option("--out", metavar="FILE", help=WRITTEN)]
 
@@ -77,9 +86,9 @@ def schema(muscle: OfMuscles = False, out: SchemaFile = None) -> None:
     """Print the JSON schema of scenario or muscle files.
 
     \b
-    Editors use the schema to check and complete TOML files. It is generated from the models of this version, so it
-    allows exactly what this version reads.
-    The first line of a TOML file names its schema: #:schema scenario.schema.json
+    Editors use the schema to check and complete TOML files. It is generated from the models of this
+    version, so it allows exactly what this version reads. The first line of a TOML file names its
+    schema: #:schema scenario.schema.json
 
     \b
     Examples:

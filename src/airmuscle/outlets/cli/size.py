@@ -15,21 +15,25 @@ def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -
     """Size muscles of the catalogue for a lift or a joint.
 
     \b
-    For each muscle whose law and permitted values are known: the shortest length that reaches both ends of the motion
-    within ratings, validity range and supply, alone and in parallel, with pressures, reserve and air of a cycle.
-    With --out, DIR/report.html shows the force-contraction chart and all choices, and DIR/scenario.toml is the best
-    choice that `airmuscle simulate` can run, with valves for the cycle time.
+    For each muscle whose law and permitted values are known: the shortest length that reaches both
+    ends of the motion within ratings, validity range and supply, alone and in parallel, with
+    pressures, reserve and air of a cycle. With --out, DIR/report.html shows the force-contraction
+    chart and all choices, and DIR/scenario.toml is the best choice that `airmuscle simulate` can
+    run, with valves for the cycle time.
 
     \b
     Examples:
-      airmuscle size --load "20 kg" --stroke "40 mm" --supply "6 bar" --max-length "400 mm" --out lift
-      airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar" --sort length
-      airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2" --supply "6 bar" --max-count 1
+      airmuscle size --load "20 kg" --stroke "40 mm" --supply "6 bar" --max-length "400 mm" --out
+      lift airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar"
+      --sort length airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2"
+      --supply "6 bar" --max-count 1
     """
     if out is not None:
         check_writable(out)
     with progress_bars("sizing") as show:
         result = request.evaluate(lambda fraction: show("", fraction))
-    scenario = sizing_scenario(result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out")
+    scenario = sizing_scenario(
+        result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out"
+    )
     files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
     deliver("size", [result.chapter(scenario)], json=json, out=out, title="Sizing", files=files)

@@ -21,11 +21,16 @@ class StudioRequest:
 
     port: int = option("Port of the server; 0 stands for any free one.", default=8765)
     host: str = option(
-        "Address of the server; 0.0.0.0 admits other machines, without encryption.", default="127.0.0.1",
+        "Address of the server; 0.0.0.0 admits other machines, without encryption.",
+        default="127.0.0.1",
         metavar="ADDRESS",
-    )  # fmt: skip
-    browser: bool = option("Open the page in the browser.", default=True, flag="--browser/--no-browser")
-    export: Path | None = optional("Write one self-contained page instead, without a server.", metavar="FILE.html")
+    )
+    browser: bool = option(
+        "Open the page in the browser.", default=True, flag="--browser/--no-browser"
+    )
+    export: Path | None = optional(
+        "Write one self-contained page instead, without a server.", metavar="FILE.html"
+    )
 
 
 @with_requests
@@ -33,10 +38,10 @@ def studio(request: StudioRequest, names: Names = None) -> None:
     """Show muscles and plants in the browser.
 
     \b
-    The page computes laws and plants itself; the server reads files of the library, texts that are pasted into the
-    page and measurement files that are dropped on it, and fits these.
-    It answers this machine only, unless another --host is given, and requires the token of the printed address.
-    Ctrl-C ends it.
+    The page computes laws and plants itself; the server reads files of the library, texts that are
+    pasted into the page and measurement files that are dropped on it, and fits these. It answers
+    this machine only, unless another --host is given, and requires the token of the printed
+    address. Ctrl-C ends it.
 
     \b
     Examples:

@@ -1,4 +1,6 @@
-"""Terminal output: messages with the options for their hints, tables and JSON without control characters, progress."""
+"""Terminal output: messages with the options for their hints, tables and JSON without control
+characters, progress.
+"""
 
 import contextlib
 import json
@@ -26,13 +28,19 @@ MISSING_NAMES = {treatment: name for name, treatment in MISSING_VALUES.items()}
 
 
 def _toml_table(hint: Hint) -> str:
-    entries = (f"{json.dumps(key) if isinstance(key, str) else key} = {json.dumps(text)}"
-               for key, text in hint.value.items())  # fmt: skip
+    entries = (
+        f"{json.dumps(key) if isinstance(key, str) else key} = {json.dumps(text)}"
+        for key, text in hint.value.items()
+    )
     return f"columns = {{ {', '.join(entries)} }}"
 
 
 def _fix(hint: Hint) -> str:
-    return "use " + ("--fix PARAMETER" if hint.value is ... else " ".join(f"--fix '{name}'" for name in hint.value))
+    return "use " + (
+        "--fix PARAMETER"
+        if hint.value is ...
+        else " ".join(f"--fix '{name}'" for name in hint.value)
+    )
 
 
 def _missing(hint: Hint) -> str:
@@ -44,8 +52,16 @@ def _missing(hint: Hint) -> str:
 
 _FILES: Mapping[str, Instruction] = {
     "units": lambda hint: "use " + " ".join(f"--unit '{name}=...'" for name in hint.value),
-    "columns": lambda hint: "use " + " ".join(f'--column "{key}={text}"' for key, text in hint.value.items()),
-    "constants": lambda hint: "use " + " ".join(f"--constant '{name}={value}'" for name, value in hint.value.items()),
+    "columns": (
+        lambda hint: (
+            "use " + " ".join(f'--column "{key}={text}"' for key, text in hint.value.items())
+        )
+    ),
+    "constants": (
+        lambda hint: (
+            "use " + " ".join(f"--constant '{name}={value}'" for name, value in hint.value.items())
+        )
+    ),
     "file_name": lambda hint: f"use --file-name '{hint.value}'",
     "time": lambda hint: f"use --time {TIME_BASE_NAMES[hint.value]}",
     "decimal": lambda hint: f"use --decimal '{hint.value}'",
@@ -59,17 +75,34 @@ _FILES: Mapping[str, Instruction] = {
 _RECORDS: Mapping[str, Instruction] = {
     "units": lambda hint: "write it in the heading under [columns] of the record's mapping file",
     "columns": lambda hint: f"write {_toml_table(hint)} in the record's mapping file",
-    "decimal": lambda hint: f"write decimal = {json.dumps(hint.value)} in the record's mapping file",
+    "decimal": lambda hint: (
+        f"write decimal = {json.dumps(hint.value)} in the record's mapping file"
+    ),
     "resting_length": lambda hint: 'write resting_length = "..." under [[record]]',
     "ambient": lambda hint: 'write ambient = "..." under [[record]]',
-    "displacement_zero": lambda hint: f'write displacement_zero = "{hint.value}" in the mapping of the record',
+    "displacement_zero": lambda hint: (
+        f'write displacement_zero = "{hint.value}" in the mapping of the record'
+    ),
     "skip_rows": lambda hint: "write skip_rows = N in the mapping of the record",
-    "missing": lambda hint: f'write missing = "{MISSING_NAMES[type(hint.value)]}" in the mapping of the record',
+    "missing": lambda hint: (
+        f'write missing = "{MISSING_NAMES[type(hint.value)]}" in the mapping of the record'
+    ),
 }
 RUN_CODE = (
-    "show", "evaluate", "fit", "approximate", "hysteresis", "predict", "plan", "simulate", "study", "tune", "benchmark",
-    "export", "schema",
-)  # fmt: skip
+    "show",
+    "evaluate",
+    "fit",
+    "approximate",
+    "hysteresis",
+    "predict",
+    "plan",
+    "simulate",
+    "study",
+    "tune",
+    "benchmark",
+    "export",
+    "schema",
+)
 """Commands with --allow-code."""
 _CODE: Mapping[str, Instruction] = {"files.allow_code": lambda hint: "use --allow-code"}
 INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
@@ -80,7 +113,9 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         **_CODE,
         "fixed": _fix,
         "degree": lambda hint: f"use --degree {hint.value}",
-        "censoring": lambda hint: "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored",
+        "censoring": lambda hint: (
+            "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored"
+        ),
         "loss": lambda hint: f"use --robust '{hint.value.scale:g} N'",
         "sigma": lambda hint: "use --equal-weights",
         **dict.fromkeys(("by", "leave_out"), lambda hint: f"use --leave-out {hint.value.quantity}"),
@@ -97,13 +132,18 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "predict": {**_FILES, **_CODE},
     "convert": _FILES,
     "plan": {"fixed": _fix, **_CODE},
-    "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
+    "fit-dynamic": {
+        **_RECORDS,
+        "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]",
+    },
 }
 """Instructions by command and argument; a hint without an argument is found by its function."""
 
 
 def in_options(text: str, command: str | None) -> str:
-    """The text with hints in the words of a command; a hint for which the command has no remedy is omitted."""
+    """The text with hints in the words of a command; a hint for which the command has no remedy is
+    omitted.
+    """
     return reworded(text, INSTRUCTIONS.get(command or "", {}))
 
 
@@ -117,7 +157,9 @@ def echo(text: str = "", *, err: bool = False) -> None:
 
 
 warned: set[str] = set()
-"""Texts of the warnings that this process has printed; the notes of a result on the same screen do not repeat them."""
+"""Texts of the warnings that this process has printed; the notes of a result on the same screen do
+not repeat them.
+"""
 
 
 def on_one_screen() -> bool:
@@ -128,7 +170,11 @@ def on_one_screen() -> bool:
 def print_json(content: Any) -> None:
     """Print standard JSON; numbers that are not finite are null."""
     lines = as_json(content).splitlines()
-    typer.echo("\n".join("".join(c if printable(c) == c else json.dumps(c)[1:-1] for c in line) for line in lines))
+    typer.echo(
+        "\n".join(
+            "".join(c if printable(c) == c else json.dumps(c)[1:-1] for c in line) for line in lines
+        )
+    )
 
 
 def print_table(columns: Mapping[str, Sequence[Any]]) -> None:
@@ -139,7 +185,11 @@ def print_table(columns: Mapping[str, Sequence[Any]]) -> None:
 
 def terminal_width() -> int:
     """The width of the terminal [characters], or of a file."""
-    return shutil.get_terminal_size().columns if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
+    return (
+        shutil.get_terminal_size().columns
+        if sys.stdout.isatty() or "COLUMNS" in os.environ
+        else WIDE
+    )
 
 
 def _display(*columns: Any) -> Any:
@@ -153,7 +203,9 @@ def _display(*columns: Any) -> Any:
 
 @contextlib.contextmanager
 def progress_bars(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
-    """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one bar per name."""
+    """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one
+    bar per name.
+    """
     from rich.markup import escape
     from rich.progress import TaskID
 
@@ -163,7 +215,9 @@ def progress_bars(label: str = "reading") -> Iterator[Callable[[str, float], Non
         def show(name: str, fraction: float) -> None:
             task = tasks.get(name)
             if task is None:
-                task = tasks[name] = display.add_task(escape(printable(f"{label} {name}")), total=1.0)
+                task = tasks[name] = display.add_task(
+                    escape(printable(f"{label} {name}")), total=1.0
+                )
             display.update(task, completed=fraction)
 
         yield show
@@ -171,8 +225,8 @@ def progress_bars(label: str = "reading") -> Iterator[Callable[[str, float], Non
 
 @contextlib.contextmanager
 def counted_progress(label: str) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a callback (step, done, in total) that draws one bar with the number of its runs and the time left; it
-    raises KeyboardInterrupt after Ctrl-C."""
+    """Yield a callback (step, done, in total) that draws one bar with the number of its runs and
+    the time left; it raises KeyboardInterrupt after Ctrl-C."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     description = TextColumn("{task.description}", markup=False)

@@ -8,7 +8,12 @@ import typer
 
 from ...core import check_writable
 from ...design import Perturbations, RobustObjective, Tuning
-from ...design.tuning import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex
+from ...design.tuning import (
+    IntegralAbsoluteError,
+    IntegralTimeAbsoluteError,
+    RootMeanSquareError,
+    TrackingIndex,
+)
 from ...design.tuning import tune as find_gains
 from ...design.tuning.rules import RuleSettings, rule_settings, rule_starts, step_experiment
 from ...design.tuning.scenario_loop import ScenarioLoop, load_scenario_loop
@@ -26,7 +31,9 @@ INDICES: dict[str, type[TrackingIndex]] = {
     "itae": IntegralTimeAbsoluteError,
 }
 """Tracking indices by their names."""
-ScenarioFile = Annotated[Path, argument("SCENARIO.toml", "A scenario file with [input.controller].")]
+ScenarioFile = Annotated[
+    Path, argument("SCENARIO.toml", "A scenario file with [input.controller].")
+]
 SAVE = "Scenario with the tuned gains; default: SCENARIO-tuned.toml next to the scenario."
 Save = Annotated[Path | None, typer.Option(metavar="FILE.toml", help=SAVE)]
 
@@ -53,54 +60,83 @@ class TuneRequest:
     """What a tuning is asked for."""
 
     bounds: tuple[str, ...] = many(
-        "Range of a gain, such as 'gain=5 1/m:500 1/m'; repeatable. Default: every gain and time that is not 0, from a "
-        "tenth of its present value to ten times it.", metavar="GAIN=MIN:MAX",
-    )  # fmt: skip
+        "Range of a gain, such as 'gain=5 1/m:500 1/m'; repeatable. Default: every gain and time"
+        " that is not 0, from a tenth of its present value to ten times it.",
+        metavar="GAIN=MIN:MAX",
+    )
     index: type[TrackingIndex] = option(
         f"Tracking index of a run: {', '.join(INDICES)}.", choices=INDICES, default="rmse"
     )
-    quantile: float = _field(RobustObjective, "quantile", "Quantile of the index over the cases; 1: the worst case.")
+    quantile: float = _field(
+        RobustObjective, "quantile", "Quantile of the index over the cases; 1: the worst case."
+    )
     quantile_weight: float = _field(
         RobustObjective, "quantile_weight", "Weight of the quantile; that of the mean is 1."
     )
-    air_weight: float = _field(RobustObjective, "air_weight", "Weight of the mean air drawn [kg/s].")
+    air_weight: float = _field(
+        RobustObjective, "air_weight", "Weight of the mean air drawn [kg/s]."
+    )
     travel_weight: float = _field(
         RobustObjective, "travel_weight", "Weight of the mean travel of the commands [strokes/s]."
     )
     loads: Any = option(
-        "Factors of the load; '' for none.", default="0.5,2", metavar="FACTORS", read=read_factors, empty=True
+        "Factors of the load; '' for none.",
+        default="0.5,2",
+        metavar="FACTORS",
+        read=read_factors,
+        empty=True,
     )
     supplies: Any = option(
-        "Factors of the supply pressure; '' for none.", default="0.8", metavar="FACTORS", read=read_factors, empty=True
+        "Factors of the supply pressure; '' for none.",
+        default="0.8",
+        metavar="FACTORS",
+        read=read_factors,
+        empty=True,
     )
     leak: float = _field(
-        Perturbations, "leak", "Leak at each muscle, relative to the largest conductance; 0 for none.", metavar="RATIO"
+        Perturbations,
+        "leak",
+        "Leak at each muscle, relative to the largest conductance; 0 for none.",
+        metavar="RATIO",
     )
-    delay: int = _field(Perturbations, "delay", "Dead time of the measurements in samples; 0 for none.")
-    draws: int = _field(Perturbations, "draws", "Draws of fitted parameters, from their covariance.")
-    rules: bool = option("Start from SIMC and AMIGO settings by a simulated step (PID only).", default=False)
+    delay: int = _field(
+        Perturbations, "delay", "Dead time of the measurements in samples; 0 for none."
+    )
+    draws: int = _field(
+        Perturbations, "draws", "Draws of fitted parameters, from their covariance."
+    )
+    rules: bool = option(
+        "Start from SIMC and AMIGO settings by a simulated step (PID only).", default=False
+    )
     budget: int = option("Maximum number of simulated loops.", default=4000, bounds=(8, 10_000_000))
-    seed: int = option("Seed of the optimiser and of the draws.", default=0, bounds=(0, float("inf")))
+    seed: int = option(
+        "Seed of the optimiser and of the draws.", default=0, bounds=(0, float("inf"))
+    )
 
 
 @with_requests
 def tune(
-    scenario: ScenarioFile, request: TuneRequest, execution: Execution, save: Save = None,
-    out: Folder = Path("tuning"), json: Json = False,
-) -> None:  # fmt: skip
+    scenario: ScenarioFile,
+    request: TuneRequest,
+    execution: Execution,
+    save: Save = None,
+    out: Folder = Path("tuning"),
+    json: Json = False,
+) -> None:
     """Tune the controller of a scenario for a family of plants.
 
     \b
-    Differential evolution minimises the mean plus a high quantile of a tracking index over the nominal plant and plants
-    with another load, supply pressure, leak, delay and drawn parameters. Writes SCENARIO-tuned.toml next to the
-    scenario, the same file with the new gains, and DIR/report.html, DIR/history.csv and DIR/figures/. Ctrl-C ends the
-    search; the best gains so far are written.
+    Differential evolution minimises the mean plus a high quantile of a tracking index over the
+    nominal plant and plants with another load, supply pressure, leak, delay and drawn parameters.
+    Writes SCENARIO-tuned.toml next to the scenario, the same file with the new gains, and
+    DIR/report.html, DIR/history.csv and DIR/figures/. Ctrl-C ends the search; the best gains so far
+    are written.
 
     \b
     Examples:
       airmuscle tune examples/pressure_loop.toml --rules --out tuning
-      airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s" --budget 20000
-      airmuscle tune lift.toml --join /shared/tuning    (on each machine)
+      airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s"
+      --budget 20000 airmuscle tune lift.toml --join /shared/tuning    (on each machine)
     """
     loaded = load_scenario_loop(scenario)
     target = save or scenario.with_name(f"{scenario.stem}-tuned.toml")
@@ -114,33 +150,62 @@ def tune(
     writes = writes or execution.takes_over(out)
     if writes:
         loaded.save(tuning.gains, target)
-    chapter = tuning.chapter(loaded.scenario.title, notes, rules, loaded.scenario.problem.integrator)
+    chapter = tuning.chapter(
+        loaded.scenario.title, notes, rules, loaded.scenario.problem.integrator
+    )
     files = {"history.csv": lambda path: save_table(tuning.history.table(), path)}
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
     others = {"scenario": target}
-    deliver("tune", [chapter], json=json, out=out, title="Tuning", files=files, others=others, writes=writes)
+    deliver(
+        "tune",
+        [chapter],
+        json=json,
+        out=out,
+        title="Tuning",
+        files=files,
+        others=others,
+        writes=writes,
+    )
     if tuning.interrupted:
         check_interrupted()
         raise KeyboardInterrupt
 
 
 def _search(
-    loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], request: TuneRequest, workers: Workers
+    loaded: ScenarioLoop,
+    ranges: Mapping[str, tuple[float, float]],
+    request: TuneRequest,
+    workers: Workers,
 ) -> tuple[Tuning, tuple[str, ...], tuple[RuleSettings, ...]]:
     """The tuning, notes on the family of plants, and the settings of the rules."""
     problem = loaded.scenario.problem
-    objective = RobustObjective(request.quantile, request.quantile_weight, request.air_weight, request.travel_weight)
-    perturbations = Perturbations(request.loads, request.supplies, request.leak, request.delay, request.draws)
+    objective = RobustObjective(
+        request.quantile, request.quantile_weight, request.air_weight, request.travel_weight
+    )
+    perturbations = Perturbations(
+        request.loads, request.supplies, request.leak, request.delay, request.draws
+    )
     family = loaded.family(perturbations, request.seed)
     rules: tuple[RuleSettings, ...] = ()
     if request.rules:
-        experiment = step_experiment(family.cases[0], problem.duration, integrator=problem.integrator)
+        experiment = step_experiment(
+            family.cases[0], problem.duration, integrator=problem.integrator
+        )
         rules = rule_settings(experiment.model)
     with progress_bars("tuning") as show:
         tuning = find_gains(
-            family.cases, ranges, duration=problem.duration, index=request.index(), objective=objective,
-            budget=request.budget, seed=request.seed, start=rule_starts(rules, ranges), start_time=problem.start_time,
-            integrator=problem.integrator, progress=lambda done, total: show("", done / total), workers=workers,
-        )  # fmt: skip
+            family.cases,
+            ranges,
+            duration=problem.duration,
+            index=request.index(),
+            objective=objective,
+            budget=request.budget,
+            seed=request.seed,
+            start=rule_starts(rules, ranges),
+            start_time=problem.start_time,
+            integrator=problem.integrator,
+            progress=lambda done, total: show("", done / total),
+            workers=workers,
+        )
     return tuning, family.notes, rules

@@ -1,7 +1,8 @@
-"""Learning environments: plants with a task as Gymnasium environments, single and as vectors of thousands.
+"""Learning environments: plants with a task as Gymnasium environments, single and as vectors of
+thousands.
 
-Where Gymnasium is installed, `import airmuscle.environments` registers them, also that of the identifier
-"airmuscle.environments:airmuscle/Joint-v0". Each name is imported when it is first used.
+Where Gymnasium is installed, `import airmuscle.environments` registers them, also that of the
+identifier "airmuscle.environments:airmuscle/Joint-v0". Each name is imported when it is first used.
 """
 
 import importlib.util
@@ -17,11 +18,15 @@ EPISODE_PERIODS = 500
 def register_environments() -> None:
     """Register airmuscle/Joint-v0, JointOnOff-v0, Lift-v0 and Arm-v0 with Gymnasium, once.
 
-    `gymnasium.make("airmuscle/Joint-v0")` and `gymnasium.make_vec(..., num_envs=N)` then return them. Gymnasium 1.0
-    and later call this for no package by themselves. Raises InputError if Gymnasium is not installed.
+    `gymnasium.make("airmuscle/Joint-v0")` and `gymnasium.make_vec(..., num_envs=N)` then return
+    them. Gymnasium 1.0 and later call this for no package by themselves. Raises InputError if
+    Gymnasium is not installed.
     """
     if importlib.util.find_spec("gymnasium") is None:
-        raise InputError("learning environments need the package gymnasium. Install it: pip install airmuscle[sim]")
+        raise InputError(
+            "learning environments need the package gymnasium. Install it: pip install"
+            " airmuscle[sim]"
+        )
     from gymnasium.envs import registration
 
     for name in ("Joint", "JointOnOff", "Lift", "Arm"):

@@ -23,7 +23,10 @@ Floats = npt.NDArray[np.float32]
 
 def observation_space(task: EnvironmentTask) -> Any:
     """The box of the observations."""
-    low, high = (np.array([getattr(o, end) for o in task.observations], np.float32) for end in ("low", "high"))
+    low, high = (
+        np.array([getattr(o, end) for o in task.observations], np.float32)
+        for end in ("low", "high")
+    )
     return gymnasium.spaces.Box(low, high, dtype=np.float32)
 
 
@@ -35,36 +38,50 @@ def action_space(task: EnvironmentTask) -> Any:
 class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
     """One plant with a task.
 
-    task           an EnvironmentTask; observations and actions are listed by its `observations` and `actions`
-    randomisation  distributions of parameters, drawn anew at every reset; () for the nominal plant
-    integrator     RungeKutta4(1e-3) by default; the period of the task is a whole number of its steps
+    task           an EnvironmentTask; observations and actions are listed by its `observations` and
+    `actions` randomisation  distributions of parameters, drawn anew at every reset; () for the
+    nominal plant integrator     RungeKutta4(1e-3) by default; the period of the task is a whole
+    number of its steps
 
-    Actions are limited to -1 to 1 and held for one period. An episode is terminated where the task ends it, or where
-    the state becomes impossible (not finite, an air mass below zero): the observation is then zero, and so is the
-    reward. The wrapper TimeLimit of `gymnasium.make` truncates it after `max_episode_steps`. Raises ParameterError for
-    an action that is not finite or of another shape.
+    Actions are limited to -1 to 1 and held for one period. An episode is terminated where the task
+    ends it, or where the state becomes impossible (not finite, an air mass below zero): the
+    observation is then zero, and so is the reward. The wrapper TimeLimit of `gymnasium.make`
+    truncates it after `max_episode_steps`. Raises ParameterError for an action that is not finite
+    or of another shape.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
 
     def __init__(
-        self, task: EnvironmentTask, randomisation: tuple[Randomisation, ...] = (), *,
-        integrator: RungeKutta4 = STEP, render_mode: str | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        task: EnvironmentTask,
+        randomisation: tuple[Randomisation, ...] = (),
+        *,
+        integrator: RungeKutta4 = STEP,
+        render_mode: str | None = None,
+    ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise ParameterError(f"render_mode is {render_mode!r}; allowed are 'human', 'rgb_array' and None.")
-        self.task, self.render_mode = task, render_mode
+            raise ParameterError(
+                f"render_mode is {render_mode!r}; allowed are 'human', 'rgb_array' and None."
+            )
+        self.task = task
+        self.render_mode = render_mode
         self._draw = EpisodeDraw(task, randomisation)
         whole_steps(task, integrator)
         self.observation_space, self.action_space = observation_space(task), action_space(task)
         self._count, self._actions = len(task.observations), len(task.actions)
         _, states = self._draw.begin(np.full((1, self._draw.dimension), 0.5))
         names = [s.name for s in task.states]
-        self._stepper = Stepper(task, dict(zip(names, states[0].tolist(), strict=True)), integrator=integrator)
-        self._inputs, self._elapsed = [0.0] * (self._actions + 1), 0
+        self._stepper = Stepper(
+            task, dict(zip(names, states[0].tolist(), strict=True)), integrator=integrator
+        )
+        self._inputs = [0.0] * (self._actions + 1)
+        self._elapsed = 0
         self._window: Any = None
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Floats, dict[str, Any]]:
         """Begin an episode: its first observation, and an empty dictionary."""
         super().reset(seed=seed)
         parameters, states = self._draw.begin(self.np_random.random((1, self._draw.dimension)))
@@ -75,12 +92,15 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         return outputs[: self._count].astype(np.float32), {}
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
-        """Hold an action for one period: observation, reward, terminated, truncated (never), the terms of the reward.
+        """Hold an action for one period: observation, reward, terminated, truncated (never), the
+        terms of the reward.
 
         The terms are `closeness`, exp(-sum e^2), and `effort`, which is subtracted from it.
         """
         values = action.tolist() if isinstance(action, np.ndarray) else action
-        inputs, squares, self._elapsed = self._inputs, 0.0, self._elapsed + 1
+        inputs = self._inputs
+        squares = 0.0
+        self._elapsed = self._elapsed + 1
         try:
             if len(values) != self._actions:
                 raise TypeError
@@ -90,13 +110,22 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
                 inputs[i] = value = min(max(value, -1.0), 1.0)
                 squares += value * value
         except TypeError:
-            raise ParameterError(f"the action is {action}; give {self._actions} finite numbers from -1 to 1.") from None
+            raise ParameterError(
+                f"the action is {action}; give {self._actions} finite numbers from -1 to 1."
+            ) from None
         inputs[-1] = self._elapsed * self.task.period
         try:
             outputs = self._stepper.step(inputs, self.task.period)
         except SimulationError:
-            return np.zeros(self._count, np.float32), 0.0, True, False, {"closeness": 0.0, "effort": 0.0}
-        reward, terminated = float(outputs[-2]), bool(outputs[-1] > 0.5)
+            return (
+                np.zeros(self._count, np.float32),
+                0.0,
+                True,
+                False,
+                {"closeness": 0.0, "effort": 0.0},
+            )
+        reward = float(outputs[-2])
+        terminated = bool(outputs[-1] > 0.5)
         effort = self.task.effort_weight * squares / self._actions
         terms = {"closeness": reward + effort, "effort": effort}
         if self.render_mode == "human":
@@ -104,17 +133,23 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         return outputs[: self._count].astype(np.float32), reward, terminated, False, terms
 
     def render(self) -> Any:
-        """The present state of the plant as the picture of `Recording.animate`, (height, width, 3) of uint8.
+        """The present state of the plant as the picture of `Recording.animate`, (height, width, 3)
+        of uint8.
 
-        None without `render_mode="rgb_array"`; with "human" it is shown in a window of Matplotlib, also by `reset` and
-        `step`. It takes some tenths of a second. Raises ParameterError for an arm in space, which is not drawn.
+        None without `render_mode="rgb_array"`; with "human" it is shown in a window of Matplotlib,
+        also by `reset` and `step`. It takes some tenths of a second. Raises ParameterError for an
+        arm in space, which is not drawn.
         """
         if self.render_mode != "human":
             return None if self.render_mode is None else self._picture()
         import matplotlib.pyplot as plt
 
         if self._window is None:
-            self._window = plt.figure("airmuscle").add_axes((0.0, 0.0, 1.0, 1.0), frameon=False).imshow(self._picture())
+            self._window = (
+                plt.figure("airmuscle")
+                .add_axes((0.0, 0.0, 1.0, 1.0), frameon=False)
+                .imshow(self._picture())
+            )
         self._window.set_data(self._picture())
         plt.pause(1e-3)
         return None
@@ -141,14 +176,17 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
 
 
 def with_on_off_valves(env: Any) -> Any:
-    """An environment, single or vector, whose actions open valves completely: 0 discharges, 1 closes both, 2 fills.
+    """An environment, single or vector, whose actions open valves completely: 0 discharges, 1
+    closes both, 2 fills.
 
-    Raises ParameterError for an action of the task that is not a pair of a fill and a discharge valve.
+    Raises ParameterError for an action of the task that is not a pair of a fill and a discharge
+    valve.
     """
     actions = env.unwrapped.task.actions
     if alone := [action.name for action in actions if len(action.inputs) != 2]:
         raise ParameterError(
-            f"the action '{alone[0]}' is no pair of a fill and a discharge valve, which alone can be on/off valves."
+            f"the action '{alone[0]}' is no pair of a fill and a discharge valve, which alone can"
+            " be on/off valves."
         )
     space = gymnasium.spaces.MultiDiscrete([3] * len(actions))
     if not isinstance(env, gymnasium.vector.VectorEnv):
@@ -165,24 +203,36 @@ def openings_of(action: Any) -> Floats:
 class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, unused-ignore]
     """A single environment whose observations pass through sensors: noise, steps, and a dead time.
 
-    noise, resolution  standard deviation and step of the observations, one for all or one for each (k,), in their units
-    delay              periods by which observations are late; until then the first one is repeated
+    noise, resolution  standard deviation and step of the observations, one for all or one for each
+    (k,), in their units delay              periods by which observations are late; until then the
+    first one is repeated
 
-    The noise is drawn from the generator of the environment, which `reset(seed=...)` seeds. Observations remain within
-    their limits. Raises ParameterError for a number that is negative or not finite.
+    The noise is drawn from the generator of the environment, which `reset(seed=...)` seeds.
+    Observations remain within their limits. Raises ParameterError for a number that is negative or
+    not finite.
     """
 
-    def __init__(self, env: Any, *, noise: Any = 0.0, resolution: Any = 0.0, delay: int = 0) -> None:
+    def __init__(
+        self, env: Any, *, noise: Any = 0.0, resolution: Any = 0.0, delay: int = 0
+    ) -> None:
         super().__init__(env)
         size = env.observation_space.shape[0]
         for name, given in {"noise": noise, "resolution": resolution, "delay": delay}.items():
             values = np.asarray(given, dtype=float)
-            if values.shape not in ((), (size,)) or not (np.isfinite(values) & (values >= 0)).all() or delay % 1:
+            if (
+                values.shape not in ((), (size,))
+                or not (np.isfinite(values) & (values >= 0)).all()
+                or delay % 1
+            ):
                 raise ParameterError(
-                    f"MeasuredObservations: {name} is {given!r}; give numbers from 0 on, one or {size} (delay: one "
-                    "whole number of periods)."
+                    f"MeasuredObservations: {name} is {given!r}; give numbers from 0 on, one or"
+                    f" {size} (delay: one whole number of periods)."
                 )
-        self.noise, self.resolution, self.delay = np.asarray(noise, float), np.asarray(resolution, float), int(delay)
+        self.noise, self.resolution, self.delay = (
+            np.asarray(noise, float),
+            np.asarray(resolution, float),
+            int(delay),
+        )
         self._late: collections.deque[Any] = collections.deque(maxlen=self.delay + 1)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
@@ -201,8 +251,8 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
 
 
 def make_environment(kind: str, task: EnvironmentTask | None = None, **options: Any) -> Any:
-    """The registered environment airmuscle/KIND-v0, or the same with another task, which is not randomised unless
-    `randomisation` is given."""
+    """The registered environment airmuscle/KIND-v0, or the same with another task, which is not
+    randomised unless `randomisation` is given."""
     task, options = task_and_options(kind, task, options)
     env = PlantEnv(task, **options)
     return with_on_off_valves(env) if kind == ON_OFF else env

@@ -18,22 +18,40 @@ from .task import EnvironmentTask, Observation
 class LoadLifting(EnvironmentTask):
     """Lifting of a load to a height y_r that is constant in an episode; all numbers are chosen.
 
-    The plant has one coordinate 'position' and one muscle. Observed are the height, its speed, the pressure, and the
-    reference. The error y - y_r is scaled by `error_scale`. An episode ends where the height is beyond `lowest` or
-    `highest`, or a number is not finite.
+    The plant has one coordinate 'position' and one muscle. Observed are the height, its speed, the
+    pressure, and the reference. The error y - y_r is scaled by `error_scale`. An episode ends where
+    the height is beyond `lowest` or `highest`, or a number is not finite.
     """
 
     plant: Plant
-    target_height: float = parameter("m", "y_r", "reference height", bounds=(-1.0, 1.0), default=0.03)
-    error_scale: float = parameter("m", "e_0", "error at which the reward is 0.37", bounds=(1e-6, 1.0), default=0.005)
-    lowest: float = parameter("m", "y_min", "lower height that ends an episode", bounds=(-1.0, 1.0), default=-0.01)
-    highest: float = parameter("m", "y_max", "upper height that ends an episode", bounds=(-1.0, 1.0), default=0.075)
-    effort_weight: float = parameter("1", "w", "weight of the effort in the reward", bounds=(0.0, 1.0), default=0.01)
+    target_height: float = parameter(
+        "m", "y_r", "reference height", bounds=(-1.0, 1.0), default=0.03
+    )
+    error_scale: float = parameter(
+        "m", "e_0", "error at which the reward is 0.37", bounds=(1e-6, 1.0), default=0.005
+    )
+    lowest: float = parameter(
+        "m", "y_min", "lower height that ends an episode", bounds=(-1.0, 1.0), default=-0.01
+    )
+    highest: float = parameter(
+        "m", "y_max", "upper height that ends an episode", bounds=(-1.0, 1.0), default=0.075
+    )
+    effort_weight: float = parameter(
+        "1", "w", "weight of the effort in the reward", bounds=(0.0, 1.0), default=0.01
+    )
     period: float = parameter("s", "T", "period of the actions", bounds=(1e-6, 10.0), default=0.01)
-    min_height: float = parameter("m", "y_0min", "lowest initial height", bounds=(-1.0, 1.0), default=0.005)
-    max_height: float = parameter("m", "y_0max", "highest initial height", bounds=(-1.0, 1.0), default=0.02)
-    min_pressure: float = parameter("Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=1.0e5)
-    max_pressure: float = parameter("Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=2.0e5)
+    min_height: float = parameter(
+        "m", "y_0min", "lowest initial height", bounds=(-1.0, 1.0), default=0.005
+    )
+    max_height: float = parameter(
+        "m", "y_0max", "highest initial height", bounds=(-1.0, 1.0), default=0.02
+    )
+    min_pressure: float = parameter(
+        "Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=1.0e5
+    )
+    max_pressure: float = parameter(
+        "Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=2.0e5
+    )
 
     @property
     def observations(self) -> tuple[Observation, ...]:
@@ -46,10 +64,20 @@ class LoadLifting(EnvironmentTask):
 
     @property
     def initial_ranges(self) -> Mapping[str, tuple[float, float]]:
-        return {"pressure": (self.min_pressure, self.max_pressure), "position": (self.min_height, self.max_height)}
+        return {
+            "pressure": (self.min_pressure, self.max_pressure),
+            "position": (self.min_height, self.max_height),
+        }
 
-    def observe(self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
-        return state["position"] / _CM, state["speed"], outputs["pressure"] / bar, self.target_height / _CM
+    def observe(
+        self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value
+    ) -> tuple[Value, ...]:
+        return (
+            state["position"] / _CM,
+            state["speed"],
+            outputs["pressure"] / bar,
+            self.target_height / _CM,
+        )
 
     def errors(self, state: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
         return ((state["position"] - self.target_height) / self.error_scale,)
@@ -64,28 +92,48 @@ class LoadLifting(EnvironmentTask):
 class JointTracking(EnvironmentTask):
     """Tracking of a sine by a joint: theta_r(t) = A sin(2 pi f t + phi); all numbers are chosen.
 
-    The plant has one rotational coordinate and two muscles. Observed are the angle, its speed, the pressures of both
-    muscles, and the reference now and one period later. The error theta - theta_r is scaled by `error_scale`. An
-    episode ends where the angle exceeds `largest_angle`, or a number is not finite.
+    The plant has one rotational coordinate and two muscles. Observed are the angle, its speed, the
+    pressures of both muscles, and the reference now and one period later. The error theta - theta_r
+    is scaled by `error_scale`. An episode ends where the angle exceeds `largest_angle`, or a number
+    is not finite.
     """
 
     plant: Plant
-    target_amplitude: float = parameter("rad", "A", "amplitude of the reference", bounds=(0.0, 3.0), default=0.3)
-    target_frequency: float = parameter("Hz", "f", "frequency of the reference", bounds=(0.0, 100.0), default=0.5)
-    target_phase: float = parameter("rad", "phi", "phase of the reference", bounds=(-10.0, 10.0), default=0.0)
-    error_scale: float = parameter("rad", "e_0", "error at which the reward is 0.37", bounds=(1e-6, 10.0), default=0.1)
-    largest_angle: float = parameter("rad", "theta_max", "angle that ends an episode", bounds=(0.0, 3.2), default=0.785)
-    effort_weight: float = parameter("1", "w", "weight of the effort in the reward", bounds=(0.0, 1.0), default=0.01)
+    target_amplitude: float = parameter(
+        "rad", "A", "amplitude of the reference", bounds=(0.0, 3.0), default=0.3
+    )
+    target_frequency: float = parameter(
+        "Hz", "f", "frequency of the reference", bounds=(0.0, 100.0), default=0.5
+    )
+    target_phase: float = parameter(
+        "rad", "phi", "phase of the reference", bounds=(-10.0, 10.0), default=0.0
+    )
+    error_scale: float = parameter(
+        "rad", "e_0", "error at which the reward is 0.37", bounds=(1e-6, 10.0), default=0.1
+    )
+    largest_angle: float = parameter(
+        "rad", "theta_max", "angle that ends an episode", bounds=(0.0, 3.2), default=0.785
+    )
+    effort_weight: float = parameter(
+        "1", "w", "weight of the effort in the reward", bounds=(0.0, 1.0), default=0.01
+    )
     period: float = parameter("s", "T", "period of the actions", bounds=(1e-6, 10.0), default=0.01)
-    initial_angle: float = parameter("rad", "theta_0", "largest initial angle", bounds=(0.0, 3.0), default=0.1)
-    min_pressure: float = parameter("Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=1.5e5)
-    max_pressure: float = parameter("Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=2.5e5)
+    initial_angle: float = parameter(
+        "rad", "theta_0", "largest initial angle", bounds=(0.0, 3.0), default=0.1
+    )
+    min_pressure: float = parameter(
+        "Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=1.5e5
+    )
+    max_pressure: float = parameter(
+        "Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=2.5e5
+    )
 
     def check(self) -> None:
         if len(self.plant.mechanism.coordinates) != 1:
             names = ", ".join(c.name for c in self.plant.mechanism.coordinates) or "none"
             raise ParameterError(
-                f"JointTracking: the coordinates of the plant are {names}; one is needed. Give ArmReaching an arm."
+                f"JointTracking: the coordinates of the plant are {names}; one is needed. Give"
+                " ArmReaching an arm."
             )
 
     @property
@@ -98,24 +146,39 @@ class JointTracking(EnvironmentTask):
         return (
             Observation("angle", "rad", -3.2, 3.2, "joint angle"),
             Observation("angular_speed", "rad/s", -50.0, 50.0, "speed of the joint angle"),
-            *(Observation(f"{p}pressure", "bar", -1.1, 20.0, "gauge pressure") for p in self.plant.prefixes),
+            *(
+                Observation(f"{p}pressure", "bar", -1.1, 20.0, "gauge pressure")
+                for p in self.plant.prefixes
+            ),
             Observation("target", "rad", -3.2, 3.2, "reference angle"),
             Observation("next_target", "rad", -3.2, 3.2, "reference angle one period later"),
         )
 
     @property
     def initial_ranges(self) -> Mapping[str, tuple[float, float]]:
-        pressures = {f"{p}pressure": (self.min_pressure, self.max_pressure) for p in self.plant.prefixes}
+        pressures = {
+            f"{p}pressure": (self.min_pressure, self.max_pressure) for p in self.plant.prefixes
+        }
         return {**pressures, self.joint.name: (-self.initial_angle, self.initial_angle)}
 
     def target(self, time: Value) -> Value:
         """The reference [rad] at a time [s]."""
-        return self.target_amplitude * ops.sin(2.0 * ops.pi * self.target_frequency * time + self.target_phase)
+        return self.target_amplitude * ops.sin(
+            2.0 * ops.pi * self.target_frequency * time + self.target_phase
+        )
 
-    def observe(self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
+    def observe(
+        self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value
+    ) -> tuple[Value, ...]:
         pressures = (outputs[f"{p}pressure"] / bar for p in self.plant.prefixes)
         later = self.target(time + self.period)
-        return (state[self.joint.name], state[self.joint.speed], *pressures, self.target(time), later)
+        return (
+            state[self.joint.name],
+            state[self.joint.speed],
+            *pressures,
+            self.target(time),
+            later,
+        )
 
     def errors(self, state: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
         return ((state[self.joint.name] - self.target(time)) / self.error_scale,)
@@ -126,27 +189,44 @@ class JointTracking(EnvironmentTask):
 
 @model
 class ArmReaching(EnvironmentTask):
-    """Reaching of angles that are constant in an episode by an arm with any number of joints; all numbers are chosen.
+    """Reaching of angles that are constant in an episode by an arm with any number of joints; all
+    numbers are chosen.
 
-    The plant has rotational coordinates only. Observed are all angles, their speeds, the pressures of all muscles, and
-    the references. The errors are scaled by `error_scale`. An episode ends where an angle exceeds `largest_angle`, or a
-    number is not finite.
+    The plant has rotational coordinates only. Observed are all angles, their speeds, the pressures
+    of all muscles, and the references. The errors are scaled by `error_scale`. An episode ends
+    where an angle exceeds `largest_angle`, or a number is not finite.
     """
 
     plant: Plant
-    targets: tuple[float, ...] = parameter("rad", "theta_r", "reference angles", bounds=(-3.2, 3.2), default=(0.0, 0.0))
-    error_scale: float = parameter("rad", "e_0", "error at which the reward is 0.37", bounds=(1e-6, 10.0), default=0.05)
-    largest_angle: float = parameter("rad", "theta_max", "angle that ends an episode", bounds=(0.0, 3.2), default=0.5)
-    effort_weight: float = parameter("1", "w", "weight of the effort in the reward", bounds=(0.0, 1.0), default=0.01)
+    targets: tuple[float, ...] = parameter(
+        "rad", "theta_r", "reference angles", bounds=(-3.2, 3.2), default=(0.0, 0.0)
+    )
+    error_scale: float = parameter(
+        "rad", "e_0", "error at which the reward is 0.37", bounds=(1e-6, 10.0), default=0.05
+    )
+    largest_angle: float = parameter(
+        "rad", "theta_max", "angle that ends an episode", bounds=(0.0, 3.2), default=0.5
+    )
+    effort_weight: float = parameter(
+        "1", "w", "weight of the effort in the reward", bounds=(0.0, 1.0), default=0.01
+    )
     period: float = parameter("s", "T", "period of the actions", bounds=(1e-6, 10.0), default=0.01)
-    initial_angle: float = parameter("rad", "theta_0", "largest initial angle", bounds=(0.0, 3.0), default=0.03)
-    min_pressure: float = parameter("Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=2.5e5)
-    max_pressure: float = parameter("Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=3.5e5)
+    initial_angle: float = parameter(
+        "rad", "theta_0", "largest initial angle", bounds=(0.0, 3.0), default=0.03
+    )
+    min_pressure: float = parameter(
+        "Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=2.5e5
+    )
+    max_pressure: float = parameter(
+        "Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=3.5e5
+    )
 
     def check(self) -> None:
         joints = len(self.plant.mechanism.coordinates)
         if len(self.targets) != joints:
-            raise ParameterError(f"ArmReaching: {len(self.targets)} targets for {joints} joints; give one each.")
+            raise ParameterError(
+                f"ArmReaching: {len(self.targets)} targets for {joints} joints; give one each."
+            )
 
     @property
     def observations(self) -> tuple[Observation, ...]:
@@ -154,17 +234,27 @@ class ArmReaching(EnvironmentTask):
         return (
             *(Observation(c.name, "rad", -3.2, 3.2, "joint angle") for c in joints),
             *(Observation(c.speed, "rad/s", -50.0, 50.0, "speed of a joint angle") for c in joints),
-            *(Observation(f"{p}pressure", "bar", -1.1, 20.0, "gauge pressure") for p in self.plant.prefixes),
+            *(
+                Observation(f"{p}pressure", "bar", -1.1, 20.0, "gauge pressure")
+                for p in self.plant.prefixes
+            ),
             *(Observation(f"{c.name}.target", "rad", -3.2, 3.2, "reference angle") for c in joints),
         )
 
     @property
     def initial_ranges(self) -> Mapping[str, tuple[float, float]]:
-        pressures = {f"{p}pressure": (self.min_pressure, self.max_pressure) for p in self.plant.prefixes}
-        angles = {c.name: (-self.initial_angle, self.initial_angle) for c in self.plant.mechanism.coordinates}
+        pressures = {
+            f"{p}pressure": (self.min_pressure, self.max_pressure) for p in self.plant.prefixes
+        }
+        angles = {
+            c.name: (-self.initial_angle, self.initial_angle)
+            for c in self.plant.mechanism.coordinates
+        }
         return {**pressures, **angles}
 
-    def observe(self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
+    def observe(
+        self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value
+    ) -> tuple[Value, ...]:
         joints = self.plant.mechanism.coordinates
         pressures = (outputs[f"{p}pressure"] / bar for p in self.plant.prefixes)
         moving = (state[c.speed] for c in joints)
@@ -185,21 +275,28 @@ TaskWithRandomisation = tuple[JointTracking | LoadLifting | ArmReaching, tuple[R
 
 @functools.cache
 def joint_task() -> TaskWithRandomisation:
-    """Tracking by joint-dmsp-20-matrix; sines of 0.1 to 0.4 rad and 0.1 to 0.8 Hz, inertia and supply vary."""
+    """Tracking by joint-dmsp-20-matrix; sines of 0.1 to 0.4 rad and 0.1 to 0.8 Hz, inertia and
+    supply vary.
+    """
     return JointTracking(_loaded("joint-dmsp-20-matrix", PlantEntry).plant), (
         ValueRange(("target_amplitude",), 0.1, 0.4),
         ValueRange(("target_frequency",), 0.1, 0.8),
         ValueRange(("target_phase",), 0.0, 2.0 * math.pi),
         FactorRange(("plant.mechanism.inertia",), 0.8, 1.2),
         FactorRange(("plant.mechanism.weight_torque",), 0.7, 1.3),
-        FactorRange(("plant.circuit[0].supply.pressure", "plant.circuit[1].supply.pressure"), 0.8, 1.0),
+        FactorRange(
+            ("plant.circuit[0].supply.pressure", "plant.circuit[1].supply.pressure"), 0.8, 1.0
+        ),
     )
 
 
 @functools.cache
 def lift_task() -> TaskWithRandomisation:
-    """Lifting of 15 to 25 kg by dmsp-20-300 with MATRIX 821 valves at 6 bar to heights of 10 to 40 mm."""
-    muscle, valve = _loaded("dmsp-20-300", Entry).muscle, _loaded("matrix-821", ValveEntry).valve
+    """Lifting of 15 to 25 kg by dmsp-20-300 with MATRIX 821 valves at 6 bar to heights of 10 to 40
+    mm.
+    """
+    muscle = _loaded("dmsp-20-300", Entry).muscle
+    valve = _loaded("matrix-821", ValveEntry).valve
     muscle = dataclasses.replace(muscle, damper=LinearDamper(200.0))
     plant = Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0))
     return LoadLifting(plant), (

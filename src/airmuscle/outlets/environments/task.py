@@ -11,14 +11,16 @@ from typing import ClassVar, NamedTuple
 from ...core import Input, ParameterError, StateVariable, System, Value, check_field_types, ops
 from ...physics.plant import Plant
 
-_FILL, _DISCHARGE = "fill", "discharge"
+_FILL = "fill"
+_DISCHARGE = "discharge"
 
 
 class Action(NamedTuple):
     """An action: its name, its meaning, and the inputs that it determines.
 
-    With a fill and a discharge valve, the positive part is the opening of the first, the negative part that of the
-    second. Any other input covers its range, from its minimum at -1 to its maximum at 1.
+    With a fill and a discharge valve, the positive part is the opening of the first, the negative
+    part that of the second. Any other input covers its range, from its minimum at -1 to its maximum
+    at 1.
     """
 
     name: str
@@ -31,19 +33,23 @@ class Action(NamedTuple):
             fill, discharge = self.inputs
             return {fill.name: ops.maximum(action, 0.0), discharge.name: ops.maximum(-action, 0.0)}
         (only,) = self.inputs
-        middle, half = 0.5 * (only.maximum + only.minimum), 0.5 * (only.maximum - only.minimum)
+        middle = 0.5 * (only.maximum + only.minimum)
+        half = 0.5 * (only.maximum - only.minimum)
         return {only.name: middle + half * action}
 
 
 def check_actions(actions: tuple[Action, ...]) -> None:
     """Raise ParameterError for a plant without inputs, or an input whose range is infinite."""
     if not actions:
-        raise ParameterError("the plant of the task has no inputs; an environment needs one action or more.")
+        raise ParameterError(
+            "the plant of the task has no inputs; an environment needs one action or more."
+        )
     for variable in (i for action in actions for i in action.inputs):
         if not (math.isfinite(variable.minimum) and math.isfinite(variable.maximum)):
             raise ParameterError(
-                f"the input '{variable.name}' has the range {variable.minimum:g} to {variable.maximum:g}; an action "
-                "needs a finite range. Give a plant whose inputs are limited."
+                f"the input '{variable.name}' has the range {variable.minimum:g} to"
+                f" {variable.maximum:g}; an action needs a finite range. Give a plant whose inputs"
+                " are limited."
             )
 
 
@@ -66,15 +72,18 @@ class Observation:
 
 
 class EnvironmentTask(System):
-    """A plant with a task, whose outputs are the observations, the reward and whether an episode ends.
+    """A plant with a task, whose outputs are the observations, the reward and whether an episode
+    ends.
 
         reward = exp(-e_1^2 - e_2^2 - ...) - w (a_1^2 + ... + a_m^2)/m
 
-    e_i control errors divided by their scale, a_j actions from -1 to 1, w weight of the effort. The reward is at most
-    1 per period; an error of one scale gives 0.37. An episode is terminated where `ends` holds.
+    e_i control errors divided by their scale, a_j actions from -1 to 1, w weight of the effort. The
+    reward is at most 1 per period; an error of one scale gives 0.37. An episode is terminated where
+    `ends` holds.
 
-    Its parameters are those of the plant (`plant.mechanism.inertia`) and its own (`target_frequency`); a randomisation
-    may vary all of them. Written over `ops`, so that it is compiled together with the plant, also in lanes.
+    Its parameters are those of the plant (`plant.mechanism.inertia`) and its own
+    (`target_frequency`); a randomisation may vary all of them. Written over `ops`, so that it is
+    compiled together with the plant, also in lanes.
     """
 
     from_file: ClassVar[bool] = False
@@ -91,11 +100,17 @@ class EnvironmentTask(System):
     @property
     @abc.abstractmethod
     def initial_ranges(self) -> Mapping[str, tuple[float, float]]:
-        """Ranges of the initial gauge pressure of every muscle ('left.pressure' [Pa]) and coordinate; speeds are 0."""
+        """Ranges of the initial gauge pressure of every muscle ('left.pressure' [Pa]) and
+        coordinate; speeds are 0.
+        """
 
     @abc.abstractmethod
-    def observe(self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
-        """The observations at a state, in the units of `observations`; `outputs` are those of the plant."""
+    def observe(
+        self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value
+    ) -> tuple[Value, ...]:
+        """The observations at a state, in the units of `observations`; `outputs` are those of the
+        plant.
+        """
 
     @abc.abstractmethod
     def errors(self, state: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
@@ -108,12 +123,17 @@ class EnvironmentTask(System):
     @functools.cached_property
     def actions(self) -> tuple[Action, ...]:
         """The actions, in the order of the inputs of the plant; each is between -1 and 1."""
-        known, actions = {i.name: i for i in self.plant.input_variables}, []
+        known = {i.name: i for i in self.plant.input_variables}
+        actions = []
         for name, variable in known.items():
             prefix, dot, own = name.rpartition(".")
             fill, discharge = (known.get(f"{prefix}{dot}{valve}") for valve in (_FILL, _DISCHARGE))
             if own not in (_FILL, _DISCHARGE) or fill is None or discharge is None:
-                actions.append(Action(name, f"{variable.meaning}; -1 is its minimum, 1 its maximum", (variable,)))
+                actions.append(
+                    Action(
+                        name, f"{variable.meaning}; -1 is its minimum, 1 its maximum", (variable,)
+                    )
+                )
             elif variable is fill:
                 meaning = "1 fills, -1 discharges, 0 closes both valves"
                 actions.append(Action(prefix or "valve", meaning, (fill, discharge)))
@@ -150,10 +170,15 @@ class EnvironmentTask(System):
         return dict(itertools.chain.from_iterable(each.items() for each in commands))
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """The observations by name, clipped, then the reward, then 1 where the episode ends, else 0."""
+        """The observations by name, clipped, then the reward, then 1 where the episode ends, else
+        0.
+        """
         time = inputs[TIME]
         values = self.observe(state, self.plant.outputs(state, self._commands(inputs)), time)
-        observed = {o.name: ops.clip(v, o.low, o.high) for o, v in zip(self.observations, values, strict=True)}
+        observed = {
+            o.name: ops.clip(v, o.low, o.high)
+            for o, v in zip(self.observations, values, strict=True)
+        }
         efforts = [inputs[f"action.{a.name}"] ** 2 for a in self.actions]
         closeness = ops.exp(-sum(error**2 for error in self.errors(state, time)))
         reward = closeness - self.effort_weight * sum(efforts) / len(efforts)

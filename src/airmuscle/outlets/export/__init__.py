@@ -1,4 +1,6 @@
-"""Export of plants, laws and controllers as source text of other languages, as FMUs, and as MuJoCo plugins."""
+"""Export of plants, laws and controllers as source text of other languages, as FMUs, and as MuJoCo
+plugins.
+"""
 
 from ...core.stubs import attach_stub
 

@@ -1,10 +1,13 @@
-"""Actuator for learning stacks: one muscle with its circuit as functions of a command, its length and its speed.
+"""Actuator for learning stacks: one muscle with its circuit as functions of a command, its length
+and its speed.
 
 start(q, c, x)       states x at q = (gauge pressure [Pa], length [m])
-step(x, z, c, h, y)  states y after a time h [s] under z = (command, length [m], speed [m/s]): the command is held,
-                     the length moves at its speed; classical Runge-Kutta method, as `simulate` with RungeKutta4(h)
-observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validity range of the muscle, else 0)
-prepare(p, c)        c, what these need of the parameters
+step(x, z, c, h, y)  states y after a time h [s] under z = (command, length [m], speed [m/s]): the
+command is held,
+                     the length moves at its speed; classical Runge-Kutta method, as `simulate` with
+                     RungeKutta4(h)
+observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validity range of the
+muscle, else 0) prepare(p, c)        c, what these need of the parameters
 """
 
 import dataclasses
@@ -24,9 +27,10 @@ from ...physics.mechanism import SHORTENING, SHORTENING_SPEED, ExternalLoad
 from ...physics.plant import Plant, open_plant
 from .printed_system import make_labels
 
-SAFETY, MAX_STEP = 1.0, 1e-3
-"""Largest product of the default step and the fastest rate of the plant, of which 2.8 is the limit of the method, and
-longest default step [s] (chosen)."""
+SAFETY = 1.0
+MAX_STEP = 1e-3
+"""Largest product of the default step and the fastest rate of the plant, of which 2.8 is the limit
+of the method, and longest default step [s] (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -34,8 +38,8 @@ class ActuatorModel:
     """One muscle of a plant, open towards its load, with one command.
 
     part       the plant with length and speed of the muscle as inputs
-    controls   inputs that the command opens: one, or two of which a negative command opens the second
-    step       the longest step of the integrator [s]
+    controls   inputs that the command opens: one, or two of which a negative command opens the
+    second step       the longest step of the integrator [s]
     """
 
     part: Plant
@@ -62,7 +66,9 @@ class ActuatorModel:
         values = {SHORTENING: rest - z[1], SHORTENING_SPEED: -z[2]}
         pair = [casadi.fmax(command, 0.0), casadi.fmax(-command, 0.0)]
         openings = pair if len(self.controls) == 2 else [command]
-        values |= {control.name: opening for control, opening in zip(self.controls, openings, strict=False)}
+        values |= {
+            control.name: opening for control, opening in zip(self.controls, openings, strict=False)
+        }
         return casadi.vertcat(casadi.SX(0, 1), *(values[name] for name in self.part.inputs))
 
     @functools.cached_property
@@ -70,7 +76,9 @@ class ActuatorModel:
         """Arguments and result of `step`."""
         import casadi
 
-        t, z, h = self._traced, casadi.SX.sym("z", 3), casadi.SX.sym("h")
+        t = self._traced
+        z = casadi.SX.sym("z", 3)
+        h = casadi.SX.sym("h")
         rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
         rows, weights = RungeKutta4(self.step).tableau()
         slopes: list[Any] = []
@@ -78,7 +86,9 @@ class ActuatorModel:
             increment = sum((a * k for a, k in zip(row, slopes, strict=True) if a), casadi.SX(0))
             at = casadi.vertcat(z[0], z[1] + sum(row) * h * z[2], z[2])
             slopes.append(rates(t.x + h * increment if row else t.x, self._inputs(at, t.p), t.p))
-        later = t.x + h * sum((b * k for b, k in zip(weights, slopes, strict=True) if b), casadi.SX(0))
+        later = t.x + h * sum(
+            (b * k for b, k in zip(weights, slopes, strict=True) if b), casadi.SX(0)
+        )
         return {"x": t.x, "z": z, "p": t.p, "h": h}, later
 
     @functools.cached_property
@@ -86,16 +96,20 @@ class ActuatorModel:
         """Arguments and result of `observe`."""
         import casadi
 
-        t, z = self._traced, casadi.SX.sym("z", 3)
+        t = self._traced
+        z = casadi.SX.sym("z", 3)
         o = casadi.substitute(t.o, t.u, self._inputs(z, t.p))
         names = (*(s.name for s in self.part.states), *t.output_names)
         known = dict(zip(names, casadi.vertsplit(casadi.vertcat(t.x, o)), strict=True))
         valid = casadi.SX(1.0)
         for limit in (each for each in self.part.column_limits if each.column in known):
-            value, (low, high) = known[limit.column], limit.bounds
+            value = known[limit.column]
+            low, high = limit.bounds
             valid = casadi.logic_and(valid, value >= low) if np.isfinite(low) else valid
             valid = casadi.logic_and(valid, value <= high) if np.isfinite(high) else valid
-        return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(known["force"], known["pressure"], valid)
+        return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(
+            known["force"], known["pressure"], valid
+        )
 
     @functools.cached_property
     def start(self) -> tuple[dict[str, Any], Any]:
@@ -109,8 +123,8 @@ class ActuatorModel:
             settled, volumes = model.settle_muscles((q[0],), {SHORTENING: shortening})
         except TypeError:
             raise ParameterError(
-                f"actuator: {self.part.muscles[0].name} has a series spring, whose initial state is found by iteration "
-                "and has no printed form; leave the series spring out."
+                f"actuator: {self.part.muscles[0].name} has a series spring, whose initial state is"
+                " found by iteration and has no printed form; leave the series spring out."
             ) from None
         state = model.fill_muscles((q[0],), volumes, settled)
         values = casadi.vertcat(*(casadi.SX(state[s.name]) for s in self.part.states))
@@ -123,25 +137,52 @@ class ActuatorModel:
 
         states = [(s.name, s.unit, s.meaning) for s in self.part.states]
         unit = self.controls[0].unit if self.controls else ""
-        labels = make_labels({
-            "x": states, "y": [(f"next {name}", unit, "") for name, unit, _ in states],
-            "z": [("command", unit, ""), ("length", "m", "of the muscle"), ("speed", "m/s", "of the length")],
-            "q": [("initial pressure", "Pa", "gauge"), ("initial length", "m", "of the muscle")],
-            "o": [("tension", "N", ""), ("pressure", "Pa", "gauge"), ("valid", "", "1 within the validity range")],
-            "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.parameters],
-        })  # fmt: skip
+        labels = make_labels(
+            {
+                "x": states,
+                "y": [(f"next {name}", unit, "") for name, unit, _ in states],
+                "z": [
+                    ("command", unit, ""),
+                    ("length", "m", "of the muscle"),
+                    ("speed", "m/s", "of the length"),
+                ],
+                "q": [
+                    ("initial pressure", "Pa", "gauge"),
+                    ("initial length", "m", "of the muscle"),
+                ],
+                "o": [
+                    ("tension", "N", ""),
+                    ("pressure", "Pa", "gauge"),
+                    ("valid", "", "1 within the validity range"),
+                ],
+                "p": [
+                    (leaf.path, leaf.declared.unit, leaf.declared.meaning)
+                    for leaf in self.parameters
+                ],
+            }
+        )
         printer = Printer(dataclasses.replace(language, labels=labels))  # type: ignore[type-var]
-        functions = (("start", self.start, "x"), ("step", self.step_of_time, "y"), ("observe", self.observe, "o"))
+        functions = (
+            ("start", self.start, "x"),
+            ("step", self.step_of_time, "y"),
+            ("observe", self.observe, "o"),
+        )
         for name, (inputs, result), output in functions:
-            printer.add(name, inputs, {output: casadi.cse(casadi.densify(result))}, ["h"] if "h" in inputs else ())
+            printer.add(
+                name,
+                inputs,
+                {output: casadi.cse(casadi.densify(result))},
+                ["h"] if "h" in inputs else (),
+            )
         return printer.module(), printer.held
 
 
 def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None) -> ActuatorModel:
-    """One muscle of a plant with its circuit, without the load; arguments as for `write_actuator`. Raises
-    ParameterError for a plant that has not one command, and a step that is not positive."""
+    """One muscle of a plant with its circuit, without the load; arguments as for `write_actuator`.
+    Raises ParameterError for a plant that has not one command, and a step that is not positive."""
     part = open_plant(single_muscle(plant, muscle))
-    controls, step = controls_of(part), _stable_step(part) if step is None else step
+    controls = controls_of(part)
+    step = _stable_step(part) if step is None else step
     if not 0.0 < step < 1.0:
         raise ParameterError(f"actuator: step is {step!r} s; allowed range: above 0 to 1 s.")
     return ActuatorModel(part, controls, step)
@@ -156,22 +197,28 @@ def single_muscle(plant: Plant, muscle: str) -> Plant:
         return plant
     if len(plant.circuits) != len(names):
         raise ParameterError(
-            f"the muscles {', '.join(names)} share the circuit {type(plant.circuits[0]).__name__} and cannot be "
-            "separate actuators; give each muscle a circuit of its own."
+            f"the muscles {', '.join(names)} share the circuit {type(plant.circuits[0]).__name__}"
+            " and cannot be separate actuators; give each muscle a circuit of its own."
         )
     if muscle not in names:
         raise ParameterError(f"choose one of the muscles {', '.join(names)}; given: '{muscle}'.")
     k = names.index(muscle)
-    return dataclasses.replace(plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad())
+    return dataclasses.replace(
+        plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad()
+    )
 
 
 def controls_of(part: Plant) -> tuple[Input, ...]:
-    """The inputs of an open plant that one command sets. Raises ParameterError for more than two."""
-    controls = tuple(i for i in part.input_variables if i.name not in (SHORTENING, SHORTENING_SPEED))
+    """The inputs of an open plant that one command sets. Raises ParameterError for more than
+    two.
+    """
+    controls = tuple(
+        i for i in part.input_variables if i.name not in (SHORTENING, SHORTENING_SPEED)
+    )
     if len(controls) > 2 or (len(controls) == 2 and any(i.minimum != 0.0 for i in controls)):
         raise ParameterError(
-            "an actuator has one control; a circuit with a single input, or two valves that open from 0, can be "
-            f"exported, but the inputs are {', '.join(i.name for i in controls)}."
+            "an actuator has one control; a circuit with a single input, or two valves that open"
+            f" from 0, can be exported, but the inputs are {', '.join(i.name for i in controls)}."
         )
     return controls
 
@@ -184,10 +231,15 @@ def control_range(controls: Sequence[Input]) -> tuple[float, float]:
 
 
 def _stable_step(part: Plant) -> float:
-    """The longest step of 1 ms / 2^k that resolves the fastest rate at a few states, with valves open and closed."""
-    compiled, fastest = compile_system(part), 1.0
+    """The longest step of 1 ms / 2^k that resolves the fastest rate at a few states, with valves
+    open and closed.
+    """
+    compiled = compile_system(part)
+    fastest = 1.0
     sizes = compiled.nominal
-    for pressure, contraction, opening in itertools.product((2e4, 2e5, 5e5), (0.0, 0.1, 0.2), (0.0, 0.5, 1.0)):
+    for pressure, contraction, opening in itertools.product(
+        (2e4, 2e5, 5e5), (0.0, 0.1, 0.2), (0.0, 0.5, 1.0)
+    ):
         shortening = contraction * part.resting_lengths[0]
         try:
             state = open_plant(part, (shortening,)).state_at(pressure=pressure)
@@ -195,7 +247,8 @@ def _stable_step(part: Plant) -> float:
             continue
         motion = {SHORTENING: shortening, SHORTENING_SPEED: 0.0}
         inputs = [
-            motion.get(i.name, i.minimum + opening * (min(i.maximum, 1e6) - i.minimum)) for i in part.input_variables
+            motion.get(i.name, i.minimum + opening * (min(i.maximum, 1e6) - i.minimum))
+            for i in part.input_variables
         ]
         slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
         if np.isfinite(slopes).all():

@@ -1,5 +1,5 @@
-"""C compilers: exported programs built and run on this machine, on other platforms, and on a microcontroller in the
-emulator QEMU."""
+"""C compilers: exported programs built and run on this machine, on other platforms, and on a
+microcontroller in the emulator QEMU."""
 
 import dataclasses
 import importlib.util
@@ -22,18 +22,23 @@ TIME_LIMIT = 600.0
 
 
 def compile_library(
-    sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = (),
+    sources: Mapping[str, bytes],
+    units: Sequence[str],
+    name: str,
+    more: Sequence[str] = (),
     command: Sequence[str] | None = None,
-) -> bytes:  # fmt: skip
-    """The shared library `name` of the files `units` among `sources`, compiled in a fresh folder by a compiler with its
-    first and `more` arguments, by default that of this machine.
+) -> bytes:
+    """The shared library `name` of the files `units` among `sources`, compiled in a fresh folder by
+    a compiler with its first and `more` arguments, by default that of this machine.
 
     Raises ParameterError where there is no compiler, FileError where it fails.
     """
     with temporary_folder() as folder:
         for file, text in sources.items():
             (folder / file).write_bytes(text)
-        run_command([*(command or [find_compiler()]), *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
+        run_command(
+            [*(command or [find_compiler()]), *OPTIONS, *units, "-o", name, *more, "-lm"], folder
+        )
         return (folder / name).read_bytes()
 
 
@@ -46,11 +51,19 @@ def find_compiler(remedy: str = "; install the package gcc or clang") -> str:
     raise ParameterError(f"no C compiler ({', '.join(COMPILERS)}) was found{remedy}")
 
 
-def run_command(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a compiler or a program in a folder. Raises FileError with its message if it fails or takes too long."""
-    name = command[3] if list(command[1:3]) == ["-P", "-m"] else Path(command[0]).name  # a program that is a package
+def run_command(
+    command: Sequence[str], folder: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run a compiler or a program in a folder. Raises FileError with its message if it fails or
+    takes too long.
+    """
+    name = (
+        command[3] if list(command[1:3]) == ["-P", "-m"] else Path(command[0]).name
+    )  # a program that is a package
     try:
-        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=TIME_LIMIT)
+        done = subprocess.run(
+            command, cwd=folder, check=False, capture_output=True, text=True, timeout=TIME_LIMIT
+        )
     except subprocess.TimeoutExpired:
         raise FileError(f"{name} was stopped after {TIME_LIMIT:g} s.") from None
     if done.returncode:
@@ -61,10 +74,12 @@ def run_command(command: Sequence[str], folder: Path | None = None) -> subproces
 
 @dataclasses.dataclass(frozen=True)
 class BuiltProgram:
-    """Standard output and error of an exported program, and the bytes of its sources without `main.c`, compiled small.
+    """Standard output and error of an exported program, and the bytes of its sources without
+    `main.c`, compiled small.
 
     code_size   [bytes] machine code and constants; None where the program `size` is missing
-    stack_size  [bytes] of all functions together, without those of the C library; None where it is not known
+    stack_size  [bytes] of all functions together, without those of the C library; None where it is
+    not known
     """
 
     output: str
@@ -76,23 +91,33 @@ class BuiltProgram:
 def measure_sizes(
     command: Sequence[str], size: str | None, sources: Sequence[Path], folder: Path
 ) -> tuple[int | None, int | None]:
-    """The bytes of machine code and constants, and of the stack, of sources without `main.c`, optimised for size by a
-    compiler with its options; `size` is the program of this name."""
+    """The bytes of machine code and constants, and of the stack, of sources without `main.c`,
+    optimised for size by a compiler with its options; `size` is the program of this name."""
     units = [p for p in sources if p.suffix == ".c" and p.name != "main.c"]
     if not units:
         return None, None
-    code, stack, options = 0, 0, ["-std=c99", "-Os", "-ffp-contract=off", "-fstack-usage", "-c"]
+    code = 0
+    stack = 0
+    options = ["-std=c99", "-Os", "-ffp-contract=off", "-fstack-usage", "-c"]
     for unit in units:
         target = folder / f"{unit.stem}.o"
         run_command([*command, *options, str(unit), "-o", str(target)])
-        numbers = re.search(r"^\s*(\d+)", run_command([size, str(target)]).stdout, re.MULTILINE) if size else None
+        numbers = (
+            re.search(r"^\s*(\d+)", run_command([size, str(target)]).stdout, re.MULTILINE)
+            if size
+            else None
+        )
         code += int(numbers.group(1)) if numbers else 0
         usage = target.with_suffix(".su")
-        stack += sum(map(int, re.findall(r"\t(\d+)\t", usage.read_text() if usage.exists() else "")))
+        stack += sum(
+            map(int, re.findall(r"\t(\d+)\t", usage.read_text() if usage.exists() else ""))
+        )
     return code or None, stack or None
 
 
-COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
+COMPILER = "arm-none-eabi-gcc"
+SIZE = "arm-none-eabi-size"
+EMULATOR = "qemu-system-arm"
 PACKAGES = "gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm"
 """The packages of Debian that contain compiler, C library and emulator."""
 
@@ -109,41 +134,66 @@ PROCESSORS = {
     "cortex-m4": Processor(("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), "mps2-an386"),
     "cortex-m7": Processor(("-mcpu=cortex-m7", "-mfpu=fpv5-d16"), "mps2-an500"),
 }
-"""Processors by name: Cortex-M4 with a unit for single precision, Cortex-M7 with one for double precision."""
+"""Processors by name: Cortex-M4 with a unit for single precision, Cortex-M7 with one for double
+precision.
+"""
 
 
 def build_and_run(sources: Sequence[Path], processor: Processor | None = None) -> BuiltProgram:
-    """Compile exported C sources in a temporary folder and run the program, for a processor in the emulator QEMU; the
-    folder of the sources is unchanged.
+    """Compile exported C sources in a temporary folder and run the program, for a processor in the
+    emulator QEMU; the folder of the sources is unchanged.
 
-    Raises ParameterError where a compiler or the emulator is missing, and FileError where one of them or the program
-    fails.
+    Raises ParameterError where a compiler or the emulator is missing, and FileError where one of
+    them or the program fails.
     """
-    units, place = [str(p) for p in sources if p.suffix == ".c"], sources[0].parent
+    units = [str(p) for p in sources if p.suffix == ".c"]
+    place = sources[0].parent
     if processor is None:
-        command = [find_compiler(
-            f". The sources are in {place}; install gcc or clang, or compile them elsewhere: cc -O2 "
-            f"{' '.join(Path(p).name for p in units)} -lm -o program. JavaScript and Octave need no compiler."
-        )]  # fmt: skip
+        command = [
+            find_compiler(
+                f". The sources are in {place}; install gcc or clang, or compile them elsewhere: cc"
+                f" -O2 {' '.join(Path(p).name for p in units)} -lm -o program. JavaScript and"
+                " Octave need no compiler."
+            )
+        ]
     else:
         for name in (each for each in (COMPILER, EMULATOR) if shutil.which(each) is None):
             raise ParameterError(
-                f"{name} was not found. The sources are in {place}; to compile and run them for a microcontroller "
-                f"install the packages {PACKAGES} (names of Debian)."
+                f"{name} was not found. The sources are in {place}; to compile and run them for a"
+                f" microcontroller install the packages {PACKAGES} (names of Debian)."
             )
         command = [COMPILER, "-mthumb", "-mfloat-abi=hard", *processor.options]
     with temporary_folder() as folder:
-        program, start, run = str(folder / "program"), list[str](), list[str]()
+        program = str(folder / "program")
+        start = list[str]()
+        run = list[str]()
         if processor is not None:
-            startup, script = folder / "cortex_m_startup.c", folder / "cortex_m.ld"
+            startup = folder / "cortex_m_startup.c"
+            script = folder / "cortex_m.ld"
             for file in (startup, script):
                 file.write_text(template(file.name), encoding="utf-8")
             start = ["-nostartfiles", "--specs=rdimon.specs", "-T", str(script), str(startup)]
-            run = [EMULATOR, "-M", processor.board, "-display", "none", "-monitor", "none", "-serial", "none",
-                   "-semihosting-config", "enable=on,target=native", "-kernel"]  # fmt: skip
-        run_command([*command, "-std=c99", "-O2", "-ffp-contract=off", *start, *units, "-o", program, "-lm"])
+            run = [
+                EMULATOR,
+                "-M",
+                processor.board,
+                "-display",
+                "none",
+                "-monitor",
+                "none",
+                "-serial",
+                "none",
+                "-semihosting-config",
+                "enable=on,target=native",
+                "-kernel",
+            ]
+        run_command(
+            [*command, "-std=c99", "-O2", "-ffp-contract=off", *start, *units, "-o", program, "-lm"]
+        )
         done = run_command([*run, program])
-        code, stack = measure_sizes(command, shutil.which(SIZE if processor else "size"), sources, folder)
+        code, stack = measure_sizes(
+            command, shutil.which(SIZE if processor else "size"), sources, folder
+        )
         return BuiltProgram(done.stdout, done.stderr, code, stack if processor else None)
 
 
@@ -152,7 +202,8 @@ PACKAGE = "ziglang"
 
 @dataclasses.dataclass(frozen=True)
 class Platform:
-    """A platform of FMUs: folder of its binaries in FMI 2 and 3, and suffix of its shared libraries.
+    """A platform of FMUs: folder of its binaries in FMI 2 and 3, and suffix of its shared
+    libraries.
 
     target  name of the platform for the cross compiler; empty: this machine, by its own compiler
     """
@@ -167,8 +218,8 @@ class Platform:
         return self.folder_2 if fmi == 2 else self.folder_3
 
     def compile(self, sources: Mapping[str, bytes], units: Sequence[str], name: str) -> bytes:
-        """The shared library `name` of the files `units` among `sources`. Raises ParameterError where the compiler is
-        missing, FileError where it fails."""
+        """The shared library `name` of the files `units` among `sources`. Raises ParameterError
+        where the compiler is missing, FileError where it fails."""
         command = [*find_cross_compiler(), "-target", self.target] if self.target else None
         return compile_library(sources, units, name + self.suffix, command=command)
 
@@ -191,11 +242,14 @@ def find_platform(name: str) -> Platform:
 
 
 def find_cross_compiler() -> list[str]:
-    """The command of the cross compiler. Raises ParameterError, with the command that installs it."""
+    """The command of the cross compiler. Raises ParameterError, with the command that installs
+    it.
+    """
     if importlib.util.find_spec(PACKAGE) is None:
         raise ParameterError(
-            f"binaries for chosen platforms need the package {PACKAGE}, a cross compiler. Install it: pip install "
-            "airmuscle[fmu]; or leave the platforms out: the binary is then that of this machine."
+            f"binaries for chosen platforms need the package {PACKAGE}, a cross compiler. Install"
+            " it: pip install airmuscle[fmu]; or leave the platforms out: the binary is then that"
+            " of this machine."
         )
     return [sys.executable, "-P", "-m", PACKAGE, "cc"]
 
@@ -206,4 +260,6 @@ def this_platform() -> Platform:
     system, suffix, of_fmi_2 = systems.get(sys.platform, ("linux", ".so", "linux64"))
     machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
     folder = f"{machine}-{system}"
-    return Platform(of_fmi_2 if machine == "x86_64" or system == "darwin" else folder, folder, suffix)
+    return Platform(
+        of_fmi_2 if machine == "x86_64" or system == "darwin" else folder, folder, suffix
+    )

@@ -1,5 +1,5 @@
-"""Variables of an FMU: time, states, rates, inputs, outputs, parameters and the tolerance, with their value references
-and units.
+"""Variables of an FMU: time, states, rates, inputs, outputs, parameters and the tolerance, with
+their value references and units.
 
 The value references follow each other in this order, as in the template `instance.h`; time is 0.
 """
@@ -18,8 +18,12 @@ from ...engine.compile.program import Description
 from .exported_run import ExportedRun
 from .printed_system import meaning_of, per_second
 
-PARAMETERS, TOLERANCE, START = "parameters", "relative_tolerance", "start"
-"""Beginning of the names of parameters, name of the tolerance, and beginning of the names of pressures at the start."""
+PARAMETERS = "parameters"
+TOLERANCE = "relative_tolerance"
+START = "start"
+"""Beginning of the names of parameters, name of the tolerance, and beginning of the names of
+pressures at the start.
+"""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,38 +59,64 @@ class Variables(list[Variable]):
     def add_parameters(self, tunable: Sequence[Leaf]) -> None:
         """Append parameters as tunable variables."""
         for leaf in tunable:
-            self.append(Variable(
-                f"{PARAMETERS}.{leaf.path}", len(self), "parameter", "tunable", "exact", float(leaf.value),
-                leaf.declared.unit, f"{leaf.declared.symbol}: {leaf.declared.meaning}", *leaf.declared.bounds,
-            ))  # fmt: skip
+            self.append(
+                Variable(
+                    f"{PARAMETERS}.{leaf.path}",
+                    len(self),
+                    "parameter",
+                    "tunable",
+                    "exact",
+                    float(leaf.value),
+                    leaf.declared.unit,
+                    f"{leaf.declared.symbol}: {leaf.declared.meaning}",
+                    *leaf.declared.bounds,
+                )
+            )
 
     def checked(self) -> list[Variable]:
-        """The variables, of which pressures state gauge or absolute. Raises ParameterError for two of one name."""
+        """The variables, of which pressures state gauge or absolute. Raises ParameterError for two
+        of one name.
+        """
         for name, count in Counter(variable.name for variable in self).items():
             if count > 1:
                 raise ParameterError(
-                    f"the FMU would have two variables '{name}'; rename the muscle or signal of this name."
+                    f"the FMU would have two variables '{name}'; rename the muscle or signal of"
+                    " this name."
                 )
         stated = []
         for v in self:
-            name, about, unit = printable(v.name), printable(v.description), v.unit.replace("Pa(a)", "Pa")
+            name = printable(v.name)
+            about = printable(v.description)
+            unit = v.unit.replace("Pa(a)", "Pa")
             kind = "absolute" if unit != v.unit else "gauge"
             is_stated = any(word in about for word in ("gauge", "absolute"))
-            if unit == "Pa" and not is_stated and ("pressure" in f"{name} {about}" or kind == "absolute"):
+            if (
+                unit == "Pa"
+                and not is_stated
+                and ("pressure" in f"{name} {about}" or kind == "absolute")
+            ):
                 about = f"{about or 'pressure'}, {kind}"
             stated.append(dataclasses.replace(v, name=name, description=about, unit=unit))
         return stated
 
 
-def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, float]) -> list[Variable]:
-    """The variables of an FMU, by increasing value reference, with the pressures of muscles [Pa] at the start by their
-    columns, and so many event indicators at the end. Raises ParameterError for two variables of one name."""
-    variables, units, known = Variables(), program.system.units, program.system.compiled.system
+def make_variables(
+    program: ExportedRun, indicators: int, starts: Mapping[str, float]
+) -> list[Variable]:
+    """The variables of an FMU, by increasing value reference, with the pressures of muscles [Pa] at
+    the start by their columns, and so many event indicators at the end. Raises ParameterError for
+    two variables of one name.
+    """
+    variables = Variables()
+    units = program.system.units
+    known = program.system.compiled.system
     for state, start in zip(known.states, program.problem.initial_vector.tolist(), strict=True):
         given = {"unit": state.unit, "nominal": state.nominal}
         variables.add(state.name, "output", state.meaning, initial="exact", start=start, **given)
     for i, state in enumerate(known.states, 1):
-        name, about, unit = f"der({state.name})", f"derivative of {state.name}", per_second(state.unit)
+        name = f"der({state.name})"
+        about = f"derivative of {state.name}"
+        unit = per_second(state.unit)
         variables.add(name, "local", about, initial="calculated", unit=unit, derivative_of=i)
     for each, start in zip(known.input_variables, program.first_inputs, strict=True):
         limits = {"minimum": each.minimum, "maximum": each.maximum}
@@ -97,11 +127,18 @@ def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, f
     exact = {"causality": "parameter", "initial": "exact"}
     if program.tolerance is not None:
         about = "relative tolerance of the integrator in Co-Simulation"
-        variables.add(TOLERANCE, description=about, variability="tunable", start=program.tolerance, **exact)
+        variables.add(
+            TOLERANCE, description=about, variability="tunable", start=program.tolerance, **exact
+        )
     for column, pressure in starts.items():
-        about = "gauge pressure of the muscle at the start, from which its air mass follows; other states are kept"
+        about = (
+            "gauge pressure of the muscle at the start, from which its air mass follows; other"
+            " states are kept"
+        )
         name = f"{START}.{column}"
-        variables.add(name, description=about, variability="fixed", start=pressure, unit="Pa", **exact)
+        variables.add(
+            name, description=about, variability="fixed", start=pressure, unit="Pa", **exact
+        )
     for i in range(1, indicators + 1):
         about = "changes its sign where the rates are not smooth"
         variables.add(f"event_indicator[{i}]", "local", about, is_indicator=True)
@@ -109,18 +146,28 @@ def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, f
 
 
 def references_of(known: Description, place: Place) -> tuple[int, int]:
-    """The value references of the rate or output, and of the state or input, of a partial derivative."""
-    n, m = len(known.state_names), len(known.input_names)
+    """The value references of the rate or output, and of the state or input, of a partial
+    derivative.
+    """
+    n = len(known.state_names)
+    m = len(known.input_names)
     row, column = place
     unknown = 1 + n + row if row < n else 1 + 2 * n + m + row - n
     return unknown, 1 + column if column < n else 1 + 2 * n + column - n
 
 
 BASE: dict[str, dict[str, int]] = {
-    "m": {"m": 1}, "s": {"s": 1}, "kg": {"kg": 1}, "K": {"K": 1}, "rad": {"rad": 1}, "N": {"kg": 1, "m": 1, "s": -2},
-    "Pa": {"kg": 1, "m": -1, "s": -2}, "J": {"kg": 1, "m": 2, "s": -2}, "W": {"kg": 1, "m": 2, "s": -3},
+    "m": {"m": 1},
+    "s": {"s": 1},
+    "kg": {"kg": 1},
+    "K": {"K": 1},
+    "rad": {"rad": 1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
     "Hz": {"s": -1},
-}  # fmt: skip
+}
 """Powers of the base units in the units of which the units of columns and parameters consist."""
 _ATOM = re.compile(r"([A-Za-z]+)(?:\^?(-?\d+))?$")
 
@@ -146,7 +193,8 @@ def add_units(parent: Element, units: Iterable[str]) -> None:
     names = sorted({unit for unit in units if has_unit(unit)})
     definitions = SubElement(parent, "UnitDefinitions") if names else parent
     for name in names:
-        element, powers = SubElement(definitions, "Unit", name=name), base_powers(name)
+        element = SubElement(definitions, "Unit", name=name)
+        powers = base_powers(name)
         if powers is not None:
             SubElement(element, "BaseUnit", {base: str(power) for base, power in powers.items()})
 

@@ -1,4 +1,6 @@
-"""Controllers as FMUs for Co-Simulation, and a control loop as an SSP package: FMUs of plant and controller, joined."""
+"""Controllers as FMUs for Co-Simulation, and a control loop as an SSP package: FMUs of plant and
+controller, joined.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -19,23 +21,33 @@ from .fmu import fmu_package
 from .identifiers import block_comment, c_number, c_values, filled, program_name
 from .printed_controller import PrintedController, check_control_law, print_controller
 
-STRUCTURE, COMMON = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common"))
+STRUCTURE, COMMON = (
+    f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common")
+)
 """Namespaces of SSP 1.0."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 
 
 def write_controller_fmu(
-    problem: Problem, path: str | Path, *, fmi: int = 3, name: str = "", title: str = "", binary: bool = True,
+    problem: Problem,
+    path: str | Path,
+    *,
+    fmi: int = 3,
+    name: str = "",
+    title: str = "",
+    binary: bool = True,
     platforms: Sequence[Platform] = (),
-) -> WrittenFmu:  # fmt: skip
+) -> WrittenFmu:
     """Write the control law of a problem as an FMU for Co-Simulation, without the plant.
 
-    problem  a plant with a ControlLoop, whose sample time, ranges and set points at its start are those of the FMU;
-             drivers between commands and openings are not in the FMU, which its documentation states
+    problem  a plant with a ControlLoop, whose sample time, ranges and set points at its start are
+    those of the FMU;
+             drivers between commands and openings are not in the FMU, which its documentation
+             states
 
-    Inputs are the measured columns and `setpoint.NAME`, outputs the commands; all parameters of the law are tunable. At
-    a sampling instant the commands follow from the inputs at once; the step that begins there holds them. Other
-    arguments and errors are those of `write_fmu`.
+    Inputs are the measured columns and `setpoint.NAME`, outputs the commands; all parameters of the
+    law are tunable. At a sampling instant the commands follow from the inputs at once; the step
+    that begins there holds them. Other arguments and errors are those of `write_fmu`.
     """
     target = check_target(path, fmi)
     package = controller_package(problem, fmi, name, title)
@@ -57,32 +69,58 @@ def controller_package(problem: Problem, fmi: int, name: str = "", title: str = 
     experiment["stepSize"] = loop.sample_time
     bounds = [leaf.declared.bounds for leaf in printed.tunable]
     places = printed.places | {
-        "provenance": block_comment(printed.provenance), "token": token, "period": c_number(loop.sample_time),
-        "start": c_number(problem.start_time), "start_inputs": c_values(start, 1),
-        "lowest": c_values([low for low, _ in bounds], 1), "highest": c_values([high for _, high in bounds], 1),
+        "provenance": block_comment(printed.provenance),
+        "token": token,
+        "period": c_number(loop.sample_time),
+        "start": c_number(problem.start_time),
+        "start_inputs": c_values(start, 1),
+        "lowest": c_values([low for low, _ in bounds], 1),
+        "highest": c_values([high for _, high in bounds], 1),
         "functions": printed.sample_in(CLanguage("double", f"{chosen}_")),
-    }  # fmt: skip
+    }
     sources = {f"{chosen}_instance.h": filled("controller_instance.h", places, chosen)}
     return FmuPackage(
-        chosen, printed.provenance, token, variables, dict.fromkeys(outputs, known), 0, experiment, sources,
+        chosen,
+        printed.provenance,
+        token,
+        variables,
+        dict.fromkeys(outputs, known),
+        0,
+        experiment,
+        sources,
         has_states=False,
-    )  # fmt: skip
+    )
 
 
-def _variables(problem: Problem, printed: PrintedController, prepared: SampledLoop) -> list[Variable]:
-    """Time, measurements, set points, commands and parameters, in the order of the template `controller_instance.h`."""
-    law, first, variables = printed.law, _first_row(problem), Variables()
+def _variables(
+    problem: Problem, printed: PrintedController, prepared: SampledLoop
+) -> list[Variable]:
+    """Time, measurements, set points, commands and parameters, in the order of the template
+    `controller_instance.h`.
+    """
+    law = printed.law
+    first = _first_row(problem)
+    variables = Variables()
     of_columns = column_units(problem.system, problem.compiled.description.output_names)
     units = {**named_signal_units(law), **{name: unit for name, unit in of_columns.items() if unit}}
     for column in law.measured_columns:
-        start, unit = first[f"{MEASURED}{column}"], units.get(column, "")
+        start = first[f"{MEASURED}{column}"]
+        unit = units.get(column, "")
         variables.add(column, "input", f"{column}, measured", start=start, unit=unit)
     for signal, value in zip(law.setpoints, prepared.setpoint_values[0].tolist(), strict=True):
-        variables.add(f"{SETPOINT}{signal}", "input", f"{signal} wanted", start=value, unit=units.get(signal, ""))
+        variables.add(
+            f"{SETPOINT}{signal}",
+            "input",
+            f"{signal} wanted",
+            start=value,
+            unit=units.get(signal, ""),
+        )
     for command, (low, high) in zip(law.inputs, printed.ranges, strict=True):
         about = f"command of {command}, held for {prepared.loop.sample_time:g} s"
         given = {"minimum": low, "maximum": high, "unit": units.get(command, "")}
-        variables.add(command, "output", about, variability="discrete", initial="calculated", **given)
+        variables.add(
+            command, "output", about, variability="discrete", initial="calculated", **given
+        )
     variables.add_parameters(printed.tunable)
     return variables.checked()
 
@@ -90,37 +128,52 @@ def _variables(problem: Problem, printed: PrintedController, prepared: SampledLo
 def _first_row(problem: Problem) -> dict[str, float]:
     """All columns at the first sample of a loop."""
     loop = check_control_law(problem)
-    short = dataclasses.replace(problem, duration=min(problem.duration, loop.sample_time), output_times=None)
+    short = dataclasses.replace(
+        problem, duration=min(problem.duration, loop.sample_time), output_times=None
+    )
     recording = solve(short).raise_if_incomplete().recording
     return {name: float(recording[name][0]) for name in recording}
 
 
 def write_ssp(
-    problem: Problem, path: str | Path, *, fmi: int = 3, name: str = "", title: str = "",
-    tunable: Sequence[str] | None = None, binary: bool = True, platforms: Sequence[Platform] = (),
-) -> WrittenFmu:  # fmt: skip
+    problem: Problem,
+    path: str | Path,
+    *,
+    fmi: int = 3,
+    name: str = "",
+    title: str = "",
+    tunable: Sequence[str] | None = None,
+    binary: bool = True,
+    platforms: Sequence[Platform] = (),
+) -> WrittenFmu:
     """Write a plant with its control loop as an SSP 1.0 package: two FMUs, and how they are joined.
 
-    The inputs of the package are the set points and the inputs of the plant that the loop does not command; their start
-    values are those of the problem. The step of the default experiment is the sample time. Raises ParameterError for a
-    loop with drivers, which would stand between the FMUs; other arguments and errors are those of `write_fmu`.
+    The inputs of the package are the set points and the inputs of the plant that the loop does not
+    command; their start values are those of the problem. The step of the default experiment is the
+    sample time. Raises ParameterError for a loop with drivers, which would stand between the FMUs;
+    other arguments and errors are those of `write_fmu`.
     """
     target = check_target(path, fmi, ".ssp")
     loop = check_control_law(problem)
     if loop.drivers:
         raise ParameterError(
-            f"an SSP package joins plant and controller directly; there are drivers of {', '.join(loop.drivers)}. "
-            "Leave drivers out, or export the loop to C, JavaScript or Octave, which have them."
+            "an SSP package joins plant and controller directly; there are drivers of"
+            f" {', '.join(loop.drivers)}. Leave drivers out, or export the loop to C, JavaScript or"
+            " Octave, which have them."
         )
     base = program_name(name, title or type(problem.system).__name__)
     first = _first_row(problem)
-    inputs = {n: ((problem.start_time, first[n]),) for n in problem.compiled.description.input_names}
+    inputs = {
+        n: ((problem.start_time, first[n]),) for n in problem.compiled.description.input_names
+    }
     open_loop = dataclasses.replace(problem, input=Schedule(inputs), control_state=None)
     packages = {
         "plant": fmu_package(open_loop, fmi, f"{base}_plant", title, tunable),
         "controller": controller_package(problem, fmi, f"{base}_controller", title),
     }
-    files, folders, remark = dict[str, bytes](), list[str](), ""
+    files = dict[str, bytes]()
+    folders = list[str]()
+    remark = ""
     for part, package in packages.items():
         files[f"resources/{part}.fmu"], folders, remark = package.content(fmi, binary, platforms)
     files["SystemStructure.ssd"] = _structure(base, packages).encode()
@@ -137,32 +190,56 @@ def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
         for part, package in parts.items()
     }
     joined = [
-        (a, signal, b) for a, b in (("plant", "controller"), ("controller", "plant"))
-        for signal, v in inside[a].items() if v.causality == "output"
-        and signal in inside[b] and inside[b][signal].causality == "input"
-    ]  # fmt: skip
+        (a, signal, b)
+        for a, b in (("plant", "controller"), ("controller", "plant"))
+        for signal, v in inside[a].items()
+        if v.causality == "output"
+        and signal in inside[b]
+        and inside[b][signal].causality == "input"
+    ]
     taken = {(b, signal) for _, signal, b in joined}
     outside = [
-        (part, v) for part, ports in inside.items() for v in ports.values()
+        (part, v)
+        for part, ports in inside.items()
+        for v in ports.values()
         if v.causality == "input" and (part, v.name) not in taken
-    ]  # fmt: skip
+    ]
     _connectors(system, [v for _, v in outside])
     elements = SubElement(system, "ssd:Elements")
     for part, ports in inside.items():
-        component = SubElement(elements, "ssd:Component", name=part, type=FMU_TYPE, source=f"resources/{part}.fmu")
+        component = SubElement(
+            elements, "ssd:Component", name=part, type=FMU_TYPE, source=f"resources/{part}.fmu"
+        )
         _connectors(component, list(ports.values()))
     connections = SubElement(system, "ssd:Connections")
     for part, v in outside:
-        SubElement(connections, "ssd:Connection", startConnector=v.name, endElement=part, endConnector=v.name)
+        SubElement(
+            connections,
+            "ssd:Connection",
+            startConnector=v.name,
+            endElement=part,
+            endConnector=v.name,
+        )
     for a, signal, b in joined:
-        ends = {"startElement": a, "startConnector": signal, "endElement": b, "endConnector": signal}
+        ends = {
+            "startElement": a,
+            "startConnector": signal,
+            "endElement": b,
+            "endConnector": signal,
+        }
         SubElement(connections, "ssd:Connection", ends)
     units = SubElement(root, "ssd:Units")
-    for unit in sorted({v.unit for ports in inside.values() for v in ports.values() if has_unit(v.unit)}):
+    for unit in sorted(
+        {v.unit for ports in inside.values() for v in ports.values() if has_unit(v.unit)}
+    ):
         powers = {base: str(power) for base, power in (base_powers(unit) or {}).items()}
         SubElement(SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", powers)
     experiment = parts["controller"].experiment
-    SubElement(root, "ssd:DefaultExperiment", {key: repr(experiment[key]) for key in ("startTime", "stopTime")})
+    SubElement(
+        root,
+        "ssd:DefaultExperiment",
+        {key: repr(experiment[key]) for key in ("startTime", "stopTime")},
+    )
     return fmi_package.xml_text(root)
 
 

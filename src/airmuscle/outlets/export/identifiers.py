@@ -1,5 +1,5 @@
-"""Texts of exported sources: identifiers in all languages, constants in C, templates of files, and comments that state
-where a file comes from."""
+"""Texts of exported sources: identifiers in all languages, constants in C, templates of files, and
+comments that state where a file comes from."""
 
 import hashlib
 import itertools
@@ -17,31 +17,39 @@ from ...core.tree import fingerprint
 from ...engine.compile.text.languages import CLanguage
 
 LONGEST = 48
-"""Characters of an identifier: with a prefix it stays within the 63 that C99 and MATLAB distinguish."""
+"""Characters of an identifier: with a prefix it stays within the 63 that C99 and MATLAB
+distinguish.
+"""
 _DIGEST = 8
 
 
 def template(name: str) -> str:
     """The text of a template, or of a header that is shipped with the program."""
-    return resources.files(__package__).joinpath("templates", *name.split("/")).read_text(encoding="utf-8")
+    return (
+        resources.files(__package__)
+        .joinpath("templates", *name.split("/"))
+        .read_text(encoding="utf-8")
+    )
 
 
 RESERVED = frozenset(template("reserved.txt").split())
-"""Words that cannot be identifiers or file names, in lower case: keywords of C, C++, JavaScript, MATLAB and Octave,
-functions that printed files call, and device names of Windows."""
+"""Words that cannot be identifiers or file names, in lower case: keywords of C, C++, JavaScript,
+MATLAB and Octave, functions that printed files call, and device names of Windows."""
 
 
 def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
-    """An identifier for every name, in order: ASCII letters, digits and single underscores, distinct in any case.
+    """An identifier for every name, in order: ASCII letters, digits and single underscores,
+    distinct in any case.
 
-    Accents are dropped, other letters are written as their code point, `.` and all other characters become `_`. A
-    keyword gets a final `_`, an identifier longer than LONGEST the digest of its name at its end, the second of two
-    equal identifiers a number. The same names give the same identifiers. Raises ParameterError for a single text.
+    Accents are dropped, other letters are written as their code point, `.` and all other characters
+    become `_`. A keyword gets a final `_`, an identifier longer than LONGEST the digest of its name
+    at its end, the second of two equal identifiers a number. The same names give the same
+    identifiers. Raises ParameterError for a single text.
     """
     if isinstance(names, str):
         raise ParameterError(
-            f"make_identifiers takes a sequence of names, not the text {abridged(names)}; give [text], or use "
-            "make_identifier."
+            f"make_identifiers takes a sequence of names, not the text {abridged(names)}; give"
+            " [text], or use make_identifier."
         )
     taken: set[str] = set()
     last: dict[str, int] = {}
@@ -64,12 +72,13 @@ def make_identifier(name: str) -> str:
 
 
 def program_name(given: str, title: str) -> str:
-    """The name of a program that the user has given, or else one from a title, in lower case. Raises ParameterError,
-    with a name that is possible, if the given one is not an identifier."""
+    """The name of a program that the user has given, or else one from a title, in lower case.
+    Raises ParameterError, with a name that is possible, if the given one is not an identifier."""
     if given and make_identifier(given) != given:
         raise ParameterError(
-            f"'{given[:80]}' cannot be the name of an exported program: it must consist of ASCII letters, digits and "
-            f"single underscores, begin with a letter, and be no keyword. Use '{make_identifier(given)}'."
+            f"'{given[:80]}' cannot be the name of an exported program: it must consist of ASCII"
+            " letters, digits and single underscores, begin with a letter, and be no keyword. Use"
+            f" '{make_identifier(given)}'."
         )
     return given or make_identifier(make_identifier(title).lower())
 
@@ -88,7 +97,9 @@ def _word(name: str) -> str:
 
 
 _PROGRAM = "add_executable({0}_run main.c)\ntarget_link_libraries({0}_run PRIVATE {0})"
-_PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&")
+_PLAIN = frozenset(
+    "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&"
+)
 _LANGUAGES = {number: CLanguage(number) for number in ("double", "float")}
 
 
@@ -98,7 +109,9 @@ def c_number(value: float, number: str = "double") -> str:
 
 
 def c_string(text: str) -> str:
-    """A text as a string of ASCII characters; all others are written as octal bytes of their UTF-8 form."""
+    """A text as a string of ASCII characters; all others are written as octal bytes of their UTF-8
+    form.
+    """
     encoded = text.encode("utf-8", "replace")
     return '"' + "".join(chr(b) if chr(b) in _PLAIN else f"\\{b:03o}" for b in encoded) + '"'
 
@@ -109,28 +122,39 @@ def c_strings(texts: Iterable[str]) -> str:
 
 
 def c_values(values: Any, padding: int = 0, number: str = "double") -> str:
-    """The elements of an array (N,) or the rows of a table (N, m), each with so many zeros at its end."""
+    """The elements of an array (N,) or the rows of a table (N, m), each with so many zeros at its
+    end.
+    """
     table = np.asarray(values, dtype=float)
     rows = [
-        [c_number(value, number) for value in (*row, *[0.0] * padding)] for row in np.atleast_2d(table).tolist()
-    ]  # fmt: skip
+        [c_number(value, number) for value in (*row, *[0.0] * padding)]
+        for row in np.atleast_2d(table).tolist()
+    ]
     texts = rows[0] if table.ndim == 1 else [f"{{{', '.join(row)}}}" for row in rows]
     return _wrapped(texts)
 
 
 def c_integers(values: Sequence[Any]) -> str:
-    """The whole numbers of an array, or the rows of a table; of none, one zero, because C has no empty array."""
-    rows = [f"{{{', '.join(map(str, row))}}}" if isinstance(row, tuple) else str(row) for row in values]
+    """The whole numbers of an array, or the rows of a table; of none, one zero, because C has no
+    empty array.
+    """
+    rows = [
+        f"{{{', '.join(map(str, row))}}}" if isinstance(row, tuple) else str(row) for row in values
+    ]
     return _wrapped(rows or ["0"])
 
 
 def with_cmake(name: str, files: Mapping[str, str]) -> dict[str, str]:
-    """The files of a C program or law with a CMakeLists.txt, which compiles them as C99 or as C++."""
+    """The files of a C program or law with a CMakeLists.txt, which compiles them as C99 or as
+    C++.
+    """
     main = "main.c" if "main.c" in files else ""
     places = {
-        "file": name, "sources": " ".join(file for file in files if file.endswith(".c") and file != main),
-        "main": f" {main}" if main else "", "program": _PROGRAM.format(name) if main else "",
-    }  # fmt: skip
+        "file": name,
+        "sources": " ".join(file for file in files if file.endswith(".c") and file != main),
+        "main": f" {main}" if main else "",
+        "program": _PROGRAM.format(name) if main else "",
+    }
     return {**files, "CMakeLists.txt": filled("CMakeLists.txt", places, name).rstrip() + "\n"}
 
 
@@ -148,28 +172,51 @@ def _wrapped(items: Sequence[str]) -> str:
 
 LICENCE = (
     "SPDX-License-Identifier: BSD-3-Clause",
-    "Integrator and form of the equations are part of airmuscle, copyright the airmuscle developers, and may be used",
+    (
+        "Integrator and form of the equations are part of airmuscle, copyright the airmuscle"
+        " developers, and may be used"
+    ),
     "under its BSD-3-Clause licence; parameters and signals are those of the user.",
 )
 WIDTH = 112
 
 
-def provenance(title: str, model: Any, further: Iterable[Any] = (), notes: Sequence[str] = ()) -> list[str]:
-    """The lines that state where a file comes from, by its model, `further` objects with references, such as the
-    integrator, and paragraphs of notes; they depend on these and the version alone."""
+def provenance(
+    title: str, model: Any, further: Iterable[Any] = (), notes: Sequence[str] = ()
+) -> list[str]:
+    """The lines that state where a file comes from, by its model, `further` objects with
+    references, such as the integrator, and paragraphs of notes; they depend on these and the
+    version alone."""
     version = metadata.version("airmuscle")
-    lines = [title, f"Exported by airmuscle {version}.", f"SHA-256 of the model: {fingerprint(model)}", *LICENCE]
+    lines = [
+        title,
+        f"Exported by airmuscle {version}.",
+        f"SHA-256 of the model: {fingerprint(model)}",
+        *LICENCE,
+    ]
     for note in notes:
         lines += ["", *textwrap.wrap(note, WIDTH)]
-    units = ((leaf, "" if leaf.declared.unit == "1" else f" {leaf.declared.unit}") for leaf in leaves(model))
-    rows = [f"  {leaf.path} = {float(leaf.value)!r}{unit}  ({leaf.declared.meaning})" for leaf, unit in units]
+    units = (
+        (leaf, "" if leaf.declared.unit == "1" else f" {leaf.declared.unit}")
+        for leaf in leaves(model)
+    )
+    rows = [
+        f"  {leaf.path} = {float(leaf.value)!r}{unit}  ({leaf.declared.meaning})"
+        for leaf, unit in units
+    ]
     lines += ["", "Parameters (SI):", *(rows or ["  none"])]
     references = {r.key: r for thing in (model, *further) for r in cite(thing)}
     lines += ["", "References:" if references else "References: none."]
     for key in sorted(references):
-        lines += textwrap.wrap(str(references[key]), WIDTH, initial_indent="  ", subsequent_indent="    ")
+        lines += textwrap.wrap(
+            str(references[key]), WIDTH, initial_indent="  ", subsequent_indent="    "
+        )
     lines = [" ".join(printable(line).split("\n")) for line in lines]
-    for ending, harmless in (("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/")):  # no line ends its comment
+    for ending, harmless in (
+        ("*/", "* /"),
+        ("/*", "/ *"),
+        ("??/", "? ?/"),
+    ):  # no line ends its comment
         lines = [line.replace(ending, harmless) for line in lines]
     return [line.rstrip("\\ \t") for line in lines]  # nor continues into the next one
 
@@ -185,12 +232,18 @@ def line_comment(lines: Iterable[str]) -> str:
 
 
 def filled(name: str, values: Mapping[str, str], prefix: str) -> str:
-    """A template with the values of its places `@name@`; `model_` and `MODEL_` become the prefix of the program.
+    """A template with the values of its places `@name@`; `model_` and `MODEL_` become the prefix of
+    the program.
 
-    Values are inserted as they are: what stands in them is not replaced. Of a place that is indented and alone in its
-    line every line of the value is indented so; an empty value leaves no line.
+    Values are inserted as they are: what stands in them is not replaced. Of a place that is
+    indented and alone in its line every line of the value is indented so; an empty value leaves no
+    line.
     """
     text = template(name).replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
-    text = re.sub(r"^( +)@(\w+)@\n", lambda mark: textwrap.indent(f"{values[mark[2]]}\n".lstrip("\n"), mark[1]), text,
-                  flags=re.MULTILINE)  # fmt: skip
+    text = re.sub(
+        r"^( +)@(\w+)@\n",
+        lambda mark: textwrap.indent(f"{values[mark[2]]}\n".lstrip("\n"), mark[1]),
+        text,
+        flags=re.MULTILINE,
+    )
     return re.sub(r"@(\w+)@", lambda mark: values[mark.group(1)], text)

@@ -1,4 +1,6 @@
-"""MuJoCo engine plugins: a muscle with its valves as an actuator of a MuJoCo model, with its states in `act`."""
+"""MuJoCo engine plugins: a muscle with its valves as an actuator of a MuJoCo model, with its states
+in `act`.
+"""
 
 import dataclasses
 import functools
@@ -17,12 +19,23 @@ from ...physics.plant import Plant, open_plant
 from .actuator import control_range, controls_of, single_muscle
 from .c_source import c_files
 from .compiler import compile_library
-from .identifiers import block_comment, c_integers, c_number, c_strings, filled, program_name, provenance
+from .identifiers import (
+    block_comment,
+    c_integers,
+    c_number,
+    c_strings,
+    filled,
+    program_name,
+    provenance,
+)
 from .printed_system import export_system
 from .write import write_files
 
-OLDEST, BROKEN = (3, 17), ("4.0.0",)
-"""First version of MuJoCo whose plugin actuators have several states, and versions in which they do not work."""
+OLDEST = (3, 17)
+BROKEN = ("4.0.0",)
+"""First version of MuJoCo whose plugin actuators have several states, and versions in which they do
+not work.
+"""
 TOLERANCE = 1e-7
 """Relative tolerance of the integration of the muscle within a step of MuJoCo; chosen."""
 REST_LENGTH = "rest_length"
@@ -30,9 +43,10 @@ REST_LENGTH = "rest_length"
 _LOADED: dict[str, str] = {}
 """The plugins of this process by name, each with the digest of its library."""
 NOTE = (
-    "The actuator does not report where a run leaves the validity range of a characteristic or of another component. "
-    "Under Euler, implicit and implicitfast its own solver integrates the muscle within each step of MuJoCo; RK4 of "
-    "MuJoCo integrates it with MuJoCo's step, which does not resolve fast states."
+    "The actuator does not report where a run leaves the validity range of a characteristic or of"
+    " another component. Under Euler, implicit and implicitfast its own solver integrates the"
+    " muscle within each step of MuJoCo; RK4 of MuJoCo integrates it with MuJoCo's step, which does"
+    " not resolve fast states."
 )
 
 
@@ -43,8 +57,9 @@ class MuscleActuator(ShortRepr):
     plant    the muscle with its circuit, and shortening and speed as inputs
     library  the shared library of the plugin; None where it was not built, which `remark` explains
 
-    The control opens the only input of the circuit, such as a spool, in its range; of a circuit with two inputs, such
-    as fill and discharge valve, a positive control opens the first, a negative one the second.
+    The control opens the only input of the circuit, such as a spool, in its range; of a circuit
+    with two inputs, such as fill and discharge valve, a positive control opens the first, a
+    negative one the second.
     """
 
     plant: Plant
@@ -70,17 +85,26 @@ class MuscleActuator(ShortRepr):
         return control_range(self.controls)
 
     def add_to(
-        self, spec: Any, *, name: str, tendon: str = "", joint: str = "", gear: float = 1.0,
-        rest_length: float | None = None, parameters: Mapping[str, float] | None = None,
-    ) -> Any:  # fmt: skip
+        self,
+        spec: Any,
+        *,
+        name: str,
+        tendon: str = "",
+        joint: str = "",
+        gear: float = 1.0,
+        rest_length: float | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> Any:
         """Add an actuator to a `mujoco.MjSpec`; returns its MjsActuator.
 
         tendon, joint  the transmission, one of the two
-        gear           length of the transmission per length of the tendon, or per angle of the joint [m/rad]
-        rest_length    length of the transmission [m] at which the muscle has its resting length; that length by default
-        parameters     parameters of this actuator by path, such as {"muscle.force": 600.0}, in SI units
+        gear           length of the transmission per length of the tendon, or per angle of the
+        joint [m/rad] rest_length    length of the transmission [m] at which the muscle has its
+        resting length; that length by default parameters     parameters of this actuator by path,
+        such as {"muscle.force": 600.0}, in SI units
 
-        Raises ParameterError without a library, for an unsuitable MuJoCo, and for a wrong transmission or parameter.
+        Raises ParameterError without a library, for an unsuitable MuJoCo, and for a wrong
+        transmission or parameter.
         """
         mujoco = check_mujoco()
         if self.library is None:
@@ -88,7 +112,10 @@ class MuscleActuator(ShortRepr):
         if bool(tendon) == bool(joint):
             raise ParameterError("MuscleActuator: give either a tendon or a joint as transmission.")
         check_known("MuscleActuator: there is no parameter", parameters or {}, self.parameters)
-        config = {**(parameters or {}), **({} if rest_length is None else {REST_LENGTH: rest_length})}
+        config = {
+            **(parameters or {}),
+            **({} if rest_length is None else {REST_LENGTH: rest_length}),
+        }
         for path in (path for path, value in config.items() if not math.isfinite(value)):
             raise ParameterError(f"MuscleActuator: {path} is {config[path]}; it must be finite.")
         _load(self.plugin_name, self.library)
@@ -100,19 +127,26 @@ class MuscleActuator(ShortRepr):
         actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON if tendon else mujoco.mjtTrn.mjTRN_JOINT
         actuator.gear[0] = gear
         actuator.dyntype, actuator.actdim = mujoco.mjtDyn.mjDYN_USER, len(self.plant.states) + 1
-        actuator.ctrlrange, actuator.ctrllimited = list(self.control_range), 1
-        actuator.plugin.name, actuator.plugin.plugin_name = instance.name, self.plugin_name
+        actuator.ctrlrange = list(self.control_range)
+        actuator.ctrllimited = 1
+        actuator.plugin.name = instance.name
+        actuator.plugin.plugin_name = self.plugin_name
         actuator.plugin.active = True
         return actuator
 
     def initialise(self, model: Any, data: Any, name: str, *, pressure: float = 0.0) -> Array:
-        """Set the states of an actuator to a gauge pressure [Pa] at its present length; returns them.
+        """Set the states of an actuator to a gauge pressure [Pa] at its present length; returns
+        them.
 
-        Parameters are those of the plant. Call it after the position was set. Raises ParameterError.
+        Parameters are those of the plant. Call it after the position was set. Raises
+        ParameterError.
         """
         check_mujoco().mj_fwdPosition(model, data)
-        which, attributes = model.actuator(name).id, (*self.parameters, REST_LENGTH)
-        raw: bytes = model.plugin_attr[int(model.plugin_attradr[int(model.actuator_plugin[which])]) :].tobytes()
+        which = model.actuator(name).id
+        attributes = (*self.parameters, REST_LENGTH)
+        raw: bytes = model.plugin_attr[
+            int(model.plugin_attradr[int(model.actuator_plugin[which])]) :
+        ].tobytes()
         texts = raw.split(b"\0")[: len(attributes)]
         given = {path: text.decode() for path, text in zip(attributes, texts, strict=True) if text}
         values = [float(given.get(path, value)) for path, value in self.parameters.items()]
@@ -131,57 +165,78 @@ class MuscleActuator(ShortRepr):
         return {leaf.path: float(leaf.value) for leaf in leaves(self.plant)}
 
 
-def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", muscle: str = "") -> MuscleActuator:
-    """Write a MuJoCo engine plugin for one muscle of a plant, and build it if MuJoCo and a C compiler are there.
+def write_mujoco_plugin(
+    plant: Plant, folder: str | Path, *, name: str = "", muscle: str = ""
+) -> MuscleActuator:
+    """Write a MuJoCo engine plugin for one muscle of a plant, and build it if MuJoCo and a C
+    compiler are there.
 
     plant   its load is left out: MuJoCo carries it
     muscle  name of the muscle, if the plant has several, each with its own circuit
 
-    The folder contains the C sources `NAME_plugin.c`, `NAME.c` and `NAME.h`, and the shared library, which belongs to
-    the version of MuJoCo that it was built with. Raises ParameterError for a plant that cannot be exported, and
-    FileError.
+    The folder contains the C sources `NAME_plugin.c`, `NAME.c` and `NAME.h`, and the shared
+    library, which belongs to the version of MuJoCo that it was built with. Raises ParameterError
+    for a plant that cannot be exported, and FileError.
     """
     part = open_plant(single_muscle(plant, muscle))
-    program, controls = program_name(name, part.muscles[0].name), controls_of(part)
+    program = program_name(name, part.muscles[0].name)
+    controls = controls_of(part)
     lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
-    system = export_system(compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0))))  # mass set by MuJoCo
-    paths, states = [leaf.path for leaf in system.tunable], system.known.state_names
+    system = export_system(
+        compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0)))
+    )  # mass set by MuJoCo
+    paths = [leaf.path for leaf in system.tunable]
+    states = system.known.state_names
     own = [leaf.path for leaf in leaves(part)]
     places = [*(system.known.input_names.index(i.name) for i in controls), -1, -1]
     values = {
-        "provenance": block_comment(lines), "name": f"airmuscle.{program}", "file": program,
-        "attribute_names": c_strings([*own, REST_LENGTH]), "places": c_integers([paths.index(path) for path in own]),
+        "provenance": block_comment(lines),
+        "name": f"airmuscle.{program}",
+        "file": program,
+        "attribute_names": c_strings([*own, REST_LENGTH]),
+        "places": c_integers([paths.index(path) for path in own]),
         "own_states": c_integers([states.index(state.name) for state in part.states]),
         "rest_length": c_number(part.muscles[0].geometry.resting_length),
-        "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
-    }  # fmt: skip
+        "attributes": str(len(own) + 1),
+        "first": str(places[0]),
+        "second": str(places[1]),
+    }
     texts = c_files(program, system, Rodas4(TOLERANCE), lines)
     texts[f"{program}_plugin.c"] = filled("mujoco_plugin.c", values, program)
     files = {file: text.encode() for file, text in texts.items()}
-    library, remark = f"lib{program}_plugin.so", ""
+    library = f"lib{program}_plugin.so"
+    remark = ""
     try:
         installed = Path(check_mujoco().__file__).parent
         linked = [str(path) for path in sorted(installed.glob("libmujoco.*"))[:1]]
         units = [file for file in files if file.endswith(".c")]
-        files[library] = compile_library(files, units, library, [f"-I{installed / 'include'}", *linked])
+        files[library] = compile_library(
+            files, units, library, [f"-I{installed / 'include'}", *linked]
+        )
     except ParameterError as reason:
         remark = str(reason)
     written = dict(zip(files, write_files(files, folder), strict=True))
-    return MuscleActuator(part, program, written[f"{program}_plugin.c"], written.get(library), remark, controls)
+    return MuscleActuator(
+        part, program, written[f"{program}_plugin.c"], written.get(library), remark, controls
+    )
 
 
 def check_mujoco() -> Any:
-    """The module mujoco. Raises ParameterError where it is missing, too old, or of a version that does not work."""
+    """The module mujoco. Raises ParameterError where it is missing, too old, or of a version that
+    does not work.
+    """
     try:
         import mujoco
     except ImportError:
-        raise ParameterError("the package mujoco is not installed; install mujoco>=3.17,!=4.0.0") from None
+        raise ParameterError(
+            "the package mujoco is not installed; install mujoco>=3.17,!=4.0.0"
+        ) from None
     version: str = mujoco.__version__
     numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:2])
     if numbers < OLDEST or version in BROKEN:
         raise ParameterError(
-            f"MuJoCo {version} is not supported, because its plugin actuators cannot have several states; install "
-            "mujoco>=3.17,!=4.0.0"
+            f"MuJoCo {version} is not supported, because its plugin actuators cannot have several"
+            " states; install mujoco>=3.17,!=4.0.0"
         )
     return mujoco
 
@@ -200,6 +255,6 @@ def _load(plugin: str, library: Path) -> None:
     except mujoco.FatalError as reason:
         _LOADED.setdefault(plugin, f"refused: {reason}")
     raise ParameterError(
-        f"the plugin {plugin} of this process is another one than {library}, and MuJoCo cannot replace it; write this "
-        "plugin with another name, or start a new process."
+        f"the plugin {plugin} of this process is another one than {library}, and MuJoCo cannot"
+        " replace it; write this plugin with another name, or start a new process."
     )

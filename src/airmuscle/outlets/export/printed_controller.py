@@ -1,4 +1,6 @@
-"""Printed control law: a sample of it as a C99 function of its memory, and its replay by the printed operations."""
+"""Printed control law: a sample of it as a C99 function of its memory, and its replay by the
+printed operations.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,11 +18,22 @@ from ...engine.compile.ir.interpreter import InterpretedBody
 from ...engine.compile.text.languages import CLanguage
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
-from .identifiers import block_comment, c_number, c_strings, c_values, filled, make_identifiers, provenance, with_cmake
+from .identifiers import (
+    block_comment,
+    c_number,
+    c_strings,
+    c_values,
+    filled,
+    make_identifiers,
+    provenance,
+    with_cmake,
+)
 from .printed_system import find_leaf, make_labels
 
 SINGLE_TOLERANCE = 1e-4
-"""Part of its range by which a command in single precision may differ from that in double precision (chosen)."""
+"""Part of its range by which a command in single precision may differ from that in double precision
+(chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -56,32 +69,53 @@ class PrintedController:
 
     @property
     def places(self) -> dict[str, str]:
-        """The places of a header: numbers of memories, measurements and so on, enumerations, provenance."""
+        """The places of a header: numbers of memories, measurements and so on, enumerations,
+        provenance.
+        """
         keys = ("memory", "measurements", "setpoints", "commands", "parameters")
-        counts = {key: str(len(names)) for key, names in zip(keys, self._kinds.values(), strict=True)}
-        rows = {kind: enumerate(make_identifiers(names)) for kind, names in self._kinds.items() if names}
-        words = [[f"{self.name}_{kind}_{word}".upper() + f" = {i}" for i, word in row] for kind, row in rows.items()]
+        counts = {
+            key: str(len(names)) for key, names in zip(keys, self._kinds.values(), strict=True)
+        }
+        rows = {
+            kind: enumerate(make_identifiers(names)) for kind, names in self._kinds.items() if names
+        }
+        words = [
+            [f"{self.name}_{kind}_{word}".upper() + f" = {i}" for i, word in row]
+            for kind, row in rows.items()
+        ]
         enumerations = "".join(f"enum {{ {', '.join(each)} }};\n" for each in words)
         return counts | {
-            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": enumerations,
-            "number": self.number, "initial_memory": c_values(self.initial_memory, 1, self.number),
-            "parameter_values": c_values(self.defaults, 1, self.number), "parameter_names": c_strings(self.paths),
-        }  # fmt: skip
+            "provenance": block_comment(self.provenance),
+            "file": self.name,
+            "enumerations": enumerations,
+            "number": self.number,
+            "initial_memory": c_values(self.initial_memory, 1, self.number),
+            "parameter_values": c_values(self.defaults, 1, self.number),
+            "parameter_names": c_strings(self.paths),
+        }
 
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
-        places = {**self.places, "functions": self.sample_in(CLanguage(self.number, f"{self.name}_"))}
-        return {f"{self.name}.{end}": filled(f"controller.{end}", places, self.name) for end in "hc"}
+        places = {
+            **self.places,
+            "functions": self.sample_in(CLanguage(self.number, f"{self.name}_")),
+        }
+        return {
+            f"{self.name}.{end}": filled(f"controller.{end}", places, self.name) for end in "hc"
+        }
 
     def sample_in(self, language: TargetLanguage) -> str:
-        """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
-        and the arrays of the command and of the later memory, which MATLAB returns."""
+        """The function of a sample in another language; its arguments are measurement, set point,
+        memory, parameters, and the arrays of the command and of the later memory, which MATLAB
+        returns."""
         law = self.law
         names = {
-            "measurement": law.measured_columns, "setpoint": [f"{name} set point" for name in law.setpoints],
-            "memory": [f"memory {name}" for name in law.initial_memory], "command": law.inputs,
+            "measurement": law.measured_columns,
+            "setpoint": [f"{name} set point" for name in law.setpoints],
+            "memory": [f"memory {name}" for name in law.initial_memory],
+            "command": law.inputs,
             "later": [f"next {name}" for name in law.initial_memory],
-        }  # fmt: skip
+        }
         rows = {array: [(name, "", "") for name in each] for array, each in names.items()}
         of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
         labels = make_labels({**rows, "parameters": of_law})
@@ -91,36 +125,57 @@ class PrintedController:
         return printer.text[-1]
 
     def files(self, measured: Array, setpoints: Array, commands: Array) -> dict[str, str]:
-        """Header, source and the program that replays measurements (K, m), set points (K, s) and commands (K, c) of a
-        run, by file name."""
-        number, precision = self.number, "single" if self.tolerance else "double"
-        limits = {"tolerance": c_number(self.tolerance), "ranges": c_values(self.ranges_of(commands), 1)}
+        """Header, source and the program that replays measurements (K, m), set points (K, s) and
+        commands (K, c) of a run, by file name."""
+        number = self.number
+        precision = "single" if self.tolerance else "double"
+        limits = {
+            "tolerance": c_number(self.tolerance),
+            "ranges": c_values(self.ranges_of(commands), 1),
+        }
         places = {
-            "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(measured)),
-            "number": number, "about": filled(f"about_{precision}.c", {}, self.name),
-            "measured": c_values(measured, 1, number), "setpoints": c_values(setpoints, 1, number),
-            "commands": c_values(commands, 1), "comparison": filled(f"replay_{precision}.c", limits, self.name),
-        }  # fmt: skip
-        return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
+            "provenance": block_comment(self.provenance),
+            "file": self.name,
+            "samples": str(len(measured)),
+            "number": number,
+            "about": filled(f"about_{precision}.c", {}, self.name),
+            "measured": c_values(measured, 1, number),
+            "setpoints": c_values(setpoints, 1, number),
+            "commands": c_values(commands, 1),
+            "comparison": filled(f"replay_{precision}.c", limits, self.name),
+        }
+        return with_cmake(
+            self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)}
+        )
 
     def arduino_files(self, sample_time: float, setpoints: Sequence[float]) -> dict[str, str]:
-        """An Arduino library: properties, header and source in `src`, and an example sketch with the sample time [s]
-        and the set points (s,) at the beginning of the run, by path."""
+        """An Arduino library: properties, header and source in `src`, and an example sketch with
+        the sample time [s] and the set points (s,) at the beginning of the run, by path."""
         name = self.name
         measured, points, commands = (
             [f"[{name}_{kind}_{word}]".upper() for word in make_identifiers(self._kinds[kind])]
             for kind in ("MEASUREMENT", "SETPOINT", "COMMAND")
         )
         places = {
-            "provenance": block_comment(self.provenance), "file": name, "number": self.number,
-            "period": str(round(1e6 * sample_time)), "law": type(self.law).__name__, "sample_time": f"{sample_time:g}",
-            "reads": "\n".join(f"  measurement{word} = 0; /* scale and offset of analogRead(A{i}) */"
-                               for i, word in enumerate(measured)),
-            "writes": "\n".join(f"  (void)command{word}; /* {low!r} to {high!r}: analogWrite, say */"
-                                for word, (low, high) in zip(commands, self.ranges, strict=True)),
-            "setpoints": "\n".join(f"  setpoint{word} = {c_number(level, self.number)};"
-                                   for word, level in zip(points, setpoints, strict=True)),
-        }  # fmt: skip
+            "provenance": block_comment(self.provenance),
+            "file": name,
+            "number": self.number,
+            "period": str(round(1e6 * sample_time)),
+            "law": type(self.law).__name__,
+            "sample_time": f"{sample_time:g}",
+            "reads": "\n".join(
+                f"  measurement{word} = 0; /* scale and offset of analogRead(A{i}) */"
+                for i, word in enumerate(measured)
+            ),
+            "writes": "\n".join(
+                f"  (void)command{word}; /* {low!r} to {high!r}: analogWrite, say */"
+                for word, (low, high) in zip(commands, self.ranges, strict=True)
+            ),
+            "setpoints": "\n".join(
+                f"  setpoint{word} = {c_number(level, self.number)};"
+                for word, level in zip(points, setpoints, strict=True)
+            ),
+        }
         return {
             "library.properties": filled("library.properties", places, name),
             **{f"src/{file}": text for file, text in self.source_files().items()},
@@ -128,7 +183,9 @@ class PrintedController:
         }
 
     def ranges_of(self, commands: Array) -> Array:
-        """The width of the range of each command (c,); of one without limits its largest size in a run (K, c)."""
+        """The width of the range of each command (c,); of one without limits its largest size in a
+        run (K, c).
+        """
         largest = np.abs(commands).max(axis=0, initial=0.0)
         width = np.array([high - low for low, high in self.ranges], dtype=float)
         return np.where(np.isfinite(width), width, np.where(largest > 0.0, largest, 1.0))
@@ -137,20 +194,31 @@ class PrintedController:
     def _kinds(self) -> dict[str, Sequence[str]]:
         """The names of the elements of the arrays, by the word of their enumeration."""
         return {
-            "MEMORY": tuple(self.law.initial_memory), "MEASUREMENT": self.law.measured_columns,
-            "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs, "PARAMETER": self.paths,
-        }  # fmt: skip
+            "MEMORY": tuple(self.law.initial_memory),
+            "MEASUREMENT": self.law.measured_columns,
+            "SETPOINT": self.law.setpoints,
+            "COMMAND": self.law.inputs,
+            "PARAMETER": self.paths,
+        }
 
     def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> Array:
-        """The commands (K, c) to measurements (K, m) and set points (K, s), from the printed instructions themselves.
+        """The commands (K, c) to measurements (K, m) and set points (K, s), from the printed
+        instructions themselves.
 
         single  every number is rounded to single precision
         """
-        memory, parameters = self.initial_memory.tolist(), self.defaults.tolist()
+        memory = self.initial_memory.tolist()
+        parameters = self.defaults.tolist()
         code = instructions(list(self.inputs.values()), list(self.outputs.values()))
-        rows, names = [], list(self.inputs)
+        rows = []
+        names = list(self.inputs)
         for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
-            given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
+            given = {
+                "measurement": measurement,
+                "setpoint": setpoint,
+                "memory": memory,
+                "parameters": parameters,
+            }
             body = InterpretedBody(given, single)
             values = emission.computed(body, code, names)
             for (output, index), value in values.items():
@@ -159,48 +227,69 @@ class PrintedController:
             memory = [body.stored["later", i] for i in range(len(memory))]
         return np.array(rows)
 
-    def check_single_precision(self, measured: Array, setpoints: Array, commands: Array, sample_time: float) -> None:
-        """Raise ParameterError where single precision changes a command of a run by more than SINGLE_TOLERANCE."""
-        deviations = np.abs(self.replay(measured, setpoints, single=True) - commands) / self.ranges_of(commands)
+    def check_single_precision(
+        self, measured: Array, setpoints: Array, commands: Array, sample_time: float
+    ) -> None:
+        """Raise ParameterError where single precision changes a command of a run by more than
+        SINGLE_TOLERANCE.
+        """
+        deviations = np.abs(
+            self.replay(measured, setpoints, single=True) - commands
+        ) / self.ranges_of(commands)
         wrong = np.argwhere(~(deviations <= SINGLE_TOLERANCE))
         if wrong.size:
             k, i = map(int, wrong[0])
             raise ParameterError(
-                f"{type(self.law).__name__} in single precision: the command '{self.law.inputs[i]}' differs by "
-                f"{deviations[k, i]:.2g} of its range from that in double precision, {k * sample_time:.4g} s after the "
-                f"start of the run; {SINGLE_TOLERANCE:g} is allowed. Export it in double precision."
+                f"{type(self.law).__name__} in single precision: the command '{self.law.inputs[i]}'"
+                f" differs by {deviations[k, i]:.2g} of its range from that in double precision,"
+                f" {k * sample_time:.4g} s after the start of the run; {SINGLE_TOLERANCE:g} is"
+                " allowed. Export it in double precision."
             )
 
 
 def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:
-    """The control loop of a problem. Raises ParameterError where its controller is neither a ControlLaw nor `also`."""
+    """The control loop of a problem. Raises ParameterError where its controller is neither a
+    ControlLaw nor `also`.
+    """
     loop = problem.input
     if not isinstance(loop, ControlLoop):
-        raise ParameterError("the problem has no controller to export; its input is a signal. Give it a ControlLoop.")
+        raise ParameterError(
+            "the problem has no controller to export; its input is a signal. Give it a ControlLoop."
+        )
     if not isinstance(loop.controller, ControlLaw | also):
         raise ParameterError(
-            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported here; of "
-            "predictive control the controller alone can, as C. Derive a law of your own from ControlLaw and write its "
-            "step over airmuscle.core.ops."
+            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported"
+            " here; of predictive control the controller alone can, as C. Derive a law of your own"
+            " from ControlLaw and write its step over airmuscle.core.ops."
         )
     return loop
 
 
 def print_controller(
-    prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] | None = (), number: str = "double",
+    prepared: SampledLoop,
+    name: str,
+    title: str = "",
+    tunable: Sequence[str] | None = (),
+    number: str = "double",
     notes: Sequence[str] = (),
-) -> PrintedController:  # fmt: skip
-    """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants; the tunable
-    ones (None: all) remain variables, and `notes` are further lines of the comment at the beginning."""
+) -> PrintedController:
+    """The control law of a prepared loop, with its sample time, ranges and fixed parameters as
+    constants; the tunable ones (None: all) remain variables, and `notes` are further lines of the
+    comment at the beginning.
+    """
     import casadi
 
-    loop, law = prepared.loop, prepared.loop.controller
+    loop = prepared.loop
+    law = prepared.loop.controller
     assert isinstance(law, ControlLaw)
-    sample, known = trace_sample(law), list(leaves(law))
+    sample = trace_sample(law)
+    known = list(leaves(law))
     paths = [leaf.path for leaf in known] if tunable is None else dict.fromkeys(tunable)
     chosen = [find_leaf(law, known, path) for path in paths]
     p = casadi.SX.sym("parameters", len(chosen))
-    parameters = [p[chosen.index(i)] if i in chosen else casadi.SX(leaf.value) for i, leaf in enumerate(known)]
+    parameters = [
+        p[chosen.index(i)] if i in chosen else casadi.SX(leaf.value) for i, leaf in enumerate(known)
+    ]
     ranges = [prepared.ranges[n] for n in law.inputs]
     low, high = ([each[k] for each in ranges] for k in (0, 1))
     old = [sample.sample_time, sample.minimum, sample.maximum, sample.parameters]
@@ -209,16 +298,33 @@ def print_controller(
     commands, later = casadi.substitute([sample.commands, sample.later], old, new)
     limited = []
     for i, (least, most) in enumerate(ranges):
-        raised = casadi.if_else(commands[i] < least, least, commands[i]) if np.isfinite(least) else commands[i]
+        raised = (
+            casadi.if_else(commands[i] < least, least, commands[i])
+            if np.isfinite(least)
+            else commands[i]
+        )
         limited.append(casadi.if_else(raised > most, most, raised) if np.isfinite(most) else raised)
-    inputs = {"measurement": sample.measured, "setpoint": sample.setpoints, "memory": sample.memory, "parameters": p}
+    inputs = {
+        "measurement": sample.measured,
+        "setpoint": sample.setpoints,
+        "memory": sample.memory,
+        "parameters": p,
+    }
     outputs = {"command": casadi.densify(casadi.vertcat(*limited)), "later": casadi.densify(later)}
-    about = [f"Sample time {c_number(loop.sample_time)} s; set points {', '.join(law.setpoints) or 'none'}; measured "
-             f"{', '.join(law.measured_columns)}; commanded {', '.join(law.inputs)}, limited to "
-             f"{', '.join(f'{a!r} to {b!r}' for a, b in zip(low, high, strict=True))}."]  # fmt: skip
+    about = [
+        f"Sample time {c_number(loop.sample_time)} s; set points"
+        f" {', '.join(law.setpoints) or 'none'}; measured {', '.join(law.measured_columns)};"
+        f" commanded {', '.join(law.inputs)}, limited to"
+        f" {', '.join(f'{a!r} to {b!r}' for a, b in zip(low, high, strict=True))}."
+    ]
     if loop.drivers:
         kinds = ", ".join(f"{key}: {value}" for key, value in loop.drivers.items())
-        about.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
+        about.append(
+            f"Not part of this program: the drivers between commands and openings ({kinds})."
+        )
     lines = provenance(title or type(law).__name__, law, notes=[*about, *notes])
-    tolerance, variables = SINGLE_TOLERANCE if number == "float" else 0.0, tuple(known[i] for i in chosen)
-    return PrintedController(name, law, inputs, outputs, ranges, variables, lines, number, tolerance)
+    tolerance = SINGLE_TOLERANCE if number == "float" else 0.0
+    variables = tuple(known[i] for i in chosen)
+    return PrintedController(
+        name, law, inputs, outputs, ranges, variables, lines, number, tolerance
+    )

@@ -1,4 +1,6 @@
-"""Printed system: the functions of a system in a language of text, with the names, units and defaults of its arrays."""
+"""Printed system: the functions of a system in a language of text, with the names, units and
+defaults of its arrays.
+"""
 
 import dataclasses
 import itertools
@@ -18,7 +20,9 @@ from .identifiers import make_identifiers
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExportedSystem:
-    """A system ready for printing: its expressions, of which some parameters are arguments and the others constants."""
+    """A system ready for printing: its expressions, of which some parameters are arguments and the
+    others constants.
+    """
 
     compiled: CompiledSystem
     traced: TracedSystem
@@ -48,16 +52,25 @@ class ExportedSystem:
     def printed(
         self, language: TargetLanguage, *, implicit: bool = True, extend: Extension | None = None
     ) -> tuple[str, ArraySizes]:
-        """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
-        states, inputs = self.compiled.system.states, self.compiled.system.input_variables
-        units, outputs = self.units, self.known.output_names
-        labels = make_labels({
-            "x": [(s.name, s.unit, s.meaning) for s in states], "u": [(i.name, i.unit, i.meaning) for i in inputs],
-            "o": [(name, units[name], meaning_of(name)) for name in outputs],
-            "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable],
-            "f": [(f"{s.name}_rate", per_second(s.unit), "") for s in states],
-            "w": [(f"{i.name}_slope", per_second(i.unit), "") for i in inputs],
-        })  # fmt: skip
+        """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a
+        Rosenbrock step.
+        """
+        states = self.compiled.system.states
+        inputs = self.compiled.system.input_variables
+        units = self.units
+        outputs = self.known.output_names
+        labels = make_labels(
+            {
+                "x": [(s.name, s.unit, s.meaning) for s in states],
+                "u": [(i.name, i.unit, i.meaning) for i in inputs],
+                "o": [(name, units[name], meaning_of(name)) for name in outputs],
+                "p": [
+                    (leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable
+                ],
+                "f": [(f"{s.name}_rate", per_second(s.unit), "") for s in states],
+                "w": [(f"{i.name}_slope", per_second(i.unit), "") for i in inputs],
+            }
+        )
         language = dataclasses.replace(language, labels=labels)  # type: ignore[type-var]
         return system_module(self.traced, language, extend, implicit=implicit)
 
@@ -69,13 +82,19 @@ def meaning_of(output: str) -> str:
 
 
 def make_labels(tables: Mapping[str, Sequence[tuple[str, str, str]]]) -> Labels:
-    """Labels of arrays from the name, unit and meaning of each element; no two have the same name."""
+    """Labels of arrays from the name, unit and meaning of each element; no two have the same
+    name.
+    """
     rows = [(array, *row) for array, table in tables.items() for row in table]
     labels: dict[str, list[Label]] = {array: [] for array in tables}
-    for identifier, (array, _, unit, meaning) in zip(make_identifiers([row[1] for row in rows]), rows, strict=True):
+    for identifier, (array, _, unit, meaning) in zip(
+        make_identifiers([row[1] for row in rows]), rows, strict=True
+    ):
         shown = f"[{unit}]" if unit not in ("", "1") else ""
         text = printable(f"{shown} {meaning}").encode("ascii", "replace").decode()
-        labels[array].append(Label(identifier, text.replace("*/", "* /").replace("??", "? ?").strip()))
+        labels[array].append(
+            Label(identifier, text.replace("*/", "* /").replace("??", "? ?").strip())
+        )
     return labels
 
 
@@ -90,19 +109,29 @@ def per_second(unit: str) -> str:
 
 
 def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None) -> ExportedSystem:
-    """A compiled system ready for printing, with the paths of its tunable parameters, all by default; the others are
-    constants, which makes it smaller. Raises ParameterError for a path that is not a parameter of the system."""
-    traced, known = compiled.program.traced, list(leaves(compiled.system))
+    """A compiled system ready for printing, with the paths of its tunable parameters, all by
+    default; the others are constants, which makes it smaller. Raises ParameterError for a path that
+    is not a parameter of the system.
+    """
+    traced = compiled.program.traced
+    known = list(leaves(compiled.system))
     if tunable is None:
         return ExportedSystem(compiled, traced, tuple(known))
     chosen = [find_leaf(compiled.system, known, path) for path in dict.fromkeys(tunable)]
     import casadi
 
     symbols = casadi.SX.sym("p", len(chosen))
-    values = [symbols[chosen.index(i)] if i in chosen else casadi.SX(known[i].value) for i in range(len(known))]
-    f, o = casadi.substitute([traced.f, traced.o], [traced.p], [casadi.vertcat(casadi.SX(0, 1), *values)])
+    values = [
+        symbols[chosen.index(i)] if i in chosen else casadi.SX(known[i].value)
+        for i in range(len(known))
+    ]
+    f, o = casadi.substitute(
+        [traced.f, traced.o], [traced.p], [casadi.vertcat(casadi.SX(0, 1), *values)]
+    )
     f, o = casadi.cse([casadi.densify(f), casadi.densify(o)])
-    return ExportedSystem(compiled, dataclasses.replace(traced, p=symbols, f=f, o=o), tuple(known[i] for i in chosen))
+    return ExportedSystem(
+        compiled, dataclasses.replace(traced, p=symbols, f=f, o=o), tuple(known[i] for i in chosen)
+    )
 
 
 def acting_parameters(compiled: CompiledSystem) -> list[str]:
@@ -111,12 +140,18 @@ def acting_parameters(compiled: CompiledSystem) -> list[str]:
 
     traced = compiled.program.traced
     paths = [leaf.path for leaf in leaves(compiled.system)]
-    acts = casadi.which_depends(casadi.vertcat(traced.f, traced.o), traced.p, 1, False) if paths else []
+    acts = (
+        casadi.which_depends(casadi.vertcat(traced.f, traced.o), traced.p, 1, False)
+        if paths
+        else []
+    )
     return list(itertools.compress(paths, acts))
 
 
 def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
-    """The number of the parameter at a path. Raises ParameterError; for a part of the structure it says so."""
+    """The number of the parameter at a path. Raises ParameterError; for a part of the structure it
+    says so.
+    """
     paths = [leaf.path for leaf in known]
     if path in paths:
         return paths.index(path)
@@ -128,9 +163,11 @@ def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
             part = getattr(part, word)
         else:
             raise ParameterError(
-                f"{type(model).__name__} has no parameter '{path}'{alternatives(path, paths, 'tunable parameters are')}"
+                f"{type(model).__name__} has no parameter"
+                f" '{path}'{alternatives(path, paths, 'tunable parameters are')}"
             )
     raise ParameterError(
-        f"'{path}' is fixed when a program is printed, because it determines the equations and is not a number in "
-        f"them{alternatives('', paths, 'tunable parameters are')} Change it in the model, and export again."
+        f"'{path}' is fixed when a program is printed, because it determines the equations and is"
+        f" not a number in them{alternatives('', paths, 'tunable parameters are')} Change it in the"
+        " model, and export again."
     )

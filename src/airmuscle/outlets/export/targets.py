@@ -1,4 +1,6 @@
-"""Targets of an export: C99, JavaScript, MATLAB and Octave, the files that each makes of a program and of a law."""
+"""Targets of an export: C99, JavaScript, MATLAB and Octave, the files that each makes of a program
+and of a law.
+"""
 
 import abc
 import dataclasses
@@ -15,20 +17,45 @@ from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
 from ...engine.compile.kernel_text.printer import KernelPrinter
-from ...engine.compile.text.languages import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
+from ...engine.compile.text.languages import (
+    DEFINITION,
+    CLanguage,
+    JavaScriptLanguage,
+    MatlabLanguage,
+)
 from ...engine.run import Integrator
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import c_files, csv_header, main_program
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText, solver_text
-from .identifiers import block_comment, c_strings, c_values, filled, line_comment, provenance, template, with_cmake
+from .identifiers import (
+    block_comment,
+    c_strings,
+    c_values,
+    filled,
+    line_comment,
+    provenance,
+    template,
+    with_cmake,
+)
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
     (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),
-    (ContractionLaw, "contraction", ("pressure", "force"),
-     ("contraction", "contraction_by_pressure", "contraction_by_force")),
-    (PressureLaw, "pressure", ("contraction", "force"), ("pressure", "pressure_by_contraction", "pressure_by_force")),
-)  # fmt: skip
-"""The closed form of each kind of law: method, arguments, and results; the stiffness is -dF/deps [N]."""
+    (
+        ContractionLaw,
+        "contraction",
+        ("pressure", "force"),
+        ("contraction", "contraction_by_pressure", "contraction_by_force"),
+    ),
+    (
+        PressureLaw,
+        "pressure",
+        ("contraction", "force"),
+        ("pressure", "pressure_by_contraction", "pressure_by_force"),
+    ),
+)
+"""The closed form of each kind of law: method, arguments, and results; the stiffness is -dF/deps
+[N].
+"""
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 _json = functools.partial(json.dumps, default=np.ndarray.tolist)
 """A value as JavaScript text: ASCII only, numbers bit by bit, infinities by name."""
@@ -56,28 +83,49 @@ class PrintedLaw:
         return [float(leaf.value) for leaf in self.known]
 
     def places(self, language: TargetLanguage) -> dict[str, str]:
-        """The places of a template, with `prepare` and the function `evaluate(argument, argument, c, result)`."""
-        printer, (first, second) = Printer(language), self.arguments
+        """The places of a template, with `prepare` and the function `evaluate(argument, argument,
+        c, result)`.
+        """
+        printer = Printer(language)
+        first, second = self.arguments
         inputs = dict(zip(self.arguments, self.symbols, strict=True))
-        printer.add("evaluate", {**inputs, PARAMETERS: self.parameters}, {"result": self.values}, self.arguments)
+        printer.add(
+            "evaluate",
+            {**inputs, PARAMETERS: self.parameters},
+            {"result": self.values},
+            self.arguments,
+        )
         return {
-            "provenance": block_comment(self.provenance), "file": self.name, "functions": printer.module(),
-            "held": str(printer.held), "parameters": str(len(self.known)), "first": first, "second": second,
-            "first_unit": UNITS[first], "second_unit": UNITS[second], "results": ", ".join(self.results),
-        }  # fmt: skip
+            "provenance": block_comment(self.provenance),
+            "file": self.name,
+            "functions": printer.module(),
+            "held": str(printer.held),
+            "parameters": str(len(self.known)),
+            "first": first,
+            "second": second,
+            "first_unit": UNITS[first],
+            "second_unit": UNITS[second],
+            "results": ", ".join(self.results),
+        }
 
 
 def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
-    """A law ready for printing. Raises ParameterError for a law without closed form, which it names."""
+    """A law ready for printing. Raises ParameterError for a law without closed form, which it
+    names.
+    """
     import casadi
 
     if not isinstance(law, Characteristic):
-        raise ParameterError(f"{one_line(law)} is not a characteristic; pass load('dmsp-20-300').characteristic, say.")
+        raise ParameterError(
+            f"{one_line(law)} is not a characteristic; pass load('dmsp-20-300').characteristic,"
+            " say."
+        )
     for _, part in parts_of(law):
         if not autodiff.is_traceable(type(part)):
             raise ParameterError(
-                f"{type(part).__name__} has no closed form and cannot be exported. Approximate it first, with its "
-                "error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
+                f"{type(part).__name__} has no closed form and cannot be exported. Approximate it"
+                " first, with its error: as_force_law(law, validity_range) for a characteristic,"
+                " as_polynomial for a geometry."
             )
     _, method, arguments, results = next(form for form in FORMS if isinstance(law, form[0]))
     model, parameters = autodiff.symbolic(law)
@@ -87,11 +135,14 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     slopes = [casadi.jacobian(value, each) for each in x]
     if method == "force":
         slopes[1] = -slopes[1]
-    # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower limit of the force.
+    # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower
+    # limit of the force.
     known = casadi.logic_and(*(casadi.logic_or(each >= 0, each < 0) for each in x))
     values = casadi.if_else(known, casadi.densify(casadi.vertcat(value, *slopes)), x[0] + x[1])
     lines = provenance(title, law)
-    return PrintedLaw(name, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines)
+    return PrintedLaw(
+        name, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines
+    )
 
 
 class Target(abc.ABC):
@@ -108,8 +159,8 @@ class Target(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class C99(Target):
-    """C99 without memory allocation, which also compiles as C++: header, source, a main program that runs the scenario,
-    and a CMakeLists.txt.
+    """C99 without memory allocation, which also compiles as C++: header, source, a main program
+    that runs the scenario, and a CMakeLists.txt.
 
     A controller has a header and a source of its own.
     """
@@ -120,9 +171,14 @@ class C99(Target):
         return with_cmake(program.name, {**source, **controller, "main.c": main_program(program)})
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        constants = {"defaults": c_values(law.defaults, 1), "parameter_names": c_strings(p.path for p in law.known)}
+        constants = {
+            "defaults": c_values(law.defaults, 1),
+            "parameter_names": c_strings(p.path for p in law.known),
+        }
         places = law.places(CLanguage("double", f"{law.name}_", None)) | constants
-        return with_cmake(law.name, {f"{law.name}.{end}": filled(f"law.{end}", places, law.name) for end in "hc"})
+        return with_cmake(
+            law.name, {f"{law.name}.{end}": filled(f"law.{end}", places, law.name) for end in "hc"}
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,23 +186,38 @@ class JavaScript(Target):
     """An ECMAScript module for browsers and Node, and a program for Node that runs the scenario."""
 
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        name, loop = program.name, program.loop
+        name = program.name
+        loop = program.loop
         solver = _javascript_solver(program.integrator)
         functions, sizes = program.system.printed(JavaScriptLanguage(), implicit=solver.implicit)
         functions = functions.replace("export function outputs(", "export function outputsOf(", 1)
-        text = "".join(f"export const {key} = {_json(value)};\n" for key, value in _camel(program.data()).items())
-        text += f"const SIZES = {_json({key: getattr(sizes, key) for key in ('held', 'jacobian', 'factors')})};\n"
-        text += "".join(f"const {key} = {_json(value)};\n" for key, value in solver.constants.items())
+        text = "".join(
+            f"export const {key} = {_json(value)};\n"
+            for key, value in _camel(program.data()).items()
+        )
+        text += (
+            "const SIZES ="
+            f" {_json({key: getattr(sizes, key) for key in ('held', 'jacobian', 'factors')})};\n"
+        )
+        text += "".join(
+            f"const {key} = {_json(value)};\n" for key, value in solver.constants.items()
+        )
         if loop is not None:
             text += f"export const loop = {_json(_camel(loop.data(program.system.known)))};\n"
             functions += f"\n{loop.controller.sample_in(JavaScriptLanguage('control_'))}"
         places = {
-            "provenance": block_comment(program.provenance), "file": name, "constants": text, "functions": functions,
-            "solver": filled("solver.mjs", solver.places, name), "arguments": filled("arguments.mjs", {}, name),
+            "provenance": block_comment(program.provenance),
+            "file": name,
+            "constants": text,
+            "functions": functions,
+            "solver": filled("solver.mjs", solver.places, name),
+            "arguments": filled("arguments.mjs", {}, name),
             "simulate": _simulation(program, "mjs", JavaScriptKernels(), {}),
-            "columns": _json(["time", *program.columns]), "header": _json(csv_header(program.columns)),
-            "package": name.replace("_", "-"), "description": json.dumps(program.provenance[0]),
-        }  # fmt: skip
+            "columns": _json(["time", *program.columns]),
+            "header": _json(csv_header(program.columns)),
+            "package": name.replace("_", "-"),
+            "description": json.dumps(program.provenance[0]),
+        }
         return {
             f"{name}.mjs": filled("program.mjs", places, name),
             f"{name}.d.mts": filled("program.d.mts", {**places, **_types(program)}, name),
@@ -155,8 +226,14 @@ class JavaScript(Target):
         }
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        stated = {"parameters": [p.path for p in law.known], "defaults": law.defaults, "results": law.results}
-        constants = "".join(f"export const {name} = {_json(value)};\n" for name, value in stated.items())
+        stated = {
+            "parameters": [p.path for p in law.known],
+            "defaults": law.defaults,
+            "results": law.results,
+        }
+        constants = "".join(
+            f"export const {name} = {_json(value)};\n" for name, value in stated.items()
+        )
         places = law.places(JavaScriptLanguage()) | {"constants": constants}
         return {f"{law.name}.mjs": filled("law.mjs", places, law.name)}
 
@@ -166,12 +243,23 @@ class Octave(Target):
     """Functions for GNU Octave and MATLAB, and a function that runs the scenario."""
 
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        name, loop, system = program.name, program.loop, program.system
-        fields = {key: f"s.{key}" for key in {*STEP.values(), *BETWEEN.values()}} | {"end": "s.finish"}
-        sizes = {"STATES": "s.n", "INPUTS": "numel(s.u)", "STAGES": "numel(s.weights)", "JACOBIAN": "0", "FACTORS": "0"}
+        name = program.name
+        loop = program.loop
+        system = program.system
+        fields = {key: f"s.{key}" for key in {*STEP.values(), *BETWEEN.values()}} | {
+            "end": "s.finish"
+        }
+        sizes = {
+            "STATES": "s.n",
+            "INPUTS": "numel(s.u)",
+            "STAGES": "numel(s.weights)",
+            "JACOBIAN": "0",
+            "FACTORS": "0",
+        }
         solver = solver_text(MatlabKernels(SHAPES), program.integrator, fields, sizes)
         functions, _ = system.printed(MatlabLanguage(), implicit=solver.implicit)
-        method, data = solver.constants, program.data()
+        method = solver.constants
+        data = program.data()
         steps = {key.lower(): m_number(method.pop(key)) for key in ("FIRST_STEP", "CLOSE")}
         data |= {"units": tuple(system.units[column] for column in system.known.column_names)}
         data["output_names"] = data.pop("outputs")
@@ -180,54 +268,83 @@ class Octave(Target):
             functions += f"\n{loop.controller.sample_in(MatlabLanguage('control_'))}"
             data["loop"] = loop.data(system.known)
         places = {
-            "provenance": line_comment(program.provenance), "file": name, "functions": f"{DEFINITION}\n{functions}",
-            "constants": _fields("model", data), **steps,
+            "provenance": line_comment(program.provenance),
+            "file": name,
+            "functions": f"{DEFINITION}\n{functions}",
+            "constants": _fields("model", data),
+            **steps,
             "solver": filled("solver.m", {**solver.places, **steps}, name),
-            "solver_constants": "".join(_fields(f"s.{key.lower()}", value) for key, value in method.items()),
+            "solver_constants": "".join(
+                _fields(f"s.{key.lower()}", value) for key, value in method.items()
+            ),
             "simulate": _simulation(program, "m", MatlabKernels(), steps),
             "loop_help": template("loop_help.m") if loop else "",
             "columns": m_strings(["time", *program.columns]),
             "header": m_string(csv_header(program.columns).strip("\n")),
-        }  # fmt: skip
-        return {f"{name}.m": filled("program.m", places, name), f"run_{name}.m": filled("run.m", places, name)}
+        }
+        return {
+            f"{name}.m": filled("program.m", places, name),
+            f"run_{name}.m": filled("run.m", places, name),
+        }
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
         places = law.places(MatlabLanguage())
         places |= {
-            "provenance": line_comment(law.provenance), "defaults": m_array(law.defaults),
-            "names": m_strings(p.path for p in law.known), "functions": f"{DEFINITION}\n{places['functions']}",
-        }  # fmt: skip
+            "provenance": line_comment(law.provenance),
+            "defaults": m_array(law.defaults),
+            "names": m_strings(p.path for p in law.known),
+            "functions": f"{DEFINITION}\n{places['functions']}",
+        }
         return {f"{law.name}.m": filled("law.m", places, law.name)}
 
 
 @functools.lru_cache(maxsize=16)
 def _javascript_solver(integrator: Integrator) -> SolverText:
-    """The solver of a module, whose text is that of no other system: the page asks for one with every plant."""
+    """The solver of a module, whose text is that of no other system: the page asks for one with
+    every plant.
+    """
     names = {*STEP.values(), *BETWEEN.values()}
-    fields = {key: f"this.{word}" for key, word in zip(names, _camel(dict.fromkeys(names)), strict=True)}
+    fields = {
+        key: f"this.{word}" for key, word in zip(names, _camel(dict.fromkeys(names)), strict=True)
+    }
     fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
-    lengths = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
-               "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
+    lengths = {
+        "STATES": "states.length",
+        "INPUTS": "inputs.length",
+        "STAGES": "WEIGHTS.length",
+        "JACOBIAN": "SIZES.jacobian",
+        "FACTORS": "SIZES.factors",
+    }
     return solver_text(JavaScriptKernels(), integrator, fields, lengths, "work.")
 
 
 def _types(program: ExportedRun) -> dict[str, str]:
     """The places of the TypeScript declarations."""
-    known, loop = program.system.known, program.loop
-    names = {"states": known.state_names, "inputs": known.input_names, "outputs": known.output_names,
-             "parameters": program.system.paths}  # fmt: skip
+    known = program.system.known
+    loop = program.loop
+    names = {
+        "states": known.state_names,
+        "inputs": known.input_names,
+        "outputs": known.output_names,
+        "parameters": program.system.paths,
+    }
     types = {kind: _union(of) for kind, of in names.items()}
     if loop is None:
         return {**types, "columns": "", "changes": "", "results": ""}
     changes = f"  controllerParameters?: Values<{_union(loop.controller.paths)}>;\n"
-    changes += f"  /** Set points {', '.join(loop.controller.law.setpoints) or 'none'}. */\n  setpoint?: Segments;\n"
+    changes += (
+        f"  /** Set points {', '.join(loop.controller.law.setpoints) or 'none'}. */\n  setpoint?:"
+        " Segments;\n"
+    )
     columns = f" | {_union(sum(loop.added_columns, ()))}"
     return {**types, "columns": columns, "changes": changes, "results": "  samples: number;\n"}
 
 
 def _camel(data: dict[str, Any]) -> dict[str, Any]:
     """The values by their names in the style of JavaScript."""
-    return {re.sub("_(.)", lambda mark: mark[1].upper(), name): value for name, value in data.items()}
+    return {
+        re.sub("_(.)", lambda mark: mark[1].upper(), name): value for name, value in data.items()
+    }
 
 
 def _union(names: Iterable[str]) -> str:
@@ -235,14 +352,22 @@ def _union(names: Iterable[str]) -> str:
     return " | ".join(map(json.dumps, names)) or "never"
 
 
-def _simulation(program: ExportedRun, suffix: str, kernels: KernelPrinter, places: Mapping[str, str]) -> str:
-    """The function `simulate`; in a loop with drivers also their arrays, and the lines that pass commands to them."""
-    loop, name = program.loop, program.name
+def _simulation(
+    program: ExportedRun, suffix: str, kernels: KernelPrinter, places: Mapping[str, str]
+) -> str:
+    """The function `simulate`; in a loop with drivers also their arrays, and the lines that pass
+    commands to them.
+    """
+    loop = program.loop
+    name = program.name
     if loop is None:
         return filled(f"simulate.{suffix}", places, name)
     driven = len(loop.drivers.kinds) > 0
     first = template("ulp.mjs") if driven and suffix == "mjs" else ""
-    own = {each: template(f"{each}.{suffix}") if driven else "" for each in ("driver_arrays", "apply_drivers")}
+    own = {
+        each: template(f"{each}.{suffix}") if driven else ""
+        for each in ("driver_arrays", "apply_drivers")
+    }
     own["kernels"] = f"{first}{kernels.text('driven_inputs', loop.kernels)}"
     return filled(f"loop.{suffix}", {**places, **own}, name)
 
@@ -251,7 +376,13 @@ def _fields(name: str, value: Any) -> str:
     """Assignments of a value to a field, of those of a dictionary to its fields."""
     if isinstance(value, dict):
         return "".join(_fields(f"{name}.{key}", each) for key, each in value.items())
-    text = m_strings(value) if isinstance(value, tuple) else m_array(value) if np.ndim(value) else m_number(value)
+    text = (
+        m_strings(value)
+        if isinstance(value, tuple)
+        else m_array(value)
+        if np.ndim(value)
+        else m_number(value)
+    )
     return f"  {name} = {text};\n"
 
 

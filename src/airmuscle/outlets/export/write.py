@@ -10,27 +10,43 @@ import numpy as np
 from ...control import LinearModelPredictive, PredictiveControl
 from ...core import Array, ParameterError, atomic_folder, check_known
 from ...engine.compile.kernel_text import CKernels, plain_kernels
-from ...engine.loop import MEASURED, ControlLoop, EnclosingLaw, Measurement, WithSensors, without_simulated
+from ...engine.loop import (
+    MEASURED,
+    ControlLoop,
+    EnclosingLaw,
+    Measurement,
+    WithSensors,
+    without_simulated,
+)
 from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_run import CONTROLLER, ExportedRun, export_loop
 from .identifiers import c_integers, c_number, c_values, filled, program_name, provenance
-from .printed_controller import SINGLE_TOLERANCE, PrintedController, check_control_law, print_controller
+from .printed_controller import (
+    SINGLE_TOLERANCE,
+    PrintedController,
+    check_control_law,
+    print_controller,
+)
 from .printed_system import export_system
 from .targets import C99, Target, print_law
 
 TOLERANCE = 1e-9
-"""Part of its range by which a command in C may differ from that in Python (chosen): sums are in another order."""
+"""Part of its range by which a command in C may differ from that in Python (chosen): sums are in
+another order.
+"""
 SINGLE_TOLERANCES = (1e-5, 1e-3, 1e-6, 1e-5)
-"""Tolerances of the quadratic program in single precision, in place of `TOLERANCES` of the law (chosen)."""
+"""Tolerances of the quadratic program in single precision, in place of `TOLERANCES` of the law
+(chosen).
+"""
 FRAME = ("y", "r", "low", "high", "predicted", "plan", "inputs", "active", "counts")
 """Arguments of the kernel that the frame in C names itself."""
 PREDICTIVE_NOTE = (
-    "The quadratic program is solved by the dual active-set method that runs in Python, printed from the same source; "
-    "no library is needed. A sample without a solution applies the last plan and counts it in the last number of the "
-    "memory."
+    "The quadratic program is solved by the dual active-set method that runs in Python, printed"
+    " from the same source; no library is needed. A sample without a solution applies the last plan"
+    " and counts it in the last number of the memory."
 )
 
 
@@ -41,23 +57,43 @@ class PrintedPredictive(PrintedController):
     law: LinearModelPredictive  # type: ignore[assignment]
 
     def source_files(self) -> dict[str, str]:
-        law, arrays, number = self.law, self.law.arrays(), self.number
+        law = self.law
+        arrays = self.law.arrays()
+        number = self.number
         shapes = {name: tuple(map(str, array.shape)) for name, array in arrays.items()}
         model = law.model
-        known = {**law.constants, **self._given, "operating": model.inputs, "sizes": model.input_sizes,
-                 "at_measured": model.measured, "at_controlled": law.model.controlled}  # fmt: skip
+        known = {
+            **law.constants,
+            **self._given,
+            "operating": model.inputs,
+            "sizes": model.input_sizes,
+            "at_measured": model.measured,
+            "at_controlled": law.model.controlled,
+        }
         places = {
             **self.places,
-            "tables": "".join(_table(f"{self.name}_{name}", array, number) for name, array in known.items()),
+            "tables": "".join(
+                _table(f"{self.name}_{name}", array, number) for name, array in known.items()
+            ),
             "functions": CKernels(shapes, number=number).text("predictive", ["predictive_sample"]),
-            "work": "".join(
-                f"  {'int' if array.dtype == np.int64 else number} {name}{''.join(f'[{k}]' for k in array.shape)};\n"
-                for name, array in arrays.items() if name not in {*FRAME, *law.constants}
-            ).rstrip(),
-            "arguments": ", ".join(f"{self.name}_{name}" if name in known else name for name in arrays),
-            **{f"{name}_at": str(list(law.initial_memory).index(f"{name}0")) for name in law.init()._fields},
-            "measured": str(len(law.measured)), "controlled": str(len(law.controlled)),
-        }  # fmt: skip
+            "work": (
+                "".join(
+                    f"  {'int' if array.dtype == np.int64 else number}"
+                    f" {name}{''.join(f'[{k}]' for k in array.shape)};\n"
+                    for name, array in arrays.items()
+                    if name not in {*FRAME, *law.constants}
+                ).rstrip()
+            ),
+            "arguments": ", ".join(
+                f"{self.name}_{name}" if name in known else name for name in arrays
+            ),
+            **{
+                f"{name}_at": str(list(law.initial_memory).index(f"{name}0"))
+                for name in law.init()._fields
+            },
+            "measured": str(len(law.measured)),
+            "controlled": str(len(law.controlled)),
+        }
         return {
             f"{self.name}.h": filled("controller.h", places, self.name),
             f"{self.name}.c": filled("predictive.c", places, self.name),
@@ -65,23 +101,41 @@ class PrintedPredictive(PrintedController):
 
     @property
     def _given(self) -> dict[str, Array]:
-        """The limits of the inputs as scaled deviations, and the tolerances, by the names of the kernel."""
-        model, (low, high) = self.law.model, np.array(self.ranges).T
-        ends = {"low": (low - model.inputs) / model.input_sizes, "high": (high - model.inputs) / model.input_sizes}
-        return ends | ({"tolerances": np.array(SINGLE_TOLERANCES)} if self.number == "float" else {})
+        """The limits of the inputs as scaled deviations, and the tolerances, by the names of the
+        kernel.
+        """
+        model = self.law.model
+        low, high = np.array(self.ranges).T
+        ends = {
+            "low": (low - model.inputs) / model.input_sizes,
+            "high": (high - model.inputs) / model.input_sizes,
+        }
+        return ends | (
+            {"tolerances": np.array(SINGLE_TOLERANCES)} if self.number == "float" else {}
+        )
 
     def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> Array:
         """The commands (K, c) to measurements (K, p) and set points (K, q), in Python.
 
         single  the operations of the program itself, each rounded to single precision
         """
-        law, memory, rows = self.law, self.law.init(), list[Any]()
+        law = self.law
+        memory = self.law.init()
+        rows = list[Any]()
         if single:
-            sample, known = plain_kernels("predictive")["predictive_sample"], {**law.arrays(), **self._given}
-            arrays = {name: each if each.dtype == np.int64 else each.astype(np.float32) for name, each in known.items()}
-            at, to = law.model.measured.astype(np.float32), law.model.controlled.astype(np.float32)
-            sizes, operating = law.model.input_sizes.astype(np.float32), law.model.inputs.astype(np.float32)
-            for values, points in zip(measured.astype(np.float32), setpoints.astype(np.float32), strict=True):
+            sample = plain_kernels("predictive")["predictive_sample"]
+            known = {**law.arrays(), **self._given}
+            arrays = {
+                name: each if each.dtype == np.int64 else each.astype(np.float32)
+                for name, each in known.items()
+            }
+            at = law.model.measured.astype(np.float32)
+            to = law.model.controlled.astype(np.float32)
+            sizes = law.model.input_sizes.astype(np.float32)
+            operating = law.model.inputs.astype(np.float32)
+            for values, points in zip(
+                measured.astype(np.float32), setpoints.astype(np.float32), strict=True
+            ):
                 arrays |= {"y": values - at, "r": points - to}
                 sample(*arrays.values())
                 rows.append(operating + sizes * arrays["inputs"])
@@ -89,26 +143,36 @@ class PrintedPredictive(PrintedController):
         ranges = dict(zip(law.inputs, self.ranges, strict=True))
         for values, points in zip(measured.tolist(), setpoints.tolist(), strict=True):
             seen = Measurement(
-                dict(zip(law.measured, values, strict=True)), dict(zip(law.controlled, points, strict=True)), ranges
+                dict(zip(law.measured, values, strict=True)),
+                dict(zip(law.controlled, points, strict=True)),
+                ranges,
             )
             commands, memory = law.step(memory, seen, 0.0)
             rows.append([commands[name] for name in law.inputs])
         return np.array(rows)
 
 
-def print_predictive(prepared: SampledLoop, name: str, title: str, number: str) -> PrintedPredictive:
+def print_predictive(
+    prepared: SampledLoop, name: str, title: str, number: str
+) -> PrintedPredictive:
     """The predictive controller of a prepared loop, with its ranges as constants."""
     law = prepared.loop.controller
     assert isinstance(law, LinearModelPredictive)
-    about = (f"Sample time {c_number(prepared.loop.sample_time)} s; set points {', '.join(law.controlled)}; measured "
-             f"{', '.join(law.measured)}; commanded {', '.join(law.inputs)}.")  # fmt: skip
+    about = (
+        f"Sample time {c_number(prepared.loop.sample_time)} s; set points"
+        f" {', '.join(law.controlled)}; measured {', '.join(law.measured)}; commanded"
+        f" {', '.join(law.inputs)}."
+    )
     lines = provenance(title or type(law).__name__, law, notes=[about, PREDICTIVE_NOTE])
-    tolerance, ranges = SINGLE_TOLERANCE if number == "float" else TOLERANCE, [prepared.ranges[n] for n in law.inputs]
+    tolerance = SINGLE_TOLERANCE if number == "float" else TOLERANCE
+    ranges = [prepared.ranges[n] for n in law.inputs]
     return PrintedPredictive(name, law, {}, {}, ranges, (), lines, number, tolerance)
 
 
 def _table(name: str, array: Array, number: str) -> str:
-    """A constant array; a table is not const, because C converts no pointer to rows of constants."""
+    """A constant array; a table is not const, because C converts no pointer to rows of
+    constants.
+    """
     if array.dtype == np.int64:
         return f"static const int {name}[{len(array)}] = {{{c_integers(array.tolist())}}};\n"
     size = "".join(f"[{k}]" for k in array.shape)
@@ -117,81 +181,115 @@ def _table(name: str, array: Array, number: str) -> str:
 
 
 NOTE = (
-    "The equations are those of the model. The program does not report where a run leaves the validity range of a "
-    "characteristic or of another component, as a simulation by airmuscle does."
+    "The equations are those of the model. The program does not report where a run leaves the"
+    " validity range of a characteristic or of another component, as a simulation by airmuscle"
+    " does."
 )
 """What an exported program does not contain."""
 
 
 def write_program(
-    problem: Problem, folder: str | Path, target: Target = C99(), *, name: str = "", title: str = "",
-    tunable: Sequence[str] | None = None, columns: Sequence[str] = (),
-) -> tuple[Path, ...]:  # fmt: skip
+    problem: Problem,
+    folder: str | Path,
+    target: Target = C99(),
+    *,
+    name: str = "",
+    title: str = "",
+    tunable: Sequence[str] | None = None,
+    columns: Sequence[str] = (),
+) -> tuple[Path, ...]:
     """Write a system and its run as a program in another language; returns the paths of its files.
 
-    problem  a system with its input signals or a control loop, initial state, output times and integrator
-    target   C99(), JavaScript() or Octave()
-    name     name of the files, and beginning of the names in them; by default the title
-    tunable  paths of the parameters that the program can change, those of a controller with `controller.` before them;
+    problem  a system with its input signals or a control loop, initial state, output times and
+    integrator target   C99(), JavaScript() or Octave() name     name of the files, and beginning of
+    the names in them; by default the title tunable  paths of the parameters that the program can
+    change, those of a controller with `controller.` before them;
              all by default, the others become constants
-    columns  states, inputs, outputs and columns of a controller that the run writes after time; all by default
+    columns  states, inputs, outputs and columns of a controller that the run writes after time; all
+    by default
 
-    The files depend on the arguments and the version of airmuscle alone. Raises ParameterError for what cannot be
-    exported, which it names, and FileError.
+    The files depend on the arguments and the version of airmuscle alone. Raises ParameterError for
+    what cannot be exported, which it names, and FileError.
     """
-    program = make_run(problem, name=name, title=title, tunable=tunable, columns=columns, with_loop=True)
+    program = make_run(
+        problem, name=name, title=title, tunable=tunable, columns=columns, with_loop=True
+    )
     return write_files(target.run_files(program), folder)
 
 
 def make_run(
-    problem: Problem, *, name: str = "", title: str = "", tunable: Sequence[str] | None = None,
-    columns: Sequence[str] = (), notes: Sequence[str] = (NOTE,), with_loop: bool = False,
-) -> ExportedRun:  # fmt: skip
-    """A problem ready for any target, with its control loop if the target has one; else as for `write_program`."""
+    problem: Problem,
+    *,
+    name: str = "",
+    title: str = "",
+    tunable: Sequence[str] | None = None,
+    columns: Sequence[str] = (),
+    notes: Sequence[str] = (NOTE,),
+    with_loop: bool = False,
+) -> ExportedRun:
+    """A problem ready for any target, with its control loop if the target has one; else as for
+    `write_program`.
+    """
     title = title or type(problem.system).__name__
     name = program_name(name, title)
-    loop, of_plant = None, tunable
+    loop = None
+    of_plant = tunable
     if isinstance(problem.input, ControlLoop):
         if not with_loop:
             raise ParameterError(
-                f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export "
-                "the plant with input signals, or the loop to C, JavaScript, Octave, or as FMUs of an SSP package."
+                f"the controller {type(problem.input.controller).__name__} cannot be exported to"
+                " this target; export the plant with input signals, or the loop to C, JavaScript,"
+                " Octave, or as FMUs of an SSP package."
             )
         of_controller = None
         if tunable is not None:
             of_plant = [path for path in tunable if not path.startswith(CONTROLLER)]
-            of_controller = [path.removeprefix(CONTROLLER) for path in tunable if path.startswith(CONTROLLER)]
+            of_controller = [
+                path.removeprefix(CONTROLLER) for path in tunable if path.startswith(CONTROLLER)
+            ]
         loop = export_loop(problem, f"{name}_controller", title, of_controller)
     integrator = problem.integrator
     if integrator is None or not integrator.printed_step:
         raise ParameterError(
-            f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
-            "DormandPrince8."
+            f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4,"
+            " RungeKutta4 or DormandPrince8."
         )
     system = export_system(problem.compiled, of_plant)
     known = sum(loop.added_columns if loop else (), system.known.column_names)
     check_known("the run has no column", columns, known)
     lines = provenance(title, problem.system, (integrator,), notes)
-    segments, times = (loop.others, loop.prepared.times) if loop else (problem.segments, problem.times)
+    segments, times = (
+        (loop.others, loop.prepared.times) if loop else (problem.segments, problem.times)
+    )
     written = tuple(c for c in columns if c != "time") or known
     return ExportedRun(name, system, problem, integrator, segments, times, lines, written, loop)
 
 
 def write_law(
-    law: Characteristic, folder: str | Path, target: Target = C99(), *, name: str = "", title: str = ""
+    law: Characteristic,
+    folder: str | Path,
+    target: Target = C99(),
+    *,
+    name: str = "",
+    title: str = "",
 ) -> tuple[Path, ...]:
-    """Write a static characteristic with its slopes as a function in another language; the paths of its files.
+    """Write a static characteristic with its slopes as a function in another language; the paths of
+    its files.
 
-    A force law gives force [N], its derivative by pressure [N/Pa] and stiffness -dF/deps [N]; a law that is given as
-    contraction or pressure gives this and its two derivatives. Raises ParameterError for a law without closed form, and
-    FileError.
+    A force law gives force [N], its derivative by pressure [N/Pa] and stiffness -dF/deps [N]; a law
+    that is given as contraction or pressure gives this and its two derivatives. Raises
+    ParameterError for a law without closed form, and FileError.
     """
     title = title or type(law).__name__
     return write_files(target.law_files(print_law(law, program_name(name, title), title)), folder)
 
 
-def write_files(files: Mapping[str, str] | Mapping[str, str | bytes], folder: str | Path) -> tuple[Path, ...]:
-    """Write texts or bytes by file name into a folder, all or none; their paths. Raises FileError."""
+def write_files(
+    files: Mapping[str, str] | Mapping[str, str | bytes], folder: str | Path
+) -> tuple[Path, ...]:
+    """Write texts or bytes by file name into a folder, all or none; their paths. Raises
+    FileError.
+    """
     target = Path(folder)
     with atomic_folder(target) as staging:
         for file, text in files.items():
@@ -204,36 +302,49 @@ def write_files(files: Mapping[str, str] | Mapping[str, str | bytes], folder: st
 PRECISIONS: dict[str, Precision] = {"double": Double(), "float": Single()}
 """Precisions of the arithmetic of exported controllers, by the names of the type in C."""
 LEFT_OUT = (
-    "Not part of this program: simulated sensors and faults of the scenario (resolution, noise, lag, delay); the "
-    "measurements are those of the real sensors."
+    "Not part of this program: simulated sensors and faults of the scenario (resolution, noise,"
+    " lag, delay); the measurements are those of the real sensors."
 )
 """Note on simulated sensors and faults."""
 
 
 def write_controller(
-    problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = (),
-    precision: Precision = Double(), arduino: bool = False,
-) -> tuple[Path, ...]:  # fmt: skip
-    """Write the control law of a problem as C99 for a microcontroller; returns the paths of its files.
+    problem: Problem,
+    folder: str | Path,
+    *,
+    name: str = "",
+    title: str = "",
+    tunable: Sequence[str] = (),
+    precision: Precision = Double(),
+    arduino: bool = False,
+) -> tuple[Path, ...]:
+    """Write the control law of a problem as C99 for a microcontroller; returns the paths of its
+    files.
 
-    problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of the replay.
-             Simulated sensors and faults (`WithSensors`, `WithStuckValve`) belong to the plant and are left out, at any
-             depth of the law; the readings of sensors around the whole law are the data of the replay
-    tunable  paths of the parameters that remain variables; none by default: all are constants of the program
-    precision  Double(), or Single() for a processor that computes with floats alone
-    arduino  whether the files are an Arduino library with an example sketch, in place of the program of the replay
+    problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of
+    the replay.
+             Simulated sensors and faults (`WithSensors`, `WithStuckValve`) belong to the plant and
+             are left out, at any depth of the law; the readings of sensors around the whole law are
+             the data of the replay
+    tunable  paths of the parameters that remain variables; none by default: all are constants of
+    the program precision  Double(), or Single() for a processor that computes with floats alone
+    arduino  whether the files are an Arduino library with an example sketch, in place of the
+    program of the replay
 
-    The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of the commands are
-    constants. The program `main.c` replays the measurements of the run. In double precision it compares the commands
-    bit by bit with those of the same operations in IEEE 754; in single precision they differ from these by at most 1e-4
-    of the range of the command. The program of a LinearModelPredictive contains the solver of its quadratic program;
-    in double precision its commands differ from those of Python by at most 1e-9 of their range.
+    The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of
+    the commands are constants. The program `main.c` replays the measurements of the run. In double
+    precision it compares the commands bit by bit with those of the same operations in IEEE 754; in
+    single precision they differ from these by at most 1e-4 of the range of the command. The program
+    of a LinearModelPredictive contains the solver of its quadratic program; in double precision its
+    commands differ from those of Python by at most 1e-9 of their range.
 
-    Raises ParameterError for a problem without a controller, a controller that is neither a ControlLaw nor a
-    LinearModelPredictive, and one that single precision changes by more; SimulationError if the run fails, and
-    FileError.
+    Raises ParameterError for a problem without a controller, a controller that is neither a
+    ControlLaw nor a LinearModelPredictive, and one that single precision changes by more;
+    SimulationError if the run fails, and FileError.
     """
-    if isinstance(problem.input, ControlLoop) and isinstance(problem.input.controller, PredictiveControl):
+    if isinstance(problem.input, ControlLoop) and isinstance(
+        problem.input.controller, PredictiveControl
+    ):
         designed = dataclasses.replace(problem.input, controller=problem.input.controller.law)
         problem = dataclasses.replace(problem, input=designed)
     loop = check_control_law(problem, also=LinearModelPredictive)
@@ -246,16 +357,27 @@ def write_controller(
     printed: PrintedController
     if isinstance(law, LinearModelPredictive):
         if tunable:
-            raise ParameterError(f"LinearModelPredictive has no tunable parameter '{tunable[0]}'; leave it out.")
+            raise ParameterError(
+                f"LinearModelPredictive has no tunable parameter '{tunable[0]}'; leave it out."
+            )
         printed = print_predictive(of_real_plant, name, title, number)
     else:
         printed = print_controller(of_real_plant, name, title, tunable, number, notes)
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
-    measured = np.column_stack([recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns])
-    enclosing, setpoints = loop.controller, prepared.setpoint_values
-    while isinstance(enclosing, EnclosingLaw) and enclosing.simulated:  # simulated sensors around the law
-        measured = enclosing.readings(measured, loop.sample_time) if isinstance(enclosing, WithSensors) else measured
+    measured = np.column_stack(
+        [recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns]
+    )
+    enclosing = loop.controller
+    setpoints = prepared.setpoint_values
+    while (
+        isinstance(enclosing, EnclosingLaw) and enclosing.simulated
+    ):  # simulated sensors around the law
+        measured = (
+            enclosing.readings(measured, loop.sample_time)
+            if isinstance(enclosing, WithSensors)
+            else measured
+        )
         enclosing = enclosing.law
     commands = printed.replay(measured, setpoints)
     if precision == Single():

@@ -1,7 +1,9 @@
-"""Declaration of requests: frozen dataclasses whose fields state meaning, unit and bounds of what a user may give.
+"""Declaration of requests: frozen dataclasses whose fields state meaning, unit and bounds of what a
+user may give.
 
-The options of a command, the form of the page and the tables of a file are derived from the fields, and so are the
-conversion of texts to SI units and the messages. A request may define `check(where)` for conditions on several fields.
+The options of a command, the form of the page and the tables of a file are derived from the fields,
+and so are the conversion of texts to SI units and the messages. A request may define `check(where)`
+for conditions on several fields.
 """
 
 import dataclasses
@@ -24,7 +26,9 @@ YES = "yes"
 
 
 class RequestError(InputError):
-    """Texts that are no request: a missing or contradictory field. `field` is the field of a page that it concerns."""
+    """Texts that are no request: a missing or contradictory field. `field` is the field of a page
+    that it concerns.
+    """
 
     def __init__(self, message: str, field: str = "") -> None:
         super().__init__(message)
@@ -36,8 +40,8 @@ Instruction = Callable[[Hint], str]
 
 
 def reworded(text: str, instructions: Mapping[str, Instruction]) -> str:
-    """The text with its hints in the words of an outlet, by argument or function; a hint without a remedy there is
-    omitted."""
+    """The text with its hints in the words of an outlet, by argument or function; a hint without a
+    remedy there is omitted."""
     if not isinstance(text, HintedText):
         return text
 
@@ -98,11 +102,16 @@ class Option:
     complete: Callable[[str], list[str]] | None = None
 
     def convert(self, value: Any, where: str) -> Any:
-        """A value as given, a text or what a parser has made of it, as that of the field. Raises InputError."""
+        """A value as given, a text or what a parser has made of it, as that of the field. Raises
+        InputError.
+        """
         if self.choices:
             if value not in self.choices:
-                allowed, similar = ", ".join(filter(None, self.choices)), suggestion(str(value), self.choices)
-                raise RequestError(f"{where} is '{value}'; allowed range: {allowed}.{similar}", self.name)
+                allowed = ", ".join(filter(None, self.choices))
+                similar = suggestion(str(value), self.choices)
+                raise RequestError(
+                    f"{where} is '{value}'; allowed range: {allowed}.{similar}", self.name
+                )
             return self.choices[value]
         if self.read is not None:
             return self.read(value, where) if isinstance(value, str) else value
@@ -117,18 +126,30 @@ class Option:
                 raise RequestError(f"{where} is '{value}'; give {YES}, or nothing.", self.name)
             value = True
         low, high = self.bounds
-        if isinstance(value, int | float) and not isinstance(value, bool) and not low <= value <= high:
-            raise RequestError(f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name)
+        if (
+            isinstance(value, int | float)
+            and not isinstance(value, bool)
+            and not low <= value <= high
+        ):
+            raise RequestError(
+                f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name
+            )
         return value
 
 
-def option(meaning: str, *, default: Any = dataclasses.MISSING, choices: Any = None, **declared: Any) -> Any:
-    """Declare a field; the keywords are those of `Option`. A default text is converted as a given one."""
+def option(
+    meaning: str, *, default: Any = dataclasses.MISSING, choices: Any = None, **declared: Any
+) -> Any:
+    """Declare a field; the keywords are those of `Option`. A default text is converted as a given
+    one.
+    """
     names = choices if isinstance(choices, Mapping) else {name: name for name in choices or ()}
     metadata = {"meaning": meaning, "default": default, "choices": names, **declared}
     value = default
     if isinstance(default, str):
-        value = Option("default", str, False, **{**metadata, "default": None}).convert(default, "default")
+        value = Option("default", str, False, **{**metadata, "default": None}).convert(
+            default, "default"
+        )
     return dataclasses.field(metadata={_KEY: metadata}, default=value)
 
 
@@ -150,35 +171,50 @@ def request(cls: type[T]) -> type[T]:
 
 def options_of(cls: Any) -> tuple[Option, ...]:
     """The declared fields of a request, in order."""
-    hints, found = typing.get_type_hints(cls), []
+    hints = typing.get_type_hints(cls)
+    found = []
     for field in (each for each in dataclasses.fields(cls) if _KEY in each.metadata):
-        declared, hint = dict(field.metadata[_KEY]), hints[field.name]
+        declared = dict(field.metadata[_KEY])
+        hint = hints[field.name]
         default = declared.pop("default")
         parts = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
         kind = next(each for each in parts if each is not type(None))
-        repeated, needed = typing.get_origin(kind) is tuple, default is dataclasses.MISSING
+        repeated = typing.get_origin(kind) is tuple
+        needed = default is dataclasses.MISSING
         kind = typing.get_args(kind)[0] if repeated else kind
-        found.append(Option(
-            field.name, kind if kind in (bool, int, float, str, Path) else str, repeated, needed=needed,
-            default=None if needed or default in ((), None) else default, **declared,
-        ))  # fmt: skip
+        found.append(
+            Option(
+                field.name,
+                kind if kind in (bool, int, float, str, Path) else str,
+                repeated,
+                needed=needed,
+                default=None if needed or default in ((), None) else default,
+                **declared,
+            )
+        )
     return tuple(found)
 
 
 def form_fields(cls: type[Any]) -> list[dict[str, Any]]:
-    """The fields of a form: name, label, hint, example, text at first, offered values with their names, and the text of
-    a box that may be marked."""
+    """The fields of a form: name, label, hint, example, text at first, offered values with their
+    names, and the text of a box that may be marked."""
     names = ("name", "label", "hint", "example", "filled")
-    return [{**{name: getattr(each, name) for name in names}, "offered": list(map(list, each.offered)),
-             "mark": YES if each.kind is bool else ""}
-            for each in options_of(cls) if each.label]  # fmt: skip
+    return [
+        {
+            **{name: getattr(each, name) for name in names},
+            "offered": list(map(list, each.offered)),
+            "mark": YES if each.kind is bool else "",
+        }
+        for each in options_of(cls)
+        if each.label
+    ]
 
 
 def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
     """The request of the values that a user has given; None and empty texts stand for the default.
 
-    In the text of a form the values of a repeated field stand between commas, spaces or lines. Raises InputError, with
-    the name of the field in the words of the outlet.
+    In the text of a form the values of a repeated field stand between commas, spaces or lines.
+    Raises InputError, with the name of the field in the words of the outlet.
     """
     values: dict[str, Any] = {}
     for each in options_of(cls):

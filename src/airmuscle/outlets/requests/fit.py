@@ -1,4 +1,5 @@
-"""Request of a static fit: a law fitted to measured points, or the comparison of all laws, with what is asked of it.
+"""Request of a static fit: a law fitted to measured points, or the comparison of all laws, with
+what is asked of it.
 
 The geometry of its muscle is a braid, as --braid or as two fields of a form.
 """
@@ -7,7 +8,16 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...bench.identify import BlockSplit, GroupSplit, Huber, LeastSquares, LevelSplit, Loss, RunSplit, SpecimenSplit
+from ...bench.identify import (
+    BlockSplit,
+    GroupSplit,
+    Huber,
+    LeastSquares,
+    LevelSplit,
+    Loss,
+    RunSplit,
+    SpecimenSplit,
+)
 from ...core import ParameterError, quantity, tree
 from ...files.library import Entry, located_errors, resting_lengths
 from ...physics.muscle.geometry import Braid, Geometry
@@ -20,13 +30,17 @@ class BraidRequest:
     """The braid in two fields of a form, both or none."""
 
     braid_radius: float | None = optional(
-        "Outer radius of the braid at rest.", unit="m",
-        label="Radius of the braid, for the geometry of the muscle file", example="optional: 10 mm",
-    )  # fmt: skip
+        "Outer radius of the braid at rest.",
+        unit="m",
+        label="Radius of the braid, for the geometry of the muscle file",
+        example="optional: 10 mm",
+    )
     braid_angle: float | None = optional(
-        "Angle between threads and axis at rest.", unit="rad",
-        label="Angle of the braid to the axis at rest", example="optional: 24.4 deg",
-    )  # fmt: skip
+        "Angle between threads and axis at rest.",
+        unit="rad",
+        label="Angle of the braid to the axis at rest",
+        example="optional: 24.4 deg",
+    )
 
     def check(self, where: Where) -> None:
         """Raise RequestError for one field without the other, and for a braid that cannot be."""
@@ -48,11 +62,17 @@ class BraidRequest:
 
 
 def read_braid(text: str, where: str) -> Braid:
-    """The braid of unit length that a text describes. Raises RequestError, UnitError or ParameterError."""
-    parts = [(name.strip(), value.strip()) for name, _, value in (part.partition("=") for part in text.split(","))]
+    """The braid of unit length that a text describes. Raises RequestError, UnitError or
+    ParameterError.
+    """
+    parts = [
+        (name.strip(), value.strip())
+        for name, _, value in (part.partition("=") for part in text.split(","))
+    ]
     if sorted(name for name, _ in parts) != ["angle", "radius"]:
         raise RequestError(
-            f"{where} must give radius and angle once each, such as 'radius=10 mm, angle=24.4 deg', not '{text}'"
+            f"{where} must give radius and angle once each, such as 'radius=10 mm, angle=24.4 deg',"
+            f" not '{text}'"
         )
     units = {"radius": "m", "angle": "rad"}
     size = {name: quantity(value, units[name], where=f"{where}, {name}") for name, value in parts}
@@ -61,31 +81,44 @@ def read_braid(text: str, where: str) -> Braid:
 
 
 def with_braid(entry: Entry, braid: Braid | None, recordings: Sequence[Recording]) -> Entry:
-    """The initial entry with the braid of --braid, if any, as its geometry. Raises ParameterError if it cannot."""
+    """The initial entry with the braid of --braid, if any, as its geometry. Raises ParameterError
+    if it cannot.
+    """
     if braid is None:
         return entry
     law = entry.characteristic
     if isinstance(getattr(law, "geometry", None), Geometry):
         raise ParameterError(
-            f"--braid: {type(law).__name__} contains its geometry, which is also that of the muscle. Omit --braid, or "
-            "give the geometry in [characteristic.geometry] of a muscle file, with --characteristic."
+            f"--braid: {type(law).__name__} contains its geometry, which is also that of the"
+            " muscle. Omit --braid, or give the geometry in [characteristic.geometry] of a muscle"
+            " file, with --characteristic."
         )
-    inside = {float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"}
+    inside = {
+        float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"
+    }
     length = check_one_length(resting_lengths(recordings) or tuple(inside))
     return dataclasses.replace(entry, geometry=braid_of_length(braid, length))
 
 
 def check_one_length(lengths: Sequence[float], noun: str = "--braid: a braid") -> float:
-    """The one resting length [m] of what the noun names. Raises ParameterError unless there is exactly one."""
+    """The one resting length [m] of what the noun names. Raises ParameterError unless there is
+    exactly one.
+    """
     if problem := problem_of_lengths(lengths, noun):
         raise ParameterError(f"{problem} Give --resting-length, or files of one muscle.")
     return lengths[0]
 
 
 def problem_of_lengths(lengths: Sequence[float], noun: str = "a braid") -> str:
-    """What is wrong with the resting lengths [m] of the data of one braid; empty if there is exactly one."""
+    """What is wrong with the resting lengths [m] of the data of one braid; empty if there is
+    exactly one.
+    """
     stated = ", ".join(f"{1e3 * length:.4g} mm" for length in lengths) or "none"
-    return "" if len(lengths) == 1 else f"{noun} has exactly one resting length; the data state {stated}."
+    return (
+        ""
+        if len(lengths) == 1
+        else f"{noun} has exactly one resting length; the data state {stated}."
+    )
 
 
 def braid_of_length(braid: Braid, resting_length: float) -> Braid:
@@ -95,13 +128,21 @@ def braid_of_length(braid: Braid, resting_length: float) -> Braid:
 
 # The fit
 
-PURPOSES: Mapping[str, GroupSplit | None] = {"repeat": RunSplit(), "length": SpecimenSplit(), "both": None}
-"""Purposes with the split that serves each: further runs of the measured muscles, other muscles, or both."""
+PURPOSES: Mapping[str, GroupSplit | None] = {
+    "repeat": RunSplit(),
+    "length": SpecimenSplit(),
+    "both": None,
+}
+"""Purposes with the split that serves each: further runs of the measured muscles, other muscles, or
+both.
+"""
 _SPLITS: Mapping[str, tuple[GroupSplit, str]] = {
-    "run": (RunSplit(), "one run at a time"), "specimen": (SpecimenSplit(), "one specimen at a time"),
+    "run": (RunSplit(), "one run at a time"),
+    "specimen": (SpecimenSplit(), "one specimen at a time"),
     "contraction": (LevelSplit("contraction"), "one level of contraction"),
-    "pressure": (LevelSplit("pressure"), "one level of pressure"), "block": (BlockSplit(), "blocks within each run"),
-}  # fmt: skip
+    "pressure": (LevelSplit("pressure"), "one level of pressure"),
+    "block": (BlockSplit(), "blocks within each run"),
+}
 SPLITS = {name: split for name, (split, _) in _SPLITS.items()}
 """Groups of rows that are left out in turn."""
 WEAK = "weak"
@@ -109,10 +150,14 @@ WEAK = "weak"
 
 
 def read_free_contraction(text: str, where: str) -> tuple[float, float]:
-    """A point of zero force: pressure [Pa] and contraction [1]. Raises RequestError or UnitError."""
+    """A point of zero force: pressure [Pa] and contraction [1]. Raises RequestError or
+    UnitError.
+    """
     pressure, sign, contraction = text.partition("=")
     if not sign:
-        raise RequestError(f"{where} must be PRESSURE=CONTRACTION, such as '3 bar=18 %', not '{text}'")
+        raise RequestError(
+            f"{where} must be PRESSURE=CONTRACTION, such as '3 bar=18 %', not '{text}'"
+        )
     value = quantity(contraction, "1", where=where)
     if not 0.0 <= value < 1.0:
         raise RequestError(f"{where}: a contraction must be from 0 to 100 %, not '{contraction}'")
@@ -124,64 +169,97 @@ class FitRequest:
     """What a static fit is asked for."""
 
     characteristic: str | None = optional(
-        "Initial law: a library entry, a muscle file (TOML), or a model that needs no initial values, such as "
-        "ContractileSurface.",
-    )  # fmt: skip
-    compare: bool = option("Fit every characteristic that the data determine, and rank them.", default=False)
+        "Initial law: a library entry, a muscle file (TOML), or a model that needs no initial"
+        " values, such as ContractileSurface.",
+    )
+    compare: bool = option(
+        "Fit every characteristic that the data determine, and rank them.", default=False
+    )
     leave_out: GroupSplit | None = optional(
-        "Groups of rows for cross-validation (--compare) and resampling (--bootstrap): run, specimen, contraction, "
-        "pressure, block.", choices=SPLITS, metavar="GROUP", label="Cross-validation leaves out",
+        "Groups of rows for cross-validation (--compare) and resampling (--bootstrap): run,"
+        " specimen, contraction, pressure, block.",
+        choices=SPLITS,
+        metavar="GROUP",
+        label="Cross-validation leaves out",
         offered=(("", "automatic"), *((name, shown) for name, (_, shown) in _SPLITS.items())),
-    )  # fmt: skip
+    )
     purpose: str | None = optional(
-        "Use of the law that --compare recommends: repeat (further runs of the measured muscles), length (other "
-        "muscles of the type), both (one law for both). Default: both, if three specimens or more were each measured "
-        "in several runs.", choices=tuple(PURPOSES), metavar="PURPOSE",
-    )  # fmt: skip
-    bootstrap: int | None = optional("Bootstrap with N refits to resampled groups of rows.", bounds=(20, 100_000))
+        "Use of the law that --compare recommends: repeat (further runs of the measured muscles),"
+        " length (other muscles of the type), both (one law for both). Default: both, if three"
+        " specimens or more were each measured in several runs.",
+        choices=tuple(PURPOSES),
+        metavar="PURPOSE",
+    )
+    bootstrap: int | None = optional(
+        "Bootstrap with N refits to resampled groups of rows.", bounds=(20, 100_000)
+    )
     profile: tuple[str, ...] = many(
-        "Profile-likelihood interval of this parameter; 'weak': of all weakly determined ones. Repeatable.",
+        "Profile-likelihood interval of this parameter; 'weak': of all weakly determined ones."
+        " Repeatable.",
         metavar="PARAMETER",
-    )  # fmt: skip
+    )
     length_error: tuple[str, ...] = many(
-        "Estimate the error of the recorded resting length of this specimen together with the law. Repeatable.",
+        "Estimate the error of the recorded resting length of this specimen together with the law."
+        " Repeatable.",
         metavar="SPECIMEN",
-    )  # fmt: skip
+    )
     shape: bool = option(
-        "Constrain a ContractileSurface: force must not decrease with pressure nor increase with contraction.",
+        "Constrain a ContractileSurface: force must not decrease with pressure nor increase with"
+        " contraction.",
         default=False,
     )
     free_contraction: tuple[Any, ...] = many(
         "With --shape: a point of zero force (free contraction), such as '3 bar=18 %'. Repeatable.",
-        metavar="PRESSURE=CONTRACTION", read=read_free_contraction,
-    )  # fmt: skip
+        metavar="PRESSURE=CONTRACTION",
+        read=read_free_contraction,
+    )
     braid: Braid | None = optional(
-        "Braid at rest, such as 'radius=10 mm, angle=24.4 deg' (outer radius; angle between threads and axis): the "
-        "[geometry] of a muscle whose law contains none. Requires the resting length.", metavar="SIZE", read=read_braid,
-    )  # fmt: skip
+        "Braid at rest, such as 'radius=10 mm, angle=24.4 deg' (outer radius; angle between threads"
+        " and axis): the [geometry] of a muscle whose law contains none. Requires the resting"
+        " length.",
+        metavar="SIZE",
+        read=read_braid,
+    )
     degree: int = option("Total degree of a ContractileSurface.", default=5, bounds=(1, 9))
-    fix: tuple[str, ...] = many("Keep this parameter at its initial value; repeatable.", metavar="PARAMETER")
+    fix: tuple[str, ...] = many(
+        "Keep this parameter at its initial value; repeatable.", metavar="PARAMETER"
+    )
     robust: str | None = optional(
-        "Threshold of the Huber loss, such as '10 N' or '0.5 %'; default: squared. With --compare: a force.",
+        "Threshold of the Huber loss, such as '10 N' or '0.5 %'; default: squared. With --compare:"
+        " a force.",
         metavar="QUANTITY",
-    )  # fmt: skip
-    uncensored: bool = option("Fit rows at zero force as measured values, not as censored data.", default=False)
-    equal_weights: bool = option("Equal weights; default: by the sensor resolution of each test rig.", default=False)
+    )
+    uncensored: bool = option(
+        "Fit rows at zero force as measured values, not as censored data.", default=False
+    )
+    equal_weights: bool = option(
+        "Equal weights; default: by the sensor resolution of each test rig.", default=False
+    )
 
     def check(self, where: Where) -> None:
         """Raise RequestError for fields that do not fit together."""
-        law, compare, shape = where("characteristic"), where("compare"), where("shape")
-        check_rules({
-            f"give the characteristic to fit with {law}, or rank all with {compare}":
-                self.characteristic is None and not self.compare,
-            f"{where('free_contraction')} requires {shape}": self.free_contraction and not self.shape,
-            f"{shape} is for a ContractileSurface, given with {law}; it excludes {compare}":
-                self.shape and self.compare,
-            f"{where('purpose')} is for {compare}, and excludes {where('leave_out')}":
-                self.purpose is not None and (not self.compare or self.leave_out is not None),
-            f"{compare} ranks by errors of rows with positive force: {where('uncensored')} and "
-            f"{where('equal_weights')} do not apply": self.compare and (self.uncensored or self.equal_weights),
-        })  # fmt: skip
+        law = where("characteristic")
+        compare = where("compare")
+        shape = where("shape")
+        check_rules(
+            {
+                f"give the characteristic to fit with {law}, or rank all with {compare}": (
+                    self.characteristic is None and not self.compare
+                ),
+                f"{where('free_contraction')} requires {shape}": (
+                    self.free_contraction and not self.shape
+                ),
+                f"{shape} is for a ContractileSurface, given with {law}; it excludes {compare}": (
+                    self.shape and self.compare
+                ),
+                f"{where('purpose')} is for {compare}, and excludes {where('leave_out')}": (
+                    self.purpose is not None and (not self.compare or self.leave_out is not None)
+                ),
+                f"{compare} ranks by errors of rows with positive force: {where('uncensored')} and {where('equal_weights')} do not apply": (  # noqa: E501
+                    self.compare and (self.uncensored or self.equal_weights)
+                ),
+            }
+        )
 
     @property
     def split(self) -> GroupSplit | None:
@@ -190,4 +268,8 @@ class FitRequest:
 
     def loss(self, unit: str) -> Loss:
         """The loss, with its threshold in this SI unit. Raises UnitError."""
-        return LeastSquares() if self.robust is None else Huber(quantity(self.robust, unit, where="--robust"))
+        return (
+            LeastSquares()
+            if self.robust is None
+            else Huber(quantity(self.robust, unit, where="--robust"))
+        )

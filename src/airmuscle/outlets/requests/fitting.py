@@ -1,4 +1,6 @@
-"""Computation of a requested static fit: the fit or the comparison, the muscle, and the chapters of its report."""
+"""Computation of a requested static fit: the fit or the comparison, the muscle, and the chapters of
+its report.
+"""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -6,12 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.identify import UNCENSORED, Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
+from ...bench.identify import (
+    UNCENSORED,
+    Fit,
+    bootstrap,
+    estimate_length_error,
+    fit,
+    profile,
+    weakly_determined,
+)
 from ...bench.identify.candidates import Candidate, standard_candidates
 from ...bench.identify.compare_chapter import LawSelection, compare_chapters, select_law
 from ...bench.identify.length_errors import length_error_chapter
 from ...bench.identify.problem import fitted_quantity_of
-from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors, specimen_errors
+from ...bench.identify.specimen_errors import (
+    odd_specimen_notes,
+    ranked_specimen_errors,
+    specimen_errors,
+)
 from ...bench.identify.static_fit_chapter import fit_chapter
 from ...bench.identify.surface.shape import fit_shape_constrained
 from ...bench.identify.surface.violations import shape_violations_of_fit
@@ -28,13 +42,15 @@ from .fit import WEAK, FitRequest, check_one_length, with_braid
 Progress = Callable[[str, float], None]
 """Called with a step and the fraction done."""
 RANKED = 5
-"""Laws of each ranking in the brief view, besides the recommended one, if there are several rankings (chosen)."""
+"""Laws of each ranking in the brief view, besides the recommended one, if there are several
+rankings (chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FittedMuscle:
-    """The fit, the muscle with its law, the chapters of the report, remarks on the specimens, and the selection of the
-    law, if laws were compared."""
+    """The fit, the muscle with its law, the chapters of the report, remarks on the specimens, and
+    the selection of the law, if laws were compared."""
 
     fit: Fit
     entry: Entry
@@ -44,12 +60,17 @@ class FittedMuscle:
 
 
 def fit_requested(
-    request: FitRequest, names: Sequence[Path], recordings: Sequence[Recording], progress: Progress | None = None,
+    request: FitRequest,
+    names: Sequence[Path],
+    recordings: Sequence[Recording],
+    progress: Progress | None = None,
     workers: Workers = 1,
-) -> FittedMuscle:  # fmt: skip
-    """The fit of the named law, or the recommended one of the comparison, with what else is requested.
+) -> FittedMuscle:
+    """The fit of the named law, or the recommended one of the comparison, with what else is
+    requested.
 
-    `names` are those of the files. Raises IdentificationError, ParameterError and others of the fit.
+    `names` are those of the files. Raises IdentificationError, ParameterError and others of the
+    fit.
     """
     recordings = list(recordings)
     if request.compare:
@@ -57,42 +78,66 @@ def fit_requested(
     assert request.characteristic is not None
     initial, scaling = find_initial_law(request.characteristic, recordings, request.degree)
     start = with_braid(initial, request.braid, recordings)
-    law, fixed = start.characteristic, (*request.fix, *scaling)
+    law = start.characteristic
+    fixed = (*request.fix, *scaling)
     found = fit(
-        law, recordings, loss=request.loss(fitted_quantity_of(law).unit), fixed=fixed,
-        censoring=UNCENSORED if request.uncensored else None, sigma=1.0 if request.equal_weights else None,
-    )  # fmt: skip
+        law,
+        recordings,
+        loss=request.loss(fitted_quantity_of(law).unit),
+        fixed=fixed,
+        censoring=UNCENSORED if request.uncensored else None,
+        sigma=1.0 if request.equal_weights else None,
+    )
     errors = specimen_errors(found, recordings, fixed)
     entry = fitted_entry(found, start, names, recordings=recordings, errors=errors)
     entry, chapters, notes = _more(request, found, entry, recordings, progress, workers)
     odd = odd_specimen_notes(errors)
-    chapter = fit_chapter(found, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings))
+    chapter = fit_chapter(
+        found, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings)
+    )
     return FittedMuscle(found, entry, [chapter, *chapters], odd)
 
 
 def _compare(
-    request: FitRequest, names: Sequence[Path], recordings: list[Recording], progress: Progress | None, workers: Workers
+    request: FitRequest,
+    names: Sequence[Path],
+    recordings: list[Recording],
+    progress: Progress | None,
+    workers: Workers,
 ) -> FittedMuscle:
     if request.braid is not None:
         check_one_length(resting_lengths(recordings))
-    named, candidates = None, None  # without a named law those that the data determine
+    # without a named law those that the data determine
+    named = None
+    candidates = None
     if request.characteristic is not None:
         named, scaling = find_initial_law(request.characteristic, recordings, request.degree)
-        own = Candidate(f"{request.characteristic} (named)", named.characteristic, (*request.fix, *scaling))
+        own = Candidate(
+            f"{request.characteristic} (named)", named.characteristic, (*request.fix, *scaling)
+        )
         candidates = [*standard_candidates(recordings), own]
     both = None if request.purpose is None else request.purpose == "both"
     selection = select_law(
-        recordings, candidates, leave_out=request.split, both=both, loss=request.loss("N"), workers=workers,
+        recordings,
+        candidates,
+        leave_out=request.split,
+        both=both,
+        loss=request.loss("N"),
+        workers=workers,
         progress=progress,
-    )  # fmt: skip
+    )
     best = selection.recommended[0]
     geometry = named.geometry if named and candidates and best.candidate is candidates[-1] else None
-    initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
+    initial = Entry(
+        best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry
+    )
     unused = []
     if not isinstance(getattr(best.candidate.law, "geometry", None), Geometry):
         initial = with_braid(initial, request.braid, recordings)
     elif request.braid is not None:
-        unused = [f"The braid is not used: {best.candidate.name} contains its geometry, which was fitted."]
+        unused = [
+            f"The braid is not used: {best.candidate.name} contains its geometry, which was fitted."
+        ]
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
     entry, more, notes = _more(request, best.fit, entry, recordings, progress, workers)
@@ -100,35 +145,53 @@ def _compare(
     odd = odd_specimen_notes(errors)
     notes = [*notes, *unused, *odd, *missing_geometry(entry)]
     comparisons[0] = dataclasses.replace(comparisons[0], notes=(*comparisons[0].notes, *notes))
-    fitted = dataclasses.replace(fit_chapter(best.fit, entry, (), _notes_of(recordings)), brief=False)
+    fitted = dataclasses.replace(
+        fit_chapter(best.fit, entry, (), _notes_of(recordings)), brief=False
+    )
     return FittedMuscle(best.fit, entry, [*comparisons, fitted, *more], [*odd, *unused], selection)
 
 
 def _more(
-    request: FitRequest, found: Fit, entry: Entry, recordings: list[Recording], progress: Progress | None,
+    request: FitRequest,
+    found: Fit,
+    entry: Entry,
+    recordings: list[Recording],
+    progress: Progress | None,
     workers: Workers,
-) -> tuple[Entry, list[Chapter], list[str]]:  # fmt: skip
-    """The entry with a constrained surface if one is requested, chapters of further results, and notes."""
-    chapters, notes, sample = list[Chapter](), list[str](), None
+) -> tuple[Entry, list[Chapter], list[str]]:
+    """The entry with a constrained surface if one is requested, chapters of further results, and
+    notes.
+    """
+    chapters = list[Chapter]()
+    notes = list[str]()
+    sample = None
     weak = weakly_determined(found) if WEAK in request.profile else ()
     names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
     if request.bootstrap is not None:
         report = None if progress is None else lambda fraction: progress("refits", fraction)
         sample = bootstrap(
-            found, recordings, refits=request.bootstrap, by=request.split, progress=report, workers=workers
+            found,
+            recordings,
+            refits=request.bootstrap,
+            by=request.split,
+            progress=report,
+            workers=workers,
         )
     profiles = tuple(profile(found, name) for name in names)
     uncertainty = Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
     if request.shape:
         if not isinstance(found.model, ContractileSurface):
             raise ParameterError(
-                f"--shape: the shape of {type(found.model).__name__} is given by its formula; only a "
-                "ContractileSurface can be constrained. Give --characteristic ContractileSurface, or omit --shape."
+                f"--shape: the shape of {type(found.model).__name__} is given by its formula; only"
+                " a ContractileSurface can be constrained. Give --characteristic"
+                " ContractileSurface, or omit --shape."
             )
         free = None
         if request.free_contraction:
             pressure, contraction = np.array(request.free_contraction).T
-            free = Recording({"pressure": pressure, "contraction": contraction}, "--free-contraction")
+            free = Recording(
+                {"pressure": pressure, "contraction": contraction}, "--free-contraction"
+            )
         shaped = fit_shape_constrained(found.model, recordings, free=free)
         chapters.append(shaped.chapter(found))
         note = f"{entry.note} With shape constraints: rms error {shaped.rmse:.4g} N."
@@ -138,17 +201,21 @@ def _more(
     if sample is not None or profiles or uncertainty.none_weak:
         chapters.append(uncertainty.chapter())
     if request.length_error:
-        errors = [estimate_length_error(found.model, recordings, name) for name in request.length_error]
+        errors = [
+            estimate_length_error(found.model, recordings, name) for name in request.length_error
+        ]
         chapters.append(length_error_chapter(errors))
     return entry, chapters, notes
 
 
 def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:
-    """The chapters of a comparison, each without the notes that one before states. Of several chapters, the brief view
-    has fewer laws of the ranking, and those that are not ranked once."""
-    stated, brief = set[str](), list[Chapter]()
+    """The chapters of a comparison, each without the notes that one before states. Of several
+    chapters, the brief view has fewer laws of the ranking, and those that are not ranked once."""
+    stated = set[str]()
+    brief = list[Chapter]()
     for each in chapters:
-        notes, tables = tuple(note for note in each.notes if note not in stated), each.tables
+        notes = tuple(note for note in each.notes if note not in stated)
+        tables = each.tables
         if len(chapters) > 1:
             tables = tuple(_shortened(each, table, not brief) for table in tables)
         brief.append(dataclasses.replace(each, notes=notes, tables=tables))
@@ -157,12 +224,16 @@ def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:
 
 
 def _shortened(chapter: Chapter, table: Table, first: bool) -> Table:
-    """A table of laws with fewer rows in the brief view: of a ranking the first ones and the recommended law."""
+    """A table of laws with fewer rows in the brief view: of a ranking the first ones and the
+    recommended law.
+    """
     if isinstance(table.brief, int):
         return table if first else dataclasses.replace(table, brief=0)
     recommended = next(each.value for each in chapter.values if each.name == "recommended")
     laws = list(table.columns["law"].values)
-    return dataclasses.replace(table, brief=sorted({*table.brief[:RANKED], laws.index(recommended)}))
+    return dataclasses.replace(
+        table, brief=sorted({*table.brief[:RANKED], laws.index(recommended)})
+    )
 
 
 def _notes_of(recordings: Sequence[Recording]) -> tuple[str, ...]:

@@ -1,4 +1,6 @@
-"""Request of the identification of an arm from episodes, and its computation: the chapter and the scenarios."""
+"""Request of the identification of an arm from episodes, and its computation: the chapter and the
+scenarios.
+"""
 
 import dataclasses
 from collections.abc import Callable, Sequence
@@ -7,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.joint import ArmFit, EpisodeMapping, fit_joint, fit_known_joint, read_episode_mapping, read_episodes
+from ...bench.joint import (
+    ArmFit,
+    EpisodeMapping,
+    fit_joint,
+    fit_known_joint,
+    read_episode_mapping,
+    read_episodes,
+)
 from ...bench.joint.episode_formats import propose_mapping
 from ...bench.joint.episode_inspection import EpisodeInspection, inspect_episodes
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
@@ -21,8 +30,11 @@ from .declaration import RequestError, Where, many, option, optional, request
 
 FIRST_LAG = 0.02
 """Lag [s] of the pressures from which the search of a known joint starts (chosen)."""
-DURATION, STEP = 2.0, 0.15
-"""Duration [s] of the scenarios, and step of the controlled one relative to the range of the angle (chosen)."""
+DURATION = 2.0
+STEP = 0.15
+"""Duration [s] of the scenarios, and step of the controlled one relative to the range of the angle
+(chosen).
+"""
 
 
 @request
@@ -30,43 +42,63 @@ class JointFitRequest:
     """What the identification of a joint is asked for."""
 
     mapping: Path | None = optional(
-        "Mapping file (TOML): which column is what. Without it one is proposed, and nothing is fitted."
+        "Mapping file (TOML): which column is what. Without it one is proposed, and nothing is"
+        " fitted."
     )
     inspect: bool = option("State what the record contains; fit nothing.", default=False)
     left_out: float | None = optional(
-        "Share of the episodes, the last ones, that judges the fit; default: a tenth, or 19 episodes if that is more, "
-        "but a third at most.", metavar="SHARE", bounds=(0.01, 0.9), label="Share of the episodes that judges the fit",
-        hint="empty: at least 19 of them, a third at most", example="0.1",
-    )  # fmt: skip
+        "Share of the episodes, the last ones, that judges the fit; default: a tenth, or 19"
+        " episodes if that is more, but a third at most.",
+        metavar="SHARE",
+        bounds=(0.01, 0.9),
+        label="Share of the episodes that judges the fit",
+        hint="empty: at least 19 of them, a third at most",
+        example="0.1",
+    )
     horizon: int = option(
-        "Rows of the free run.", default=40, bounds=(5, 1000), metavar="ROWS", label="Rows of the free run",
-        example="40", filled="40",
-    )  # fmt: skip
+        "Rows of the free run.",
+        default=40,
+        bounds=(5, 1000),
+        metavar="ROWS",
+        label="Rows of the free run",
+        example="40",
+        filled="40",
+    )
     residual: bool = option(
-        "Fit a hybrid law to what physics leaves, used for joints that gain by it on episodes held back.",
-        default=False, label="A hybrid law for what physics leaves (takes longer)",
-    )  # fmt: skip
+        "Fit a hybrid law to what physics leaves, used for joints that gain by it on episodes held"
+        " back.",
+        default=False,
+        label="A hybrid law for what physics leaves (takes longer)",
+    )
     seed: int = option("Seed of the order of the windows.", default=0)
     known: str | None = optional(
-        "A joint of known muscles and geometry, a scenario or a plant of the library: the numbers of --free are "
-        "estimated.", metavar="SCENARIO",
+        "A joint of known muscles and geometry, a scenario or a plant of the library: the numbers"
+        " of --free are estimated.",
+        metavar="SCENARIO",
         complete=lambda incomplete: [name for name in list_plants() if name.startswith(incomplete)],
-        label="Joint of known muscles and geometry", hint="a plant of the library, or the text of a scenario",
+        label="Joint of known muscles and geometry",
+        hint="a plant of the library, or the text of a scenario",
         example="joint-dmsp-20-matrix",
-    )  # fmt: skip
+    )
     free: tuple[str, ...] = many(
-        "With --known: path of a parameter that is estimated, zeros, gains or lags. Repeatable; by default inertia, "
-        "damping, offset, weight and friction of the mechanism, lags and zeros.", metavar="PATH",
-        label="Parameters of a known joint that are estimated", hint="empty: mechanism, lags and zeros",
+        "With --known: path of a parameter that is estimated, zeros, gains or lags. Repeatable; by"
+        " default inertia, damping, offset, weight and friction of the mechanism, lags and zeros.",
+        metavar="PATH",
+        label="Parameters of a known joint that are estimated",
+        hint="empty: mechanism, lags and zeros",
         example="mechanism.inertia, zeros",
-    )  # fmt: skip
+    )
 
     def check(self, where: Where) -> None:
         """Raise RequestError for paths without a known joint, and for a residual of one."""
         if self.known is None and self.free:
-            raise RequestError(f"{where('free')} requires {where('known')}, the scenario of the joint.", "free")
+            raise RequestError(
+                f"{where('free')} requires {where('known')}, the scenario of the joint.", "free"
+            )
         if self.known is not None and self.residual:
-            raise RequestError(f"{where('residual')} and {where('known')} exclude each other.", "residual")
+            raise RequestError(
+                f"{where('residual')} and {where('known')} exclude each other.", "residual"
+            )
 
 
 def inspect_requested(source: Path, request: JointFitRequest) -> EpisodeInspection:
@@ -78,8 +110,9 @@ def inspect_requested(source: Path, request: JointFitRequest) -> EpisodeInspecti
 def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:
     if request.mapping is None:
         raise RequestError(
-            f"a mapping file is needed, which states what the columns are. Proposal for {source.name}, to be corrected "
-            f"and given as --mapping arm.toml:\n\n{propose_mapping(source)}",
+            "a mapping file is needed, which states what the columns are. Proposal for"
+            f" {source.name}, to be corrected and given as --mapping"
+            f" arm.toml:\n\n{propose_mapping(source)}",
             "mapping",
         )
     return read_episode_mapping(request.mapping)
@@ -88,44 +121,72 @@ def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:
 def fit_requested_arm(
     source: Path, request: JointFitRequest, progress: Callable[[str], None]
 ) -> tuple[Chapter, dict[str, str]]:
-    """The chapter of the fit, and scenarios and muscles by file. Raises RequestError without a mapping file."""
-    rules, title = _mapping(source, request), f"Arm identified from {source.name}"
+    """The chapter of the fit, and scenarios and muscles by file. Raises RequestError without a
+    mapping file.
+    """
+    rules = _mapping(source, request)
+    title = f"Arm identified from {source.name}"
     episodes = read_episodes(source, rules)
     common: dict[str, Any] = {
-        "pairs": rules.pairs, "left_out": request.left_out, "rows": request.horizon, "progress": progress
-    }  # fmt: skip
+        "pairs": rules.pairs,
+        "left_out": request.left_out,
+        "rows": request.horizon,
+        "progress": progress,
+    }
     if request.known is None:
-        fit = fit_joint(episodes, axes=rules.axes, residual=request.residual, seed=request.seed, **common)
+        fit = fit_joint(
+            episodes, axes=rules.axes, residual=request.residual, seed=request.seed, **common
+        )
         names = [muscle.name for muscle in fit.arm.muscle]
-        note, warning = "supply, orifices and volumes are chosen", SCALED
+        note = "supply, orifices and volumes are chosen"
+        warning = SCALED
     else:
         plant = load_scenario(request.known).plant
         arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
         fit = fit_known_joint(arm, episodes, request.free, **common)
         names = [fit.arm.muscle[number - 1].name for pair in fit.pairs for number in pair]
-        note, warning = IN_PLACE, ""
+        note = IN_PLACE
+        warning = ""
     muscles = {
         f"muscles/{muscle.name}.toml": to_toml(
-            dataclasses.replace(entry_of(muscle), title=f"{muscle.name}: {title}", provenance="fitted", warning=warning)
+            dataclasses.replace(
+                entry_of(muscle),
+                title=f"{muscle.name}: {title}",
+                provenance="fitted",
+                warning=warning,
+            )
         )
         for number, muscle in enumerate(fit.arm.muscle)
-        if any(each.path.startswith(f"muscle[{number}].") for each in fit.estimates)  # identified parameters
+        if any(
+            each.path.startswith(f"muscle[{number}].") for each in fit.estimates
+        )  # identified parameters
     }
-    return dataclasses.replace(fit.chapter(), title=title), _scenarios(fit, names, title, note) | muscles
+    return (
+        dataclasses.replace(fit.chapter(), title=title),
+        _scenarios(fit, names, title, note) | muscles,
+    )
 
 
-IN_PLACE = "supply and orifices are chosen; pressure regulators stand in place of the circuits of the known joint"
+IN_PLACE = (
+    "supply and orifices are chosen; pressure regulators stand in place of the circuits of the"
+    " known joint"
+)
 SCALED = "the scale of its forces is chosen: the record contains pressures and angles alone"
 
 
 def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict[str, str]:
-    """The arm at constant set points, and with a PID controller of each angle to be tuned; `names` as in the pairs."""
+    """The arm at constant set points, and with a PID controller of each angle to be tuned; `names`
+    as in the pairs.
+    """
     middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
     run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
-    ranges = np.ptp(np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0).tolist()
-    laws, wanted = [], {}
+    ranges = np.ptp(
+        np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0
+    ).tolist()
+    laws = []
+    wanted = {}
     for j, (c, range_) in enumerate(zip(fit.arm.mechanism.coordinates, ranges, strict=True)):
         mean = float(np.mean(levels[2 * j : 2 * j + 2]))
         pair = CoContraction((f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint"), mean)

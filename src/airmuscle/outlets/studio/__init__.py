@@ -1,4 +1,6 @@
-"""Studio: a page in the browser that shows muscles and plants, computed in the page by printed programs."""
+"""Studio: a page in the browser that shows muscles and plants, computed in the page by printed
+programs.
+"""
 
 from ...core.stubs import attach_stub
 

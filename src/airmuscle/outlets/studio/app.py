@@ -11,23 +11,44 @@ from typing import Any
 
 from ...core import AirmuscleError
 from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
-from ..requests import BraidRequest, FitRequest, JointFitRequest, ReadingRequest, RequestError, form_fields
+from ..requests import (
+    BraidRequest,
+    FitRequest,
+    JointFitRequest,
+    ReadingRequest,
+    RequestError,
+    form_fields,
+)
 from . import tasks
 from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
-from .security import Access, Application, BadRequest, json_answer, limited_table, limited_text, secured
+from .security import (
+    Access,
+    Application,
+    BadRequest,
+    json_answer,
+    limited_table,
+    limited_text,
+    secured,
+)
 from .worker import LimitError, Task, WorkerPool
 
-WORKERS, LONG_WORKERS = 5, 3
-"""Number of worker processes for sheets, some of which are kept ready, and of those for what may take long: measurement
-files, sizings and joints (chosen)."""
+WORKERS = 5
+LONG_WORKERS = 3
+"""Number of worker processes for sheets, some of which are kept ready, and of those for what may
+take long: measurement files, sizings and joints (chosen)."""
 TIME_LIMIT = 20.0
 """Limit [s] of the computation of a sheet of a user (chosen)."""
 LIBRARY_LIMIT = 120.0
-"""The same of the library, and of a sizing (chosen: a joint with an elaborate law takes some seconds)."""
-MAX_SHEETS, MAX_PAGE = 100, 256 * 1024
-"""Number of sheets that the server keeps, and largest size of a request for a self-contained page [bytes] (chosen)."""
+"""The same of the library, and of a sizing (chosen: a joint with an elaborate law takes some
+seconds).
+"""
+MAX_SHEETS = 100
+MAX_PAGE = 256 * 1024
+"""Number of sheets that the server keeps, and largest size of a request for a self-contained page
+[bytes] (chosen).
+"""
 LONG_TASKS = (sheet_of_joint, tasks.size_sheet)
 """Tasks that leave the workers of the other sheets free."""
 SHEETS: Mapping[str, tuple[str, Callable[[], Any], Callable[[str], dict[str, Any]]]] = {
@@ -35,28 +56,51 @@ SHEETS: Mapping[str, tuple[str, Callable[[], Any], Callable[[str], dict[str, Any
     "plant": ("plant", list_plants, tasks.sheet_of_library_plant),
     "joint": ("joint", joint_names, sheet_of_joint),
 }
-"""Sheets of the library by their address: what they are, their names, and the task that makes one."""
+"""Sheets of the library by their address: what they are, their names, and the task that makes
+one.
+"""
 
 
 def library_list() -> dict[str, Any]:
     """Names and titles of the laws and plants that the page offers."""
-    listed: dict[str, Any] = {"version": metadata.version("airmuscle"), "laws": [], "plants": [], "joints": []}
-    names_of = {"laws": (LAWS, list_laws()), "plants": (PLANTS, list_plants()), "joints": (PLANTS, joint_names())}
+    listed: dict[str, Any] = {
+        "version": metadata.version("airmuscle"),
+        "laws": [],
+        "plants": [],
+        "joints": [],
+    }
+    names_of = {
+        "laws": (LAWS, list_laws()),
+        "plants": (PLANTS, list_plants()),
+        "joints": (PLANTS, joint_names()),
+    }
     for kind, (folder, names) in names_of.items():
         for name in names:
             tables = read_toml(folder / f"{name}.toml")
-            row = {"name": name, "title": tables["title"], "provenance": tables.get("provenance", "chosen")}
+            row = {
+                "name": name,
+                "title": tables["title"],
+                "provenance": tables.get("provenance", "chosen"),
+            }
             listed[kind].append(row)
-    fit = [field for each in (ReadingRequest, BraidRequest, FitRequest) for field in form_fields(each)]
-    return {**listed, "forms": {"size": tasks.size_form(), "fit": fit, "arm": form_fields(JointFitRequest)}}
+    fit = [
+        field for each in (ReadingRequest, BraidRequest, FitRequest) for field in form_fields(each)
+    ]
+    return {
+        **listed,
+        "forms": {"size": tasks.size_form(), "fit": fit, "arm": form_fields(JointFitRequest)},
+    }
 
 
 def create_app(
-    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = (),
-    fits: FitService | None = None, long_pool: WorkerPool | None = None,
-) -> Application:  # fmt: skip
-    """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette.
-    `long_pool` computes joints and sizings, by default `pool`."""
+    access: Access = Access(),
+    pool: WorkerPool | None = None,
+    opened: tuple[dict[str, Any], ...] = (),
+    fits: FitService | None = None,
+    long_pool: WorkerPool | None = None,
+) -> Application:
+    """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError
+    without starlette. `long_pool` computes joints and sizings, by default `pool`."""
     from starlette.applications import Starlette
     from starlette.requests import ClientDisconnect
     from starlette.routing import Route
@@ -77,7 +121,9 @@ def create_app(
     ]
     errors: dict[Any, Any] = {
         AirmuscleError: _refused,
-        ClientDisconnect: _stating("the connection was closed.", 400),  # nobody receives it: the tab was closed
+        ClientDisconnect: _stating(
+            "the connection was closed.", 400
+        ),  # nobody receives it: the tab was closed
         **{status: _stating("there is no such address.", status) for status in (404, 405)},
         500: _stating("the server failed; its terminal states the reason.", 500),
     }
@@ -85,18 +131,32 @@ def create_app(
 
 
 class Handlers:
-    """The functions that answer requests, and the sheets that were requested last, by their identifier."""
+    """The functions that answer requests, and the sheets that were requested last, by their
+    identifier.
+    """
 
     def __init__(
-        self, pool: WorkerPool, long_pool: WorkerPool, access: Access, opened: tuple[dict[str, Any], ...]
+        self,
+        pool: WorkerPool,
+        long_pool: WorkerPool,
+        access: Access,
+        opened: tuple[dict[str, Any], ...],
     ) -> None:
         from starlette import responses
 
-        self._pool, self._long_pool, self._access, self._opened = pool, long_pool, access, opened
+        self._pool = pool
+        self._long_pool = long_pool
+        self._access = access
+        self._opened = opened
         self._kept: collections.OrderedDict[str, dict[str, Any]] = collections.OrderedDict()
         self._of_library: dict[tuple[str, str], str] = {}
         self._lock = threading.Lock()
-        self._web, self._page, self._library, self._responses = web_files(), server_page(), library_list(), responses
+        self._web, self._page, self._library, self._responses = (
+            web_files(),
+            server_page(),
+            library_list(),
+            responses,
+        )
         for sheet in opened:
             self._keep(sheet)
 
@@ -112,18 +172,24 @@ class Handlers:
                 self._kept.popitem(last=False)
 
     def _sheet(self, task: Task, text: str, limit: float, in_library: bool) -> dict[str, Any]:
-        """The sheet that a task makes of a text, within a limit of time [s]; of the library a kept one."""
+        """The sheet that a task makes of a text, within a limit of time [s]; of the library a kept
+        one.
+        """
         key = (task.__name__, text)
         sheet = self._get(self._of_library.get(key, "")) if in_library else None
         if sheet is None:
-            sheet = (self._long_pool if task in LONG_TASKS else self._pool).call(task, text, limit=limit)
+            sheet = (self._long_pool if task in LONG_TASKS else self._pool).call(
+                task, text, limit=limit
+            )
             self._keep(sheet)
             if in_library:
                 self._of_library[key] = sheet["id"]
         return sheet
 
     async def page(self, request: Any) -> Any:
-        """The page; a token in its address becomes a cookie, so that it does not stay in the address."""
+        """The page; a token in its address becomes a cookie, so that it does not stay in the
+        address.
+        """
         if cookie := self._access.cookie(request.scope):
             answer = self._responses.RedirectResponse("/", status_code=303)
             answer.set_cookie(**cookie)
@@ -146,7 +212,9 @@ class Handlers:
 
     async def library(self, request: Any) -> Any:
         """Names of the library, and the sheets with which the page begins."""
-        return json_answer({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
+        return json_answer(
+            {**self._library, "opened": [_without_script(sheet) for sheet in self._opened]}
+        )
 
     def of_library(self, kind: str) -> Callable[[Any], Any]:
         """The handler of the sheets of a law, a plant or a joint of the library."""
@@ -160,7 +228,9 @@ class Handlers:
 
         return handle
 
-    def of_text(self, task: Callable[[str], dict[str, Any]], limit: float = TIME_LIMIT) -> Callable[[Any], Any]:
+    def of_text(
+        self, task: Callable[[str], dict[str, Any]], limit: float = TIME_LIMIT
+    ) -> Callable[[Any], Any]:
         """The handler of the sheets that a task makes of texts of users."""
 
         async def handle(request: Any) -> Any:
@@ -175,13 +245,22 @@ class Handlers:
         return json_answer(_without_script(await run_in_threadpool(self._sheet, *arguments)))
 
     async def save_page(self, request: Any) -> Any:
-        """One file of what is on the screen, without fits: the request names the sheets and the state of the page."""
+        """One file of what is on the screen, without fits: the request names the sheets and the
+        state of the page.
+        """
         wanted = await limited_table(request, MAX_PAGE)
-        names, state = wanted.get("sheets"), wanted.get("state")
-        if not isinstance(state, dict) or not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+        names = wanted.get("sheets")
+        state = wanted.get("state")
+        if (
+            not isinstance(state, dict)
+            or not isinstance(names, list)
+            or not all(isinstance(n, str) for n in names)
+        ):
             raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")
         if not 1 <= len(names) <= MAX_PAGE_SHEETS:
-            raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
+            raise BadRequest(
+                f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}."
+            )
         sheets = [sheet for sheet in map(self._get, names) if sheet is not None]
         if len(sheets) < len(names):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
@@ -195,7 +274,13 @@ def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
 
 async def _refused(request: Any, error: Exception) -> Any:
     assert isinstance(error, AirmuscleError)
-    status = error.status if isinstance(error, BadRequest) else 503 if isinstance(error, LimitError) else 422
+    status = (
+        error.status
+        if isinstance(error, BadRequest)
+        else 503
+        if isinstance(error, LimitError)
+        else 422
+    )
     field = {"field": error.field} if isinstance(error, RequestError) else {}
     return json_answer({"error": str(error.message), **field}, status)
 

@@ -1,6 +1,8 @@
-"""Task of the tab Fit on episodes of an arm: what the record contains, and the fit, report and scenarios of the arm.
+"""Task of the tab Fit on episodes of an arm: what the record contains, and the fit, report and
+scenarios of the arm.
 
-The computation is that of `airmuscle fit-joint`. A ZIP archive is a folder of episodes. A mapping is proposed.
+The computation is that of `airmuscle fit-joint`. A ZIP archive is a folder of episodes. A mapping
+is proposed.
 """
 
 import contextlib
@@ -16,14 +18,24 @@ from ...core import AirmuscleError, FileError, atomic_folder, suggestion
 from ...files.library import list_plants
 from ...report.data import as_json, as_sheet
 from ...report.write import write_into
-from ..requests import JointFitRequest, RequestError, build, fit_requested_arm, form_fields, inspect_requested
+from ..requests import (
+    JointFitRequest,
+    RequestError,
+    build,
+    fit_requested_arm,
+    form_fields,
+    inspect_requested,
+)
 from .fit_reading import without_folder
 from .fit_uploads import FILES
 from .plant_sheet import svg_uri
 from .tasks import check_self_contained
 
-ARCHIVE, MAPPING, KNOWN = ".zip", "mapping.toml", "known.toml"
-MAX_UNPACKED, MAX_ENTRIES = 512 * 10**6, 20_000
+ARCHIVE = ".zip"
+MAPPING = "mapping.toml"
+KNOWN = "known.toml"
+MAX_UNPACKED = 512 * 10**6
+MAX_ENTRIES = 20_000
 """Largest size [bytes] and number of the files of an archive (chosen)."""
 MAX_TEXT = 20_000
 """Largest size of a mapping and of a scenario [characters] (chosen)."""
@@ -36,7 +48,9 @@ ArmTexts = Mapping[str, str]
 
 
 def _request(texts: ArmTexts, folder: Path) -> JointFitRequest:
-    """The request, whose mapping file and known joint are written to a folder. Raises InputError."""
+    """The request, whose mapping file and known joint are written to a folder. Raises
+    InputError.
+    """
     given: dict[str, Any] = {**texts, "mapping": _written(folder / MAPPING, texts["mapping"])}
     known = texts["known"].strip()
     if known and ("=" in known or "[" in known):
@@ -47,9 +61,10 @@ def _request(texts: ArmTexts, folder: Path) -> JointFitRequest:
         given["known"] = str(_written(folder / KNOWN, known))
     elif known and known not in list_plants():
         raise RequestError(
-            f"'{known[:60]}' is no plant of the library; write the name of one, or the text of a scenario."
-            f"{suggestion(known, list_plants())}", "known",
-        )  # fmt: skip
+            f"'{known[:60]}' is no plant of the library; write the name of one, or the text of a"
+            f" scenario.{suggestion(known, list_plants())}",
+            "known",
+        )
     return build(JointFitRequest, given, lambda name: name.replace("_", " "))
 
 
@@ -62,23 +77,36 @@ def _written(path: Path, text: str) -> Path:
 def read_arm_settings(data: dict[str, Any]) -> ArmTexts:
     """The settings in a request of the page. Raises RequestError."""
     values = {name: data.get(name, "") for name in FIELDS}
-    for name in (n for n, value in values.items() if not isinstance(value, str) or len(value) > MAX_TEXT):
+    for name in (
+        n for n, value in values.items() if not isinstance(value, str) or len(value) > MAX_TEXT
+    ):
         raise RequestError(f"{name} must be a text of at most {MAX_TEXT} characters.", name)
     return values
 
 
 def sheet_of_episodes(folder: str, texts: ArmTexts) -> dict[str, Any]:
-    """What was understood of the episodes of a set; problems are part of the sheet, and no exception."""
+    """What was understood of the episodes of a set; problems are part of the sheet, and no
+    exception.
+    """
     names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
     sheet: dict[str, Any] = {
-        "files": [{"name": name, "columns": []} for name in names], "recordings": [], "remarks": [], "problems": [],
-        "mapping": texts["mapping"], "lines": [], "ready": False,
-    }  # fmt: skip
+        "files": [{"name": name, "columns": []} for name in names],
+        "recordings": [],
+        "remarks": [],
+        "problems": [],
+        "mapping": texts["mapping"],
+        "lines": [],
+        "ready": False,
+    }
     try:
         with _opened(Path(folder)) as (source, place):
             sheet["mapping"] = sheet["mapping"] or propose_mapping(source)
-            found = inspect_requested(source, _request({**texts, "mapping": sheet["mapping"]}, place))
-            sheet["lines"] = [line for line in str(found).splitlines() if not line.startswith("error: ")]
+            found = inspect_requested(
+                source, _request({**texts, "mapping": sheet["mapping"]}, place)
+            )
+            sheet["lines"] = [
+                line for line in str(found).splitlines() if not line.startswith("error: ")
+            ]
             sheet["problems"] = [{"field": "mapping", "text": text} for text in found.errors]
     except RequestError as error:
         sheet["problems"] = [{"field": error.field or "mapping", "text": error.message}]
@@ -87,10 +115,14 @@ def sheet_of_episodes(folder: str, texts: ArmTexts) -> dict[str, Any]:
 
 
 def run_arm_fit(
-    folder: str, out: str, texts: ArmTexts, report: Callable[[float, str], None], pack: Callable[[Path], list[str]]
+    folder: str,
+    out: str,
+    texts: ArmTexts,
+    report: Callable[[float, str], None],
+    pack: Callable[[Path], list[str]],
 ) -> None:
-    """Fit an arm to the episodes of a set, and write its result into `out`; `pack` returns the files that are offered.
-    Raises RequestError."""
+    """Fit an arm to the episodes of a set, and write its result into `out`; `pack` returns the
+    files that are offered. Raises RequestError."""
     report(0.0, "reading the episodes")
     lines: list[str] = []
 
@@ -112,7 +144,9 @@ def run_arm_fit(
 
 @contextlib.contextmanager
 def _opened(folder: Path, field: str = "mapping") -> Iterator[tuple[Path, Path]]:
-    """The file or the folder of the episodes of a set, and a folder for the mapping; errors do not name them."""
+    """The file or the folder of the episodes of a set, and a folder for the mapping; errors do not
+    name them.
+    """
     files = sorted((folder / FILES).iterdir())
     with tempfile.TemporaryDirectory(dir=folder) as made:
         place = Path(made)
@@ -120,27 +154,41 @@ def _opened(folder: Path, field: str = "mapping") -> Iterator[tuple[Path, Path]]
             if not files:
                 raise RequestError("there is no file; drop the episodes first.", "files")
             source = files[0] if len(files) == 1 else folder / FILES
-            yield (_unpacked(source, place / "episodes") if source.suffix.lower() == ARCHIVE else source), place
+            yield (
+                (
+                    _unpacked(source, place / "episodes")
+                    if source.suffix.lower() == ARCHIVE
+                    else source
+                ),
+                place,
+            )
         except AirmuscleError as error:
             text = without_folder(without_folder(str(error.message), place), folder / FILES)
-            own = getattr(error, "field", "") or next((n for n in ("mapping", "known") if f"{n}.toml" in text), field)
+            own = getattr(error, "field", "") or next(
+                (n for n in ("mapping", "known") if f"{n}.toml" in text), field
+            )
             raise RequestError(text, own) from None
 
 
 def _unpacked(archive: Path, folder: Path) -> Path:
-    """The folder of the files of an archive: the innermost one that alone holds all. Raises FileError."""
+    """The folder of the files of an archive: the innermost one that alone holds all. Raises
+    FileError.
+    """
     try:
         with zipfile.ZipFile(archive) as file:
             entries = file.infolist()
             if len(entries) > MAX_ENTRIES or sum(each.file_size for each in entries) > MAX_UNPACKED:
                 raise FileError(
-                    f"{archive.name}: the archive holds more than {MAX_ENTRIES} files or {MAX_UNPACKED // 10**6} MB; "
-                    "give fewer episodes."
+                    f"{archive.name}: the archive holds more than {MAX_ENTRIES} files or"
+                    f" {MAX_UNPACKED // 10**6} MB; give fewer episodes."
                 )
             file.extractall(folder)  # names that lead out of the folder are changed
     except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError) as reason:
-        raise FileError(f"{archive.name}: cannot be read as a ZIP archive ({reason}). Write it again.") from None
+        raise FileError(
+            f"{archive.name}: cannot be read as a ZIP archive ({reason}). Write it again."
+        ) from None
     inner = list(folder.iterdir())
     while len(inner) == 1 and inner[0].is_dir() and not (inner[0] / "metadata.yaml").exists():
-        folder, inner = inner[0], list(inner[0].iterdir())
+        folder = inner[0]
+        inner = list(inner[0].iterdir())
     return folder

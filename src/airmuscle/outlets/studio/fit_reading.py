@@ -1,4 +1,6 @@
-"""Reading of uploaded files: recordings, and every problem in the words of the field of the page that it concerns."""
+"""Reading of uploaded files: recordings, and every problem in the words of the field of the page
+that it concerns.
+"""
 
 import dataclasses
 import os
@@ -20,8 +22,11 @@ from ..requests.declaration import Instruction, RequestError, reworded
 from .fit_settings import FitSettings
 from .fit_uploads import FILES
 
-MAX_ROWS, MAX_COLUMNS = 200_000, 400
-"""Maximum number of rows of a file that are used, of more every n-th, and of columns that are shown (chosen)."""
+MAX_ROWS = 200_000
+MAX_COLUMNS = 400
+"""Maximum number of rows of a file that are used, of more every n-th, and of columns that are shown
+(chosen).
+"""
 NEEDED = ("pressure", "contraction", "force")
 """Quantities of a static fit."""
 
@@ -46,7 +51,9 @@ class FileColumn:
 
 @dataclasses.dataclass(eq=False)
 class ReadSet:
-    """The recordings of all files, complete and with the selected rows, the columns, and the problems."""
+    """The recordings of all files, complete and with the selected rows, the columns, and the
+    problems.
+    """
 
     columns: dict[str, list[FileColumn]] = dataclasses.field(default_factory=dict)
     """Columns by the name of the file."""
@@ -61,12 +68,16 @@ class ReadSet:
     def complain(self, error: AirmuscleError, field: str = "") -> None:
         """Add a problem, once."""
         problem = as_field_error(error, field)
-        if all((problem.message, problem.field) != (each.message, each.field) for each in self.problems):
+        if all(
+            (problem.message, problem.field) != (each.message, each.field) for each in self.problems
+        ):
             self.problems.append(problem)
 
 
 def read_set(folder: Path, settings: FitSettings) -> ReadSet:
-    """The recordings of the files of a set, as `recording.read` reads them with the same mapping."""
+    """The recordings of the files of a set, as `recording.read` reads them with the same
+    mapping.
+    """
     read = ReadSet()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AirmuscleWarning)
@@ -101,14 +112,19 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         read.complain(RequestError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
-        columns, units = list[FileColumn](), table.units or ("",) * len(table.headings)
+        columns = list[FileColumn]()
+        units = table.units or ("",) * len(table.headings)
         for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
-            chosen, (name, stated, known) = settings.columns.get(key), _name_and_unit(heading)
-            stated, unit = unit_row or stated, ""
+            chosen = settings.columns.get(key)
+            name, stated, known = _name_and_unit(heading)
+            stated = unit_row or stated
+            unit = ""
             if chosen:
                 name, unit, known = _name_and_unit(chosen)
             name = name if known else heading
-            columns.append(FileColumn(key, heading, name, unit or stated, stated, known, chosen != ""))
+            columns.append(
+                FileColumn(key, heading, name, unit or stated, stated, known, chosen != "")
+            )
         columns = columns[:MAX_COLUMNS]
         listed = read.columns.setdefault(path.name, [])
         listed += [each for each in columns if all(each.key != other.key for other in listed)]
@@ -124,7 +140,9 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         if problems:
             continue
         try:
-            parts = [interpret(part, settings.mapping({}), constants) for part in split_specimens(mapped)]
+            parts = [
+                interpret(part, settings.mapping({}), constants) for part in split_specimens(mapped)
+            ]
         except AirmuscleError as error:
             read.complain(error, field)
             continue
@@ -133,8 +151,11 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
 
 
 def without_folder(text: str, folder: Path) -> str:
-    """The text without the path of a folder, or its beginning, which a reader of another package may quote."""
-    path, text = str(folder), text.replace(f"{folder}{os.sep}", "")
+    """The text without the path of a folder, or its beginning, which a reader of another package
+    may quote.
+    """
+    path = str(folder)
+    text = text.replace(f"{folder}{os.sep}", "")
     first_directory = folder.parents[-2] if len(folder.parents) > 1 else folder
     for length in range(len(path), len(f"{first_directory}{os.sep}"), -1):
         text = text.replace(path[:length], "…")
@@ -148,11 +169,15 @@ def _tables(path: Path, settings: FitSettings) -> tuple[RawTable, ...]:
     except ColumnError as error:
         if error.hint is None or error.hint.argument != "columns":
             raise
-        return read_tables(path, settings.mapping({**settings.columns, "1": ""}), am.bench.Decimation(MAX_ROWS))
+        return read_tables(
+            path, settings.mapping({**settings.columns, "1": ""}), am.bench.Decimation(MAX_ROWS)
+        )
 
 
 def _constants(path: Path, settings: FitSettings) -> dict[str, float | str]:
-    """The constants of a file: those of its row precede those in its name and those of all files."""
+    """The constants of a file: those of its row precede those in its name and those of all
+    files.
+    """
     try:
         common = settings.mapping({}).constants_of(path)
     except AirmuscleError as error:
@@ -162,7 +187,9 @@ def _constants(path: Path, settings: FitSettings) -> dict[str, float | str]:
 
 def _keys(table: RawTable) -> list[str]:
     """The key of each column: its heading if it occurs once, otherwise its number."""
-    return [h if h and table.headings.count(h) == 1 else str(i) for i, h in enumerate(table.headings, 1)]
+    return [
+        h if h and table.headings.count(h) == 1 else str(i) for i, h in enumerate(table.headings, 1)
+    ]
 
 
 def _name_and_unit(text: str) -> tuple[str, str, bool]:
@@ -177,16 +204,21 @@ def _name_and_unit(text: str) -> tuple[str, str, bool]:
 def _unit_problems(
     table: RawTable, columns: Sequence[FileColumn], constants: dict[str, float | str]
 ) -> Iterator[RequestError]:
-    """A problem for each column whose unit is missing or unknown, and for two columns of one quantity."""
+    """A problem for each column whose unit is missing or unknown, and for two columns of one
+    quantity.
+    """
     ambient = constants.get("ambient")
     pressure = quantity(ambient, "Pa", ambient=0.0) if ambient else AMBIENT_PRESSURE
     used = [column for column in columns if column.used]
     names = [column.name for column in used if column.known]
-    double = next((column for column in used if column.known and names.count(column.name) > 1), None)
+    double = next(
+        (column for column in used if column.known and names.count(column.name) > 1), None
+    )
     if double is not None:
         keys = " and ".join(f"'{column.key}'" for column in used if column.name == double.name)
         yield RequestError(
-            f"{table.origin}: columns {keys} are both read as {double.name}. Select 'not used' for all but one.",
+            f"{table.origin}: columns {keys} are both read as {double.name}. Select 'not used' for"
+            " all but one.",
             f"column:{double.key}",
         )
         return
@@ -212,13 +244,24 @@ def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
     """Complain about each quantity that a static fit needs and the recording lacks."""
     moved = next((each for each in ("length", "shortening") if each in recording.columns), "")
     for name in (name for name in NEEDED if name not in recording):
-        text, field = f"no column is a {name}. Select its column.", "columns"
+        text = f"no column is a {name}. Select its column."
+        field = "columns"
         if name == "contraction" and moved:
-            text = f"the resting length is not known, which converts the {moved} to a contraction. Write it into the "
-            text, field = f"{text}field 'Resting length', such as 300 mm.", "resting_length"
+            text = (
+                f"the resting length is not known, which converts the {moved} to a contraction."
+                " Write it into the "
+            )
+            text = f"{text}field 'Resting length', such as 300 mm."
+            field = "resting_length"
         elif name == "contraction":
-            text = "there is neither a contraction nor a length. Select its column, which may be a shortening or an "
-            text += "elongation, or write the length at which the muscle was held into the row of the file."
+            text = (
+                "there is neither a contraction nor a length. Select its column, which may be a"
+                " shortening or an "
+            )
+            text += (
+                "elongation, or write the length at which the muscle was held into the row of the"
+                " file."
+            )
             field = f"file:{file}"
         read.complain(RequestError(f"{recording.origin}: {text}", field))
 
@@ -229,40 +272,66 @@ def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
 def _missing(hint: Hint) -> str:
     """The field of a treatment of missing values, and that of its codes."""
     codes = ", ".join(map(str, hint.value.codes))
-    choice = "interpolate short gaps" if isinstance(hint.value, am.bench.InterpolateMissing) else "leave out the rows"
+    choice = (
+        "interpolate short gaps"
+        if isinstance(hint.value, am.bench.InterpolateMissing)
+        else "leave out the rows"
+    )
     return f"select '{choice}' in the field 'Missing values'" + (
         f" and write {codes} into the field 'Codes of missing values'" if codes else ""
     )
 
 
 _INSTRUCTIONS: Mapping[str, tuple[str, Instruction]] = {
-    "units": ("columns", lambda hint: f"select it in the table Columns, row {', '.join(map(str, hint.value))}"),
+    "units": (
+        "columns",
+        lambda hint: f"select it in the table Columns, row {', '.join(map(str, hint.value))}",
+    ),
     "columns": ("columns", lambda hint: "select the quantity of each column in the table Columns"),
     "constants": ("files", lambda hint: "write it into the row of the file, in the table Files"),
-    "file_name": ("file_name", lambda hint: f"write {hint.value} into the field 'Values in file names'"),
+    "file_name": (
+        "file_name",
+        lambda hint: f"write {hint.value} into the field 'Values in file names'",
+    ),
     "time": ("time", lambda hint: "select another time base"),
     "decimal": ("decimal", lambda hint: "select the decimal mark"),
     "missing": ("missing", _missing),
-    "drop_outliers": ("outliers", lambda hint: "select 'leave out' in the field 'Suspected outliers'"),
+    "drop_outliers": (
+        "outliers",
+        lambda hint: "select 'leave out' in the field 'Suspected outliers'",
+    ),
     "skip_rows": ("skip_rows", lambda hint: "write it into the field 'Lines above the headings'"),
     "displacement_zero": (
-        "displacement_zero", lambda hint: "write it into the field 'Displacement at the resting length'"
+        "displacement_zero",
+        lambda hint: "write it into the field 'Displacement at the resting length'",
     ),
     "resting_length": ("resting_length", lambda hint: "write it into the field 'Resting length'"),
-    **dict.fromkeys(("by", "leave_out"), (
-        "leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'"
-    )),
+    **dict.fromkeys(
+        ("by", "leave_out"),
+        (
+            "leave_out",
+            lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'",
+        ),
+    ),
     "bench.fit_hysteresis": ("hysteresis", lambda hint: "mark 'Friction from both branches'"),
-}  # fmt: skip
+}
 """Field and instruction by the argument of a hint, or by its function."""
 
 
 def in_page_words(text: str) -> str:
-    """The text with hints that name fields of the page; a hint for which the page has no field is left out."""
+    """The text with hints that name fields of the page; a hint for which the page has no field is
+    left out.
+    """
     return reworded(text, {name: instruction for name, (_, instruction) in _INSTRUCTIONS.items()})
 
 
 def as_field_error(error: AirmuscleError, field: str = "") -> RequestError:
     """The error with its field: its own, that of its hint, or else `field`."""
-    hinted = [_INSTRUCTIONS[hint.argument][0] for hint in error.message.hints if hint.argument in _INSTRUCTIONS]
-    return RequestError(in_page_words(error.message), getattr(error, "field", "") or next(iter(hinted), field))
+    hinted = [
+        _INSTRUCTIONS[hint.argument][0]
+        for hint in error.message.hints
+        if hint.argument in _INSTRUCTIONS
+    ]
+    return RequestError(
+        in_page_words(error.message), getattr(error, "field", "") or next(iter(hinted), field)
+    )

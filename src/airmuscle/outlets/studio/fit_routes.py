@@ -1,14 +1,13 @@
-"""Addresses of the tab Fit: upload of files, what was understood, and the tasks with their results, which
-wait in a queue: few run at a time, each in a process that can be ended. A task has a random identifier, which only the
-page that started it knows, and the page may be closed meanwhile.
+"""Addresses of the tab Fit: upload of files, what was understood, and the tasks with their results,
+which wait in a queue: few run at a time, each in a process that can be ended. A task has a random
+identifier, which only the page that started it knows, and the page may be closed meanwhile.
 
 POST /api/fit/file?set=ID&name=NAME   a measurement file; without a set a new one is begun
 POST /api/fit/remove                  {"set": ID, "name": NAME}
-POST /api/fit/read                    {"set": ID, "settings": {...}}: columns, runs, problems and points
-POST /api/fit/start                   the same: the identifier of a task
-GET  /api/fit/task/ID                 state and progress
-POST /api/fit/task/ID/cancel
-GET  /api/fit/task/ID/FILE            result.json, report.html, muscle.toml, report.zip
+POST /api/fit/read                    {"set": ID, "settings": {...}}: columns, runs, problems and
+points POST /api/fit/start                   the same: the identifier of a task GET
+/api/fit/task/ID                 state and progress POST /api/fit/task/ID/cancel GET
+/api/fit/task/ID/FILE            result.json, report.html, muscle.toml, report.zip
 """
 
 import collections
@@ -31,17 +30,33 @@ from .worker import LimitedWorker, Task
 
 MAX_SETTINGS = 256 * 1024
 """Largest size of the settings [bytes] (chosen)."""
-TIME_LIMIT, READING_LIMIT = 1800.0, 90.0
+TIME_LIMIT = 1800.0
+READING_LIMIT = 90.0
 """Limits [s] of a fit, and of the reading of a set (chosen)."""
-FIT_WORKERS, MAX_WAITING, MAX_TASKS = 2, 20, 200
-"""Number of fits at a time and of fits that wait, and of tasks whose state and result the server keeps (chosen)."""
-WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
-_TYPES = {"html": "text/html", "toml": "application/toml", "zip": "application/zip", "json": "application/json"}
+FIT_WORKERS = 2
+MAX_WAITING = 20
+MAX_TASKS = 200
+"""Number of fits at a time and of fits that wait, and of tasks whose state and result the server
+keeps (chosen).
+"""
+WAITING = "waiting"
+RUNNING = "running"
+DONE = "done"
+FAILED = "failed"
+CANCELLED = "cancelled"
+_TYPES = {
+    "html": "text/html",
+    "toml": "application/toml",
+    "zip": "application/zip",
+    "json": "application/json",
+}
 
 
 @dataclasses.dataclass(eq=False)
 class FitTask:
-    """A fit that waits, runs or has ended: completed fraction, what is being done, and the error with its field."""
+    """A fit that waits, runs or has ended: completed fraction, what is being done, and the error
+    with its field.
+    """
 
     identifier: str
     set_name: str
@@ -55,18 +70,25 @@ class FitTask:
 
 
 class FitQueue:
-    """Fits in order of their arrival. `task` is called with the arguments of a fit and a function for its progress."""
+    """Fits in order of their arrival. `task` is called with the arguments of a fit and a function
+    for its progress.
+    """
 
-    def __init__(self, task: Task, count: int = FIT_WORKERS, make_worker: Callable[[], Any] = LimitedWorker) -> None:
-        self._task, self._count, self._make_worker = task, count, make_worker
+    def __init__(
+        self, task: Task, count: int = FIT_WORKERS, make_worker: Callable[[], Any] = LimitedWorker
+    ) -> None:
+        self._task = task
+        self._count = count
+        self._make_worker = make_worker
         self._tasks: collections.OrderedDict[str, FitTask] = collections.OrderedDict()
         self._running: dict[str, Any] = {}
         self._threads: list[threading.Thread] = []
-        self._changed, self._stopped = threading.Condition(), False
+        self._changed = threading.Condition()
+        self._stopped = False
 
     def submit(self, set_name: str, folder: Path, *arguments: Any) -> str:
-        """The identifier of a new task, which receives `arguments` after the folder of its result. Raises BadRequest if
-        too many wait."""
+        """The identifier of a new task, which receives `arguments` after the folder of its result.
+        Raises BadRequest if too many wait."""
         identifier = secrets.token_urlsafe(16)
         out = folder / "tasks" / identifier
         with self._changed:
@@ -77,7 +99,9 @@ class FitQueue:
             for old in self._in(DONE, FAILED, CANCELLED)[: max(0, len(self._tasks) - MAX_TASKS)]:
                 shutil.rmtree(self._tasks.pop(old.identifier).folder, ignore_errors=True)
             if len(self._threads) < self._count:
-                self._threads.append(threading.Thread(target=self._serve, name="airmuscle studio fit", daemon=True))
+                self._threads.append(
+                    threading.Thread(target=self._serve, name="airmuscle studio fit", daemon=True)
+                )
                 self._threads[-1].start()
             self._changed.notify()
         return identifier
@@ -142,42 +166,61 @@ class FitQueue:
 
     def _run(self, task: FitTask, worker: Any) -> None:
         def report(fraction: float, text: str) -> None:
-            task.fraction, task.text = fraction, text
+            task.fraction = fraction
+            task.text = text
             if task.state == CANCELLED:  # cancelled while the process was started
                 worker.kill()
 
-        state, error, field = DONE, "", ""
+        state = DONE
+        error = ""
+        field = ""
         try:
             worker.call(self._task, task.arguments, TIME_LIMIT, report)
         except AirmuscleError as reason:
-            state, error = FAILED, str(reason)
+            state = FAILED
+            error = str(reason)
             field = reason.field if isinstance(reason, RequestError) else ""
         except Exception as reason:
-            state, error = FAILED, f"the fit ended without a result ({type(reason).__name__})."
+            state = FAILED
+            error = f"the fit ended without a result ({type(reason).__name__})."
         if state != DONE:  # what a process that was ended has left
             shutil.rmtree(task.folder, ignore_errors=True)
         with self._changed:
             del self._running[task.identifier]
             if task.state == RUNNING:
-                task.state, task.error, task.field = state, error, field
+                task.state = state
+                task.error = error
+                task.field = field
 
 
 class FitService:
     """The files and the tasks of the tab Fit."""
 
-    def __init__(self, pool: Any, uploads: UploadStore | None = None, queue: FitQueue | None = None) -> None:
-        self._pool, self._uploads, self._queue = pool, uploads or UploadStore(), queue or FitQueue(run_fit)
+    def __init__(
+        self, pool: Any, uploads: UploadStore | None = None, queue: FitQueue | None = None
+    ) -> None:
+        self._pool, self._uploads, self._queue = (
+            pool,
+            uploads or UploadStore(),
+            queue or FitQueue(run_fit),
+        )
 
     def routes(self) -> list[Any]:
         """The routes for the application."""
         from starlette.routing import Route
 
         changing = {
-            "file": self.add_file, "remove": self.remove_file, "read": self.read, "start": self.start,
+            "file": self.add_file,
+            "remove": self.remove_file,
+            "read": self.read,
+            "start": self.start,
             "task/{task}/cancel": self.cancel,
-        }  # fmt: skip
+        }
         reading = {"task/{task}": self.status, "task/{task}/{name}": self.file}
-        routes = [Route(f"/api/fit/{path}", handler, methods=["POST"]) for path, handler in changing.items()]
+        routes = [
+            Route(f"/api/fit/{path}", handler, methods=["POST"])
+            for path, handler in changing.items()
+        ]
         return routes + [Route(f"/api/fit/{path}", handler) for path, handler in reading.items()]
 
     def stop(self) -> None:
@@ -204,7 +247,9 @@ class FitService:
 
         _, folder, settings = await self._given(request)
         task = sheet_of_files if isinstance(settings, FitSettings) else sheet_of_episodes
-        sheet = await run_in_threadpool(self._pool.call, task, str(folder), settings, limit=READING_LIMIT)
+        sheet = await run_in_threadpool(
+            self._pool.call, task, str(folder), settings, limit=READING_LIMIT
+        )
         return json_answer(sheet)
 
     async def start(self, request: Any) -> Any:
@@ -212,10 +257,14 @@ class FitService:
         return json_answer({"task": self._queue.submit(*await self._given(request))})
 
     async def _given(self, request: Any) -> tuple[str, Path, FitSettings | ArmTexts]:
-        """A set, its folder, and the settings of measurement files of a muscle, or of episodes of an arm."""
+        """A set, its folder, and the settings of measurement files of a muscle, or of episodes of
+        an arm.
+        """
         wanted = await limited_table(request, MAX_SETTINGS)
-        name, given = _name(wanted, "set"), wanted.get("settings", {})
-        folder, is_arm = self._uploads.folder(name), isinstance(given, dict) and given.get("record") == "arm"
+        name = _name(wanted, "set")
+        given = wanted.get("settings", {})
+        folder = self._uploads.folder(name)
+        is_arm = isinstance(given, dict) and given.get("record") == "arm"
         return name, folder, read_arm_settings(given) if is_arm else read_settings(given)
 
     async def status(self, request: Any) -> Any:
@@ -231,8 +280,10 @@ class FitService:
         """A file of a result."""
         from starlette.responses import FileResponse
 
-        task, name = self._queue.find(request.path_params["task"]), request.path_params["name"]
-        path, shown = task.folder / name, None if name == RESULT else name
+        task = self._queue.find(request.path_params["task"])
+        name = request.path_params["name"]
+        path = task.folder / name
+        shown = None if name == RESULT else name
         if name not in (RESULT, *DOWNLOADS) or task.state != DONE or not path.is_file():
             raise BadRequest("this fit has no such file.", 404)
         self._uploads.folder(task.set_name)  # a set whose result is read is not idle

@@ -1,4 +1,5 @@
-"""Settings of a fit in the page: interpretation of the files, selection of rows, and options of the comparison.
+"""Settings of a fit in the page: interpretation of the files, selection of rows, and options of the
+comparison.
 
 An error names the field of the page that it concerns: `resting_length`, `column:p`, `file:run.csv`.
 """
@@ -18,9 +19,14 @@ from ...core import AirmuscleError, UnitError, quantity
 from ...files.library.files import list_laws
 from ..requests import BraidRequest, FitRequest, ReadingRequest, RequestError, build, form_fields
 
-MAX_RULES, MAX_CHOICES = 200, 500
-"""Maximum number of selections of rows; of corrected columns, or of files with facts of their own (chosen)."""
-OFFERED = {each["name"]: [value for value, _ in each["offered"]] for each in form_fields(ReadingRequest)}
+MAX_RULES = 200
+MAX_CHOICES = 500
+"""Maximum number of selections of rows; of corrected columns, or of files with facts of their own
+(chosen).
+"""
+OFFERED = {
+    each["name"]: [value for value, _ in each["offered"]] for each in form_fields(ReadingRequest)
+}
 """Values that the form offers, by the fields with a text that applies to all files."""
 TEXTS = tuple(OFFERED)
 BRAID = ("braid_radius", "braid_angle")
@@ -52,8 +58,8 @@ class Rule:
 class FitSettings:
     """What the user states about the files, which rows are used, and what is fitted.
 
-    columns  heading with quantity and unit by the heading in the file; an empty text excludes the column
-    facts    resting_length, length and specimen by the name of a file
+    columns  heading with quantity and unit by the heading in the file; an empty text excludes the
+    column facts    resting_length, length and specimen by the name of a file
     """
 
     texts: Mapping[str, str]
@@ -65,14 +71,21 @@ class FitSettings:
     hysteresis: bool
 
     def mapping(self, columns: Mapping[str, str] | None = None) -> am.bench.ColumnMapping:
-        """The interpretation of all files, with these columns in place of all. Raises RequestError."""
+        """The interpretation of all files, with these columns in place of all. Raises
+        RequestError.
+        """
         codes = self.texts["missing_code"].replace(";", ",").split(",")
-        texts: dict[str, Any] = {**self.texts, "missing_code": [each for each in codes if each.strip()]}
+        texts: dict[str, Any] = {
+            **self.texts,
+            "missing_code": [each for each in codes if each.strip()],
+        }
         try:
             chosen = self.columns if columns is None else columns
             return build(ReadingRequest, texts, _words).column_mapping(columns=chosen)
         except AirmuscleError as error:
-            named = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
+            named = next(
+                (name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns"
+            )
             raise RequestError(error.message, getattr(error, "field", "") or named) from None
 
     @property
@@ -81,7 +94,9 @@ class FitSettings:
         try:
             return build(BraidRequest, {name: self.texts[name] for name in BRAID}, _words).braid
         except UnitError as error:
-            raise RequestError(error.message, next(name for name in BRAID if _words(name) in error.message)) from None
+            raise RequestError(
+                error.message, next(name for name in BRAID if _words(name) in error.message)
+            ) from None
 
 
 def _words(name: str) -> str:
@@ -95,7 +110,9 @@ def read_settings(data: Any) -> FitSettings:
     texts = dict[str, str]()
     for name in (*TEXTS, *BRAID):
         given = data.get(name, "")
-        texts[name] = given if given in OFFERED.get(name, ()) else _text(given, name)  # tab and blank as they are
+        texts[name] = (
+            given if given in OFFERED.get(name, ()) else _text(given, name)
+        )  # tab and blank as they are
     facts: dict[str, dict[str, str]] = {}
     for file, value in _table(data.get("files", {}), "files").items():
         field = f"file:{file}"
@@ -103,15 +120,24 @@ def read_settings(data: Any) -> FitSettings:
         for unknown in (each for each in table if each not in FILE_FACTS):
             text = f"'{str(unknown)[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
             raise RequestError(text, field)
-        facts[file] = {name: text for name in FILE_FACTS if (text := _text(table.get(name, ""), field))}
-    columns = {key: _heading(key, value) for key, value in _table(data.get("columns", {}), "columns").items()}
+        facts[file] = {
+            name: text for name in FILE_FACTS if (text := _text(table.get(name, ""), field))
+        }
+    columns = {
+        key: _heading(key, value)
+        for key, value in _table(data.get("columns", {}), "columns").items()
+    }
     rules = data.get("rules", [])
     if not isinstance(rules, list) or len(rules) > MAX_RULES:
-        raise RequestError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
+        raise RequestError(
+            f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules"
+        )
     entry, left_out = (_text(data.get(name, ""), name) for name in ("entry", "leave_out"))
     leave_out = build(FitRequest, {"compare": True, "leave_out": left_out}, _words).leave_out
     hysteresis = data.get("hysteresis") is True
-    settings = FitSettings(texts, columns, facts, tuple(map(_rule, rules)), entry, leave_out, hysteresis)
+    settings = FitSettings(
+        texts, columns, facts, tuple(map(_rule, rules)), entry, leave_out, hysteresis
+    )
     _ = settings.braid  # checks it
     for file, stated in facts.items():
         for name in (each for each in stated if each in LENGTHS):
@@ -133,7 +159,9 @@ def _check_length(text: str, words: str, field: str) -> None:
 
 def _text(value: Any, field: str, longest: int = 200) -> str:
     if not isinstance(value, str) or len(value) > longest or not value.isprintable():
-        raise RequestError(f"{_words(field)} must be a text of at most {longest} printable characters.", field)
+        raise RequestError(
+            f"{_words(field)} must be a text of at most {longest} printable characters.", field
+        )
     return value.strip()
 
 
@@ -148,11 +176,14 @@ def _heading(key: str, value: Any) -> str:
     field = f"column:{key}"
     if not isinstance(value, dict):
         raise RequestError("a column needs a quantity and a unit.", field)
-    name, unit = _text(value.get("quantity", ""), field), _text(value.get("unit", ""), field, 40)
+    name = _text(value.get("quantity", ""), field)
+    unit = _text(value.get("unit", ""), field, 40)
     if not name:
         return ""
     if name not in COLUMN_CHOICES:
-        raise RequestError(f"'{name[:40]}' is no known quantity; allowed: {', '.join(COLUMN_CHOICES)}.", field)
+        raise RequestError(
+            f"'{name[:40]}' is no known quantity; allowed: {', '.join(COLUMN_CHOICES)}.", field
+        )
     return f"{name} [{unit}]" if unit else name
 
 
@@ -185,11 +216,15 @@ def _rule(value: Any) -> Rule:
 Mask = npt.NDArray[np.bool_]
 
 
-def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence[Outlier] = ()) -> Mask:
-    """The rows of a recording that the rules leave, without outliers, shape (N,). Raises RequestError for an unknown
-    column."""
+def used_rows(
+    recording: am.Recording, rules: Sequence[Rule], outliers: Sequence[Outlier] = ()
+) -> Mask:
+    """The rows of a recording that the rules leave, without outliers, shape (N,). Raises
+    RequestError for an unknown column."""
     used = kept_rows(recording, outliers)
-    for rule in (each for each in rules if not each.recordings or recording.origin in each.recordings):
+    for rule in (
+        each for each in rules if not each.recordings or recording.origin in each.recordings
+    ):
         if rule.rows is not None:
             inside = np.zeros(len(recording), bool)
             inside[slice(*rule.rows)] = True
@@ -197,7 +232,10 @@ def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence
             inside = np.ones(len(recording), bool)
             for name, (low, high) in rule.ranges.items():
                 if name not in recording:
-                    text = f"{recording.origin}: no column '{name[:40]}', which a selection of rows names."
+                    text = (
+                        f"{recording.origin}: no column '{name[:40]}', which a selection of rows"
+                        " names."
+                    )
                     raise RequestError(text, "rules")
                 inside &= (recording[name] >= low) & (recording[name] <= high)
         used &= inside if rule.keep else ~inside
@@ -207,14 +245,17 @@ def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence
 def selected(
     recordings: Sequence[am.Recording], rules: Sequence[Rule], outliers: Sequence[Sequence[Outlier]]
 ) -> list[am.Recording]:
-    """The recordings reduced to the selected rows of their files, with a note on what was left out; without those that
-    are empty. Raises RequestError if no row is left."""
+    """The recordings reduced to the selected rows of their files, with a note on what was left out;
+    without those that are empty. Raises RequestError if no row is left."""
     kept = []
     for complete, found in zip(recordings, outliers, strict=True):
         recording = leave_out(complete, found)
         used = used_rows(complete, rules)[kept_rows(complete, found)]
         count = int(np.count_nonzero(~used))
-        note = f"{recording.origin}: {count} of {len(recording)} rows are left out, as specified by the user."
+        note = (
+            f"{recording.origin}: {count} of {len(recording)} rows are left out, as specified by"
+            " the user."
+        )
         if used.all():
             kept.append(recording)
         elif used.any():

@@ -1,8 +1,8 @@
-"""Tasks of the tab Fit: what was understood of uploaded files, and the fit: the comparison of all laws on the selected
-rows, its report, and the friction of both branches.
+"""Tasks of the tab Fit: what was understood of uploaded files, and the fit: the comparison of all
+laws on the selected rows, its report, and the friction of both branches.
 
-The computation is that of `airmuscle fit --compare` and `airmuscle hysteresis`. All files of the result are moved into
-their folder together at the end.
+The computation is that of `airmuscle fit --compare` and `airmuscle hysteresis`. All files of the
+result are moved into their folder together at the end.
 """
 
 import itertools
@@ -18,8 +18,17 @@ import numpy as np
 import airmuscle as am
 
 from ...bench.identify.compare_chapter import LawSelection
-from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
-from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
+from ...bench.identify.hysteresis import (
+    LoopFit,
+    find_loops,
+    fit_jointly,
+    fit_loop,
+    loops_not_joined,
+)
+from ...bench.identify.hysteresis.hysteresis_chapter import (
+    hysteresis_chapters,
+    joint_friction_chapter,
+)
 from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.static_fit_chapter import band_curves, equation_section
 from ...bench.readers.constants import CONSTANT_QUANTITIES
@@ -39,26 +48,38 @@ from .fit_uploads import FILES
 
 Report = Callable[[float, str], None]
 DOWNLOADS = (
-    "report.html", "muscle.toml", "scenario.toml", "controlled.toml", "report.zip", "friction.html", "friction.toml"
-)  # fmt: skip
+    "report.html",
+    "muscle.toml",
+    "scenario.toml",
+    "controlled.toml",
+    "report.zip",
+    "friction.html",
+    "friction.toml",
+)
 """Files of a result that the page offers."""
 RESULT = "result.json"
 SHARES = (0.05, 0.75, 0.95)
 """Completed fractions after reading, comparison and friction (chosen for the progress)."""
 GEOMETRY = (
-    "The muscle file contains no geometry, because the law needs none. A plant takes the enclosed volume from it: add "
-    "radius and angle of the braid under Muscle, or a table [geometry] to the file, before a simulation."
+    "The muscle file contains no geometry, because the law needs none. A plant takes the enclosed"
+    " volume from it: add radius and angle of the braid under Muscle, or a table [geometry] to the"
+    " file, before a simulation."
 )
 """Remark on a muscle without geometry."""
 FRICTION_LAWS = 4
-"""Number of friction laws that are fitted to each loop and to all loops together, for the progress."""
-MAX_POINTS, MAX_PARITY_POINTS = 2000, 4000
-"""Maximum number of points of a loop and of the parity chart; of more rows every n-th one is shown (chosen)."""
+"""Number of friction laws that are fitted to each loop and to all loops together, for the
+progress.
+"""
+MAX_POINTS = 2000
+MAX_PARITY_POINTS = 4000
+"""Maximum number of points of a loop and of the parity chart; of more rows every n-th one is shown
+(chosen).
+"""
 
 
 def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Report) -> None:
-    """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`. Raises RequestError
-    for input of the page that is not possible."""
+    """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`.
+    Raises RequestError for input of the page that is not possible."""
     if not isinstance(settings, FitSettings):
         run_arm_fit(folder, out, settings, report, _pack)
         return
@@ -70,9 +91,13 @@ def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Rep
         raise RequestError(problem, "resting_length")
 
     def progress(name: str, fraction: float) -> None:
-        report(SHARES[0] + (SHARES[1] - SHARES[0]) * fraction, f"comparison: {name}" if name else "comparison")
+        report(
+            SHARES[0] + (SHARES[1] - SHARES[0]) * fraction,
+            f"comparison: {name}" if name else "comparison",
+        )
 
-    named, split = settings.entry or None, settings.leave_out
+    named = settings.entry or None
+    split = settings.leave_out
     request = FitRequest(compare=True, characteristic=named, leave_out=split, braid=braid)
     try:
         found = fit_requested(request, names, recordings, progress)
@@ -83,17 +108,24 @@ def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Rep
     with atomic_folder(out) as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         sheet = {**result_sheet(found.selection, found.fit), "rows": sum(map(len, recordings))}
-        sheet["hysteresis"] = _friction(recordings, staging, report) if settings.hysteresis else None
+        sheet["hysteresis"] = (
+            _friction(recordings, staging, report) if settings.hysteresis else None
+        )
         report(SHARES[2], "report")
         save(found.entry, staging / "muscle.toml")
         write_into(staging, chapters, title="Fit")
-        sheet["notes"] = [*map(in_page_words, found.notes), *([GEOMETRY] if missing_geometry(found.entry) else [])]
+        sheet["notes"] = [
+            *map(in_page_words, found.notes),
+            *([GEOMETRY] if missing_geometry(found.entry) else []),
+        ]
         sheet["files"] = _pack(staging)
         (staging / RESULT).write_text(as_json(sheet), encoding="utf-8")
 
 
 def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording], list[Path]]:
-    """The selected rows of all recordings, and the names of the files. Raises the first problem as RequestError."""
+    """The selected rows of all recordings, and the names of the files. Raises the first problem as
+    RequestError.
+    """
     read = read_set(folder, settings)
     if read.problems:
         raise read.problems[0]
@@ -115,7 +147,11 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
             loops = find_loops(recordings)
         except AirmuscleError as error:
             return {"reason": in_page_words(error.message), "loops": []}
-    remarks = [in_page_words(each.message.args[0]) for each in caught if isinstance(each.message, AirmuscleWarning)]
+    remarks = [
+        in_page_words(each.message.args[0])
+        for each in caught
+        if isinstance(each.message, AirmuscleWarning)
+    ]
     steps, total = itertools.count(), FRICTION_LAWS * (len(loops) + 1)
 
     def progress(name: str) -> None:
@@ -124,7 +160,8 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
 
     fits = [fit_loop(loop, progress=progress) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
-    own, chapters = folder / "friction", hysteresis_chapters(fits, joint)
+    own = folder / "friction"
+    chapters = hysteresis_chapters(fits, joint)
     own.mkdir()
     write_into(own, [in_words(chapter, in_page_words) for chapter in chapters], title="Friction")
     (own / "report.html").replace(folder / "friction.html")
@@ -134,7 +171,12 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
         text = f"# {verdict}\n{part_toml('friction', friction)}"
         (folder / "friction.toml").write_text(text, encoding="utf-8")
     together = _sheet(joint_friction_chapter(joint, loops_not_joined(fits))) if joint else None
-    return {"reason": "", "loops": [_loop(fit) for fit in fits], "joint": together, "remarks": remarks}
+    return {
+        "reason": "",
+        "loops": [_loop(fit) for fit in fits],
+        "joint": together,
+        "remarks": remarks,
+    }
 
 
 def _sheet(chapter: Chapter) -> dict[str, Any]:
@@ -142,16 +184,23 @@ def _sheet(chapter: Chapter) -> dict[str, Any]:
 
 
 def _loop(fit: LoopFit) -> dict[str, Any]:
-    recording, varied = fit.loop.recording, fit.loop.varied
+    recording = fit.loop.recording
+    varied = fit.loop.varied
     rows = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
     return {
-        **_sheet(fit.chapter()), "justified": fit.recommended is not None, "varied": varied,
-        "x": recording[varied][rows], "force": recording["force"][rows], "direction": fit.loop.direction[rows],
-    }  # fmt: skip
+        **_sheet(fit.chapter()),
+        "justified": fit.recommended is not None,
+        "varied": varied,
+        "x": recording[varied][rows],
+        "force": recording["force"][rows],
+        "direction": fit.loop.direction[rows],
+    }
 
 
 def _pack(folder: Path) -> list[str]:
-    """Write all files of the result into one archive; returns the names of the files that the page offers."""
+    """Write all files of the result into one archive; returns the names of the files that the page
+    offers.
+    """
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     with zipfile.ZipFile(folder / "report.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         for path in files:
@@ -164,14 +213,21 @@ def _pack(folder: Path) -> list[str]:
 
 def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
     """The selection and the recommended fit as plain data."""
-    best, (equations, _) = selection.recommended[0], equation_section(fit)
-    quantity, step = fit.fitted_quantity, max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
+    best = selection.recommended[0]
+    equations, _ = equation_section(fit)
+    quantity = fit.fitted_quantity
+    step = max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
     columns = {
-        "measured": fit.recording[quantity.name], "modelled": fit.modelled, "residual": fit.residuals,
-        "censored": fit.censoring != 0, **{name: fit.recording[name] for name in ("pressure", "contraction", "force")},
-    }  # fmt: skip
+        "measured": fit.recording[quantity.name],
+        "modelled": fit.modelled,
+        "residual": fit.residuals,
+        "censored": fit.censoring != 0,
+        **{name: fit.recording[name] for name in ("pressure", "contraction", "force")},
+    }
     return {
-        "recommended": best.candidate.name, "parameters": best.parameter_count, "error": best.cross_validated_rmse,
+        "recommended": best.candidate.name,
+        "parameters": best.parameter_count,
+        "error": best.cross_validated_rmse,
         "reason": selection.reason,
         "comparisons": [
             {"purpose": each.purpose, "group": each.leave_out.group_name, **_sheet(each.chapter())}
@@ -179,14 +235,22 @@ def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
         ],
         "fit": _sheet(fit.chapter()),
         "equations": [
-            {"title": each.title, "note": each.note, "lines": [to_display_mathml(line) for line in each.lines],
-             "sources": dict(each.sources)}
+            {
+                "title": each.title,
+                "note": each.note,
+                "lines": [to_display_mathml(line) for line in each.lines],
+                "sources": dict(each.sources),
+            }
             for each in equations
         ],
-        "parity": {"quantity": quantity.name, "unit": quantity.unit, "step": step,
-                   **{name: column[::step] for name, column in columns.items()}},
+        "parity": {
+            "quantity": quantity.name,
+            "unit": quantity.unit,
+            "step": step,
+            **{name: column[::step] for name, column in columns.items()},
+        },
         "bands": _bands(fit),
-    }  # fmt: skip
+    }
 
 
 def _bands(fit: am.Fit) -> dict[str, Any] | None:
@@ -195,26 +259,34 @@ def _bands(fit: am.Fit) -> dict[str, Any] | None:
         return None
     rows = [
         {
-            "level": each.level, "x": each.points,
+            "level": each.level,
+            "x": each.points,
             **{key: getattr(each.confidence, key) for key in ("value", "low", "high")},
-            "prediction_low": each.prediction.low, "prediction_high": each.prediction.high,
+            "prediction_low": each.prediction.low,
+            "prediction_high": each.prediction.high,
         }
         for each in curves
-    ]  # fmt: skip
-    constant, varying = curves[0].constant, curves[0].varying
+    ]
+    constant = curves[0].constant
+    varying = curves[0].varying
     return {"constant": constant, "varying": varying, "basis": fit.error_basis, "curves": rows}
 
 
-# What was understood of uploaded files: columns, recordings with runs and findings, problems, points of the chart
+# What was understood of uploaded files: columns, recordings with runs and findings, problems,
+# points of the chart
 
-SHOWN_POINTS, DIGITS, MAX_LISTED = 9000, 7, 60
-"""Maximum number of points of the chart, of more rows every n-th one, and their significant digits; maximum number of
-runs or findings of a recording that are listed (chosen)."""
+SHOWN_POINTS = 9000
+DIGITS = 7
+MAX_LISTED = 60
+"""Maximum number of points of the chart, of more rows every n-th one, and their significant digits;
+maximum number of runs or findings of a recording that are listed (chosen)."""
 SHOWN = ("time", "pressure", "contraction", "length", "force")
 
 
 def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
-    """What was understood of the files of a set; problems are part of the sheet, and no exception."""
+    """What was understood of the files of a set; problems are part of the sheet, and no
+    exception.
+    """
     read = read_set(Path(folder), settings)
     names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
     used = _selected_rows(read, settings.rules)
@@ -226,15 +298,22 @@ def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
     step = max(1, math.ceil(sum(map(len, read.recordings)) / SHOWN_POINTS))
     rows = zip(read.recordings, read.files, inspections, used, read.outliers, strict=True)
     return {
-        "files": [{"name": name, "columns": [_column(each) for each in read.columns.get(name, [])]} for name in names],
+        "files": [
+            {"name": name, "columns": [_column(each) for each in read.columns.get(name, [])]}
+            for name in names
+        ],
         "recordings": [_recording(*row, step) for row in rows],
         "problems": [{"field": each.field, "text": str(each.message)} for each in read.problems],
-        "remarks": read.remarks, "step": step, "ready": bool(read.recordings) and not read.problems,
-    }  # fmt: skip
+        "remarks": read.remarks,
+        "step": step,
+        "ready": bool(read.recordings) and not read.problems,
+    }
 
 
 def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
-    """The used rows of each recording; all where a rule is not possible, which becomes a problem."""
+    """The used rows of each recording; all where a rule is not possible, which becomes a
+    problem.
+    """
     used = []
     for recording, outliers in zip(read.recordings, read.outliers, strict=True):
         try:
@@ -250,40 +329,73 @@ def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
 def _column(column: FileColumn) -> dict[str, Any]:
     factor, shown = display_scale(column.name) if column.known else (1.0, "")
     own = {key: getattr(column, key) for key in ("key", "heading", "unit", "stated", "used")}
-    return {**own, "quantity": column.name if column.known else "", "factor": factor, "shown_unit": shown}
+    return {
+        **own,
+        "quantity": column.name if column.known else "",
+        "factor": factor,
+        "shown_unit": shown,
+    }
 
 
 def _recording(
-    recording: am.Recording, file: str, inspection: Inspection | None, used: Any, outliers: Sequence[Outlier], step: int
+    recording: am.Recording,
+    file: str,
+    inspection: Inspection | None,
+    used: Any,
+    outliers: Sequence[Outlier],
+    step: int,
 ) -> dict[str, Any]:
-    columns, constants, ranges = [name for name in SHOWN if name in recording], {}, {}
+    columns = [name for name in SHOWN if name in recording]
+    constants = {}
+    ranges = {}
     inspected: dict[str, Any] = {}
     if inspection is not None:
-        sampling, findings = inspection.sampling, inspection.findings[:MAX_LISTED]
+        sampling = inspection.sampling
+        findings = inspection.findings[:MAX_LISTED]
         inspected = {
-            "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]], "run_count": len(inspection.runs),
+            "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]],
+            "run_count": len(inspection.runs),
             "branches": len(inspection.branches),
-            "sampling": None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration},
+            "sampling": (
+                None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration}
+            ),
             "outliers": len({each.row for each in inspection.outliers}),
-            "findings": [{"text": in_page_words(each.text), "serious": each.serious} for each in findings],
-        }  # fmt: skip
+            "findings": [
+                {"text": in_page_words(each.text), "serious": each.serious} for each in findings
+            ],
+        }
     for name, value in recording.constants.items():
         factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
-        constants[name] = f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
+        constants[name] = (
+            f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
+        )
     for name in recording if len(recording) else ():
         factor, _ = display_scale(name)
-        ranges[name] = [float(recording[name].min()) * factor, float(recording[name].max()) * factor]
+        ranges[name] = [
+            float(recording[name].min()) * factor,
+            float(recording[name].max()) * factor,
+        ]
     return {
-        "origin": recording.origin, "file": file, "rows": len(recording), "used": int(np.count_nonzero(used)),
-        "constants": constants, "notes": [in_page_words(note) for note in recording.notes], "ranges": ranges,
+        "origin": recording.origin,
+        "file": file,
+        "rows": len(recording),
+        "used": int(np.count_nonzero(used)),
+        "constants": constants,
+        "notes": [in_page_words(note) for note in recording.notes],
+        "ranges": ranges,
         **inspected,
-        "left_out": [int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0],
-        "points": {name: [float(f"{x:.{DIGITS}g}") for x in recording[name][::step]] for name in columns},
-    }  # fmt: skip
+        "left_out": [
+            int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0
+        ],
+        "points": {
+            name: [float(f"{x:.{DIGITS}g}") for x in recording[name][::step]] for name in columns
+        },
+    }
 
 
 def _run(run: Run) -> dict[str, Any]:
-    level, rows = "", [run.interval.start, run.interval.stop]
+    level = ""
+    rows = [run.interval.start, run.interval.stop]
     if run.constant_column is not None and run.constant_value is not None:
         factor, unit = display_scale(run.constant_column)
         level = f"{run.constant_column} {run.constant_value * factor:.4g} {unit}"

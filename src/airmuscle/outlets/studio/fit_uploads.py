@@ -1,7 +1,9 @@
-"""Uploads of the tab Fit: sets of measurement files in a temporary folder, within limits of number and size.
+"""Uploads of the tab Fit: sets of measurement files in a temporary folder, within limits of number
+and size.
 
-A set has a random identifier, which only the page that uploaded it knows; it is made when its first file was accepted.
-A file appears under its name when it is complete. The folder of a server that was killed is removed by the next one.
+A set has a random identifier, which only the page that uploaded it knows; it is made when its first
+file was accepted. A file appears under its name when it is complete. The folder of a server that
+was killed is removed by the next one.
 """
 
 import functools
@@ -20,13 +22,15 @@ from ...bench.readers.reader import EXTENSIONS
 from ...core import is_running
 from .security import BadRequest
 
-MAX_FILE, MAX_SET = 32 * 10**6, 64 * 10**6
+MAX_FILE = 32 * 10**6
+MAX_SET = 64 * 10**6
 """Largest size of a measurement file, and of all files of a set [bytes] (chosen)."""
-MAX_FILES, MAX_SETS = 400, 40
+MAX_FILES = 400
+MAX_SETS = 40
 """Maximum number of files of a set, and of sets that the server keeps (chosen)."""
 MAX_IDLE = 600.0
-"""Time [s] without a request after which a set may be removed for the sake of another one (chosen); one without files
-may be removed at once."""
+"""Time [s] without a request after which a set may be removed for the sake of another one (chosen);
+one without files may be removed at once."""
 MAX_NAME = 120
 """Maximum length of the name of a file (chosen)."""
 FILES = "files"
@@ -39,15 +43,28 @@ _FORBIDDEN = set('<>:"/\\|?*')
 
 
 def check_file_name(name: str) -> str:
-    """The name of an uploaded file in composed characters. Raises BadRequest for a path and for an unknown format."""
+    """The name of an uploaded file in composed characters. Raises BadRequest for a path and for an
+    unknown format.
+    """
     name = unicodedata.normalize("NFC", name)
     shown = "".join(c if c.isprintable() else "?" for c in name)[:60]
-    if not name.isprintable() or _FORBIDDEN & set(name) or name != name.strip(" ") or name.startswith("."):
-        raise BadRequest(f"'{shown}' is no name of a file; rename it, without folders and special characters.")
+    if (
+        not name.isprintable()
+        or _FORBIDDEN & set(name)
+        or name != name.strip(" ")
+        or name.startswith(".")
+    ):
+        raise BadRequest(
+            f"'{shown}' is no name of a file; rename it, without folders and special characters."
+        )
     if len(name.encode()) > MAX_NAME:
-        raise BadRequest(f"'{shown}…': the name of the file has more than {MAX_NAME} bytes; shorten it.")
+        raise BadRequest(
+            f"'{shown}…': the name of the file has more than {MAX_NAME} bytes; shorten it."
+        )
     if Path(name).suffix.lower() not in ACCEPTED:
-        raise BadRequest(f"'{shown}' is of no supported format; supported extensions are {', '.join(ACCEPTED)}.")
+        raise BadRequest(
+            f"'{shown}' is of no supported format; supported extensions are {', '.join(ACCEPTED)}."
+        )
     return name
 
 
@@ -59,14 +76,23 @@ class UploadStore:
         self._used: dict[str, float] = {}
 
     def new_set(self, is_needed: IsNeeded) -> str:
-        """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest if none is idle."""
+        """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest
+        if none is idle.
+        """
         with self._lock:
             if len(self._used) >= MAX_SETS:
                 latest = time.monotonic() - MAX_IDLE
                 filled = {name: any((self._top / name / FILES).iterdir()) for name in self._used}
-                idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
+                idle = [
+                    n
+                    for n, used in self._used.items()
+                    if (used < latest or not filled[n]) and not is_needed(n)
+                ]
                 if not idle:
-                    text = f"the server keeps {MAX_SETS} sets of files, and all are in use; try again later."
+                    text = (
+                        f"the server keeps {MAX_SETS} sets of files, and all are in use; try again"
+                        " later."
+                    )
                     raise BadRequest(text, 503)
                 oldest = min(idle, key=lambda name: (filled[name], self._used[name]))
                 shutil.rmtree(self._top / oldest, ignore_errors=True)
@@ -88,11 +114,15 @@ class UploadStore:
         """The names of the files of a set, in order."""
         return sorted(path.name for path in (self.folder(identifier) / FILES).iterdir())
 
-    async def add(self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: IsNeeded) -> str:
-        """Add a file, or replace the one of this name; the identifier of the set, of a new one if none is given. Raises
-        BadRequest beyond the limits; then there is no new set."""
+    async def add(
+        self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: IsNeeded
+    ) -> str:
+        """Add a file, or replace the one of this name; the identifier of the set, of a new one if
+        none is given. Raises BadRequest beyond the limits; then there is no new set."""
         folder = self.folder(identifier) if identifier else None
-        others = [path for path in (folder / FILES).iterdir() if path.name != name] if folder else []
+        others = (
+            [path for path in (folder / FILES).iterdir() if path.name != name] if folder else []
+        )
         if len(others) >= MAX_FILES:
             raise BadRequest(f"at most {MAX_FILES} files are fitted together; remove some.", 413)
         allowed = MAX_SET - sum(path.stat().st_size for path in others)
@@ -103,9 +133,13 @@ class UploadStore:
                 async for part in parts:
                     size += len(part)
                     if size > MAX_FILE:
-                        raise BadRequest(f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413)
+                        raise BadRequest(
+                            f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413
+                        )
                     if size > allowed:
-                        raise BadRequest(f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413)
+                        raise BadRequest(
+                            f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413
+                        )
                     file.write(part)
             if not size:
                 raise BadRequest(f"{name} is empty.")
@@ -128,7 +162,9 @@ class UploadStore:
 
     @functools.cached_property
     def _top(self) -> Path:
-        """A folder that only this user can read; those of servers that were killed are removed before it is made."""
+        """A folder that only this user can read; those of servers that were killed are removed
+        before it is made.
+        """
         parent = self._parent or Path(tempfile.gettempdir())
         for old in parent.glob(f"{_PREFIX}*"):
             process = old.name.removeprefix(_PREFIX).partition("-")[0]

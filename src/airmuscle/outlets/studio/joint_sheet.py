@@ -1,14 +1,17 @@
-"""Sheet of a joint: a plant of two muscles with its control laws as printed programs, tasks and readings.
+"""Sheet of a joint: a plant of two muscles with its control laws as printed programs, tasks and
+readings.
 
-The functions write into arrays that they are given; c is what `prepare(p, c)` made of the parameters:
+The functions write into arrays that they are given; c is what `prepare(p, c)` made of the
+parameters:
 
-    sample(y, r, m, T, l, h, c, u, n)   measurements, set points, memory, sample time [s], ranges of the commands:
+    sample(y, r, m, T, l, h, c, u, n)   measurements, set points, memory, sample time [s], ranges of
+    the commands:
                                         commands and later memory
     slopes(y, r, m, T, l, h, c, f, D)   the same with f = (u, n), and D = df/d(y, m), row by row
-    linear(x, u, c, f, A, B, C)         rates f, df/dx, df/du, and the derivatives of columns by x, row by row
-    pair(x, f)                          x = (angle, p_1, p_2), f = PAIR
-    cut_segments(...)                   the kernel of `driven_inputs`, with its arguments
-    needed(x, f)                        x = (angle, angular speed, angular acceleration, p_1, p_2), f = torque that the
+    linear(x, u, c, f, A, B, C)         rates f, df/dx, df/du, and the derivatives of columns by x,
+    row by row pair(x, f)                          x = (angle, p_1, p_2), f = PAIR cut_segments(...)
+    the kernel of `driven_inputs`, with its arguments needed(x, f)                        x =
+    (angle, angular speed, angular acceleration, p_1, p_2), f = torque that the
                                         muscles must give, with that of their dampers
 """
 
@@ -35,10 +38,21 @@ from .law_sheet import identifier_of
 from .plant_sheet import sheet_of_tables
 
 PAIR = (
-    "torque", "stiffness", "torque_by_first", "torque_by_second", "stiffness_by_first", "stiffness_by_second",
-    "tension_first", "tension_second", "shut_valves", "load", "load_slope",
-)  # fmt: skip
-"""Results of `pair`, in SI units: sums over both muscles, tensions, and the torque of weights and springs."""
+    "torque",
+    "stiffness",
+    "torque_by_first",
+    "torque_by_second",
+    "stiffness_by_first",
+    "stiffness_by_second",
+    "tension_first",
+    "tension_second",
+    "shut_valves",
+    "load",
+    "load_slope",
+)
+"""Results of `pair`, in SI units: sums over both muscles, tensions, and the torque of weights and
+springs.
+"""
 DURATION = 1.0
 """Duration of the printed run [s], which the tab does not use."""
 REGION_ANGLES = 61
@@ -51,90 +65,156 @@ def joint_names() -> tuple[str, ...]:
 
 
 def sheet_of_joint(name: str) -> dict[str, Any]:
-    """The sheet of a joint of the library, by its complete name. Raises the errors of its loaders."""
+    """The sheet of a joint of the library, by its complete name. Raises the errors of its
+    loaders.
+    """
     tables, location = plant_tables(name)
     given = joint_tables(tables)
     sheet = sheet_of_tables(given, location, name, tables.get("sources", {}))
     plant = build_scenario(given, location).plant
     statics = statics_within_valves(plant)
     controllers = joint_controllers(plant, statics)
-    measured = tuple(dict.fromkeys(column for each in controllers for column in each.law.measured_columns))
-    rows = ",\n".join(f"{json.dumps(key)}: {text}" for key, text in _programs(plant, controllers, measured).items())
+    measured = tuple(
+        dict.fromkeys(column for each in controllers for column in each.law.measured_columns)
+    )
+    rows = ",\n".join(
+        f"{json.dumps(key)}: {text}"
+        for key, text in _programs(plant, controllers, measured).items()
+    )
     angles = np.linspace(*statics.angle_range, REGION_ANGLES)
-    region = {"angle": angles} | dict(zip(("least", "greatest"), statics.stiffness_limits(angles), strict=True))
+    region = {"angle": angles} | dict(
+        zip(("least", "greatest"), statics.stiffness_limits(angles), strict=True)
+    )
     taut = np.isfinite(list(region.values())).all(axis=0)  # both muscles, without a load
-    script, old, valves = sheet.pop("script"), sheet.pop("id"), valve_set(plant)
+    script = sheet.pop("script")
+    old = sheet.pop("id")
+    valves = valve_set(plant)
     script += f'airmusclePrograms["{old}"].joint = {{\n{rows}\n}};\n'
     sheet |= {
-        "tab": "joint", **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")},
-        "parameters": [{**row, "path": row["path"].replace(".inner.", ".")} for row in sheet["parameters"]],
-        "measured": list(measured), "pressure_range": list(statics.pressure_range),
+        "tab": "joint",
+        **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")},
+        "parameters": [
+            {**row, "path": row["path"].replace(".inner.", ".")} for row in sheet["parameters"]
+        ],
+        "measured": list(measured),
+        "pressure_range": list(statics.pressure_range),
         "controllers": [_controller_row(each) for each in controllers],
         "region": {key: values[taut].tolist() for key, values in region.items()},
-        "pair": list(PAIR), "offsets": valves.offsets, "regulated": valves.inner is None,
-        "switching": valves.switching, "tasks": [
-            {"name": each.name, "motion": {"kind": type(each.motion).__name__, **dataclasses.asdict(each.motion)},
-             "duration": each.duration, "begin": each.begin, "torque": list(map(list, each.torque)),
-             "stiffening": list(map(list, each.stiffening))}
-            for each in STANDARD_TASKS if each.stuck is None
+        "pair": list(PAIR),
+        "offsets": valves.offsets,
+        "regulated": valves.inner is None,
+        "switching": valves.switching,
+        "tasks": [
+            {
+                "name": each.name,
+                "motion": {"kind": type(each.motion).__name__, **dataclasses.asdict(each.motion)},
+                "duration": each.duration,
+                "begin": each.begin,
+                "torque": list(map(list, each.torque)),
+                "stiffening": list(map(list, each.stiffening)),
+            }
+            for each in STANDARD_TASKS
+            if each.stuck is None
         ],
-    }  # fmt: skip
+    }
     sheet["id"] = identifier_of(sheet, script)
     return {**sheet, "script": script.replace(old, sheet["id"])}
 
 
 def joint_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables of a scenario of a joint on which an external torque acts, without the input of its example."""
-    plant, run = dict(tables["plant"]), tables["run"]
+    """The tables of a scenario of a joint on which an external torque acts, without the input of
+    its example.
+    """
+    plant = dict(tables["plant"])
+    run = tables["run"]
     plant["mechanism"] = {"model": "JointWithExternalTorque", "inner": plant["mechanism"]}
-    kept = {key: tables[key] for key in TABLES if key in tables and key not in ("plant", "input", "run")}
-    return {**kept, "plant": plant, "input": {}, "run": {"duration": DURATION, "initial_state": run["initial_state"]}}
+    kept = {
+        key: tables[key] for key in TABLES if key in tables and key not in ("plant", "input", "run")
+    }
+    return {
+        **kept,
+        "plant": plant,
+        "input": {},
+        "run": {"duration": DURATION, "initial_state": run["initial_state"]},
+    }
 
 
-def _programs(plant: am.Plant, controllers: tuple[JointController, ...], measured: tuple[str, ...]) -> dict[str, str]:
-    """The programs of the tab as expressions of JavaScript, by name; `inputs` is the kernel that cuts the inputs which
-    no controller commands into the segments of a sample."""
+def _programs(
+    plant: am.Plant, controllers: tuple[JointController, ...], measured: tuple[str, ...]
+) -> dict[str, str]:
+    """The programs of the tab as expressions of JavaScript, by name; `inputs` is the kernel that
+    cuts the inputs which no controller commands into the segments of a sample."""
     inputs = JavaScriptKernels().text("driven_inputs", ["cut_segments"])
     programs = {
-        "linear": _linear_program(plant, measured), "statics": _pair_program(plant),
+        "linear": _linear_program(plant, measured),
+        "statics": _pair_program(plant),
         "inputs": f"(() => {{\n{inputs}\nreturn {{ cut_segments }};\n}})()",
-    }  # fmt: skip
+    }
     for each in controllers:
         same = each.law is each.averaged
         programs[each.key] = _law_program(each.law, sample=True, slopes=same)
         if not same:
-            programs[f"{each.key}-averaged"] = _law_program(each.averaged, sample=False, slopes=True)
+            programs[f"{each.key}-averaged"] = _law_program(
+                each.averaged, sample=False, slopes=True
+            )
     return programs
 
 
 def _controller_row(controller: JointController) -> dict[str, Any]:
-    law, averaged = controller.law, controller.averaged
-    known, inner = list(leaves(law)), list(leaves(averaged))
+    law = controller.law
+    averaged = controller.averaged
+    known = list(leaves(law))
+    inner = list(leaves(averaged))
     prefix = "law." if hasattr(law, "law") else ""
-    bounds = {leaf.path: [float(x) if np.isfinite(x) else None for x in leaf.declared.bounds] for leaf in inner}
+    bounds = {
+        leaf.path: [float(x) if np.isfinite(x) else None for x in leaf.declared.bounds]
+        for leaf in inner
+    }
     return {
-        "key": controller.key, "setpoints": list(law.setpoints), "measured": list(law.measured_columns),
-        "inputs": list(law.inputs), "memory": list(law.initial_memory),
+        "key": controller.key,
+        "setpoints": list(law.setpoints),
+        "measured": list(law.measured_columns),
+        "inputs": list(law.inputs),
+        "memory": list(law.initial_memory),
         "initial_memory": [float(value) for value in law.initial_memory.values()],
-        "paths": [leaf.path for leaf in known], "values": [float(leaf.value) for leaf in known], "prefix": prefix,
-        "averaged_paths": [leaf.path for leaf in inner], "averaged_memory": list(averaged.initial_memory),
+        "paths": [leaf.path for leaf in known],
+        "values": [float(leaf.value) for leaf in known],
+        "prefix": prefix,
+        "averaged_paths": [leaf.path for leaf in inner],
+        "averaged_memory": list(averaged.initial_memory),
         "averaged_start": [float(value) for value in averaged.initial_memory.values()],
-        "balance": controller.balance, "bias": f"{prefix}{controller.bias}" if controller.bias else "",
-        "gains": [{**dataclasses.asdict(gain), "path": f"{prefix}{gain.path}", "bounds": bounds[gain.path]}
-                  for gain in controller.gains],
-    }  # fmt: skip
+        "balance": controller.balance,
+        "bias": f"{prefix}{controller.bias}" if controller.bias else "",
+        "gains": [
+            {
+                **dataclasses.asdict(gain),
+                "path": f"{prefix}{gain.path}",
+                "bounds": bounds[gain.path],
+            }
+            for gain in controller.gains
+        ],
+    }
 
 
 def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> str:
-    """The functions of a control law; its parameters are the vector p, in the order of its leaves."""
+    """The functions of a control law; its parameters are the vector p, in the order of its
+    leaves.
+    """
     import casadi
 
     traced = trace_sample(law)
     p = casadi.SX.sym("p", sum(1 for _ in tree.leaves(law)))
     commands, later = casadi.substitute([traced.commands, traced.later], [traced.parameters], [p])
     commands, later = casadi.cse([casadi.densify(commands), casadi.densify(later)])
-    arguments = {"y": traced.measured, "r": traced.setpoints, "m": traced.memory, "T": traced.sample_time,
-                 "l": traced.minimum, "h": traced.maximum, "p": p}  # fmt: skip
+    arguments = {
+        "y": traced.measured,
+        "r": traced.setpoints,
+        "m": traced.memory,
+        "T": traced.sample_time,
+        "l": traced.minimum,
+        "h": traced.maximum,
+        "p": p,
+    }
     printer = Printer(JavaScriptLanguage(exported=False))
     if sample:
         printer.add("sample", arguments, {"u": commands, "n": later})
@@ -143,33 +223,50 @@ def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> st
         by = casadi.vertcat(traced.measured, traced.memory)
         table = casadi.densify(casadi.vec(casadi.jacobian(both, by).T))
         printer.add("slopes", arguments, {"f": both, "D": casadi.cse(table)})
-    return _module(printer, [name for name, wanted in (("sample", sample), ("slopes", slopes)) if wanted])
+    return _module(
+        printer, [name for name, wanted in (("sample", sample), ("slopes", slopes)) if wanted]
+    )
 
 
 def _linear_program(plant: am.Plant, columns: tuple[str, ...]) -> str:
-    """The linearisation of a plant for the columns that control laws measure. Raises ParameterError for a column that
-    depends on an input at once."""
+    """The linearisation of a plant for the columns that control laws measure. Raises ParameterError
+    for a column that depends on an input at once."""
     import casadi
 
     compiled = compile_system(plant)
-    traced, states = compiled.program.traced, compiled.description.state_names
+    traced = compiled.program.traced
+    states = compiled.description.state_names
     rows = casadi.vertsplit(casadi.vertcat(traced.o, traced.x))
     known = dict(zip((*traced.output_names, *states), rows, strict=True))
     measured = casadi.vertcat(*(known[name] for name in columns))
     if any(casadi.which_depends(measured, traced.u, 1, False)):
-        raise ParameterError(f"a column among {', '.join(columns)} depends on an input at once; it cannot be measured.")
-    tables = {"A": casadi.jacobian(traced.f, traced.x), "B": casadi.jacobian(traced.f, traced.u),
-              "C": casadi.jacobian(measured, traced.x)}  # fmt: skip
+        raise ParameterError(
+            f"a column among {', '.join(columns)} depends on an input at once; it cannot be"
+            " measured."
+        )
+    tables = {
+        "A": casadi.jacobian(traced.f, traced.x),
+        "B": casadi.jacobian(traced.f, traced.u),
+        "C": casadi.jacobian(measured, traced.x),
+    }
     printer = Printer(JavaScriptLanguage(exported=False))
-    outputs = {"f": traced.f, **{name: casadi.densify(casadi.vec(table.T)) for name, table in tables.items()}}
+    outputs = {
+        "f": traced.f,
+        **{name: casadi.densify(casadi.vec(table.T)) for name, table in tables.items()},
+    }
     values = casadi.cse(list(outputs.values()))
-    printer.add("linear", {"x": traced.x, "u": traced.u, "p": traced.p}, dict(zip(outputs, values, strict=True)))
+    printer.add(
+        "linear",
+        {"x": traced.x, "u": traced.u, "p": traced.p},
+        dict(zip(outputs, values, strict=True)),
+    )
     return _module(printer, ["linear"])
 
 
 def _pair_program(plant: am.Plant) -> str:
-    """The statics of a joint as a function of the angle and of both pressures, and the torque [N m] of the muscles
-    without their dampers for an angle, its speed and acceleration, and both pressures."""
+    """The statics of a joint as a function of the angle and of both pressures, and the torque [N m]
+    of the muscles without their dampers for an angle, its speed and acceleration, and both
+    pressures."""
     import casadi
 
     x = casadi.SX.sym("x", 3)
@@ -177,18 +274,29 @@ def _pair_program(plant: am.Plant) -> str:
         dict(zip(function.names, casadi.horzsplit(function.function(x[0], x[i])), strict=True))
         for i, function in enumerate(torque_functions(plant), 1)
     ]
-    torque, stiffness, shut = (both[0][name] + both[1][name] for name in ("torque", "stiffness", "shut_valves"))
-    each = (muscle[name] for name in ("torque_by_pressure", "stiffness_by_pressure", "tension") for muscle in both)
+    torque, stiffness, shut = (
+        both[0][name] + both[1][name] for name in ("torque", "stiffness", "shut_valves")
+    )
+    each = (
+        muscle[name]
+        for name in ("torque_by_pressure", "stiffness_by_pressure", "tension")
+        for muscle in both
+    )
     load = load_function(plant).function(x[0])
     values = [torque, stiffness, *each, shut, load[0], load[1]]
     printer = Printer(JavaScriptLanguage(exported=False))
     printer.add("pair", {"x": x}, {"f": casadi.cse(casadi.densify(casadi.vertcat(*values)))})
-    x, mechanism, lengths = casadi.SX.sym("x", 5), plant.mechanism, plant.resting_lengths
+    x = casadi.SX.sym("x", 5)
+    mechanism = plant.mechanism
+    lengths = plant.resting_lengths
     coordinate = mechanism.coordinates[0]
-    q, v = {coordinate.name: x[0]}, {coordinate.speed: x[1]}
+    q = {coordinate.name: x[0]}
+    v = {coordinate.speed: x[1]}
     contractions = mechanism.contractions(q, lengths)
     damping = []
-    for muscle, length, contraction, pressure in zip(plant.muscles, lengths, contractions, (x[3], x[4]), strict=True):
+    for muscle, length, contraction, pressure in zip(
+        plant.muscles, lengths, contractions, (x[3], x[4]), strict=True
+    ):
         speed = length * casadi.jacobian(casadi.SX(contraction), x[0]) * x[1]
         damping.append(-muscle.damper.force(pressure, contraction, speed))
     held = mechanism.generalised_forces(q, damping, lengths)[coordinate.name]
@@ -200,4 +308,7 @@ def _pair_program(plant: am.Plant) -> str:
 def _module(printer: Printer, names: list[str]) -> str:
     """The functions as an expression of JavaScript."""
     text = printer.module()
-    return f"(() => {{\n{text}\nreturn {{ {', '.join([*names, 'prepare'])}, held: {printer.held} }};\n}})()"
+    return (
+        f"(() => {{\n{text}\nreturn {{ {', '.join([*names, 'prepare'])}, held: {printer.held}"
+        " };\n})()"
+    )

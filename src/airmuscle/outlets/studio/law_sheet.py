@@ -1,16 +1,18 @@
-"""Sheet of a law: all that the page shows of a muscle or a law, as plain data; TOML text with places for numbers; the
-printed law and its outline as JavaScript functions of arrays, parameters as inputs.
+"""Sheet of a law: all that the page shows of a muscle or a law, as plain data; TOML text with
+places for numbers; the printed law and its outline as JavaScript functions of arrays, parameters as
+inputs.
 
-A template is a list of texts and integers: an integer is the place of the parameter of this index, which is written
-as Python writes a float, so that a page fills in numbers without a server. The functions write into arrays that they
-are given; x are the arguments, c is what `prepare(p, c)` made of the parameters:
+A template is a list of texts and integers: an integer is the place of the parameter of this index,
+which is written as Python writes a float, so that a page fills in numbers without a server. The
+functions write into arrays that they are given; x are the arguments, c is what `prepare(p, c)` made
+of the parameters:
 
     force(x, c, f)          x = (p, eps), f = (F, dF/dp, dF/deps)
     contraction(x, c, f)    x = (p, F),   f = (eps, deps/dp, deps/dF)
     pressure(x, c, f)       x = (eps, F), f = (p, dp/deps, dp/dF)
     limits(c, f)            f = search ranges of pressure, contraction and force
-    outline(x, c, f)        x = (eps, t), f = (axial position, radius), t from -1 to 1 along a segment
-    volume(x, c, f)         x = (eps),    f = (V, dV/deps)
+    outline(x, c, f)        x = (eps, t), f = (axial position, radius), t from -1 to 1 along a
+    segment volume(x, c, f)         x = (eps),    f = (V, dV/deps)
 
 A direction that the law does not give in closed form is missing; the page searches for its root.
 """
@@ -28,7 +30,18 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import AirmuscleError, Array, Leaf, ParameterError, TraceError, autodiff, cite, conversion, leaves, tree
+from ...core import (
+    AirmuscleError,
+    Array,
+    Leaf,
+    ParameterError,
+    TraceError,
+    autodiff,
+    cite,
+    conversion,
+    leaves,
+    tree,
+)
 from ...engine.compile.functions import Printer
 from ...engine.compile.text.languages import JavaScriptLanguage
 from ...files.library import Entry, to_toml
@@ -44,13 +57,21 @@ _MARK = re.compile(r"7(?:\.\d+)?e\+250")
 Law = am.characteristic.Characteristic
 Template = list[str | int]
 MAX_PARAMETERS = 60
-"""Maximum number of parameters with a slider; a law with more, such as a table, has none (chosen)."""
+"""Maximum number of parameters with a slider; a law with more, such as a table, has none
+(chosen).
+"""
 SHOWN_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
-    "m": ((1.0, "mm"),), "rad": ((math.inf, "deg"),), "s": ((0.5, "ms"),), "m3": ((1.0, "cm3"),), "kg": ((0.1, "g"),),
-    "Pa": ((1e3, "Pa"), (1e6, "kPa"), (math.inf, "MPa")), "m3/(s Pa)": ((math.inf, "dm3/(s bar)"),),
-}  # fmt: skip
+    "m": ((1.0, "mm"),),
+    "rad": ((math.inf, "deg"),),
+    "s": ((0.5, "ms"),),
+    "m3": ((1.0, "cm3"),),
+    "kg": ((0.1, "g"),),
+    "Pa": ((1e3, "Pa"), (1e6, "kPa"), (math.inf, "MPa")),
+    "m3/(s Pa)": ((math.inf, "dm3/(s bar)"),),
+}
 """Units in which numbers below a limit are shown, by SI unit (chosen)."""
-OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 61, 41
+OUTLINE_CONTRACTIONS = 61
+OUTLINE_POINTS = 41
 """Grid of an outline that is not in closed form (chosen)."""
 DIRECTIONS = ("force", "contraction", "pressure")
 _UNTRACEABLE = (AirmuscleError, RuntimeError, TypeError, ValueError)
@@ -58,41 +79,63 @@ _UNTRACEABLE = (AirmuscleError, RuntimeError, TypeError, ValueError)
 
 
 def law_sheet(entry: Entry) -> dict[str, Any]:
-    """The sheet of an entry, with the text of its program under "script"; of a law without a closed form, that of its
-    approximation on its validity range, with the error. Raises TraceError for one without a validity range."""
+    """The sheet of an entry, with the text of its program under "script"; of a law without a closed
+    form, that of its approximation on its validity range, with the error. Raises TraceError for one
+    without a validity range.
+    """
     law, errors = _in_closed_form(entry)
     geometry, kind, ratings = entry.geometry, type(entry.characteristic), entry.ratings
     text, functions, held = print_law(law, geometry)
     rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
     if parameter_model(law, geometry) is not law:
         rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
-    limits, fixed = validity_range_of(law, entry.validity_range), bool(errors) or len(rows) > MAX_PARAMETERS
-    parameters = [] if fixed else [parameter_row(path, leaf, entry.provenance) for path, leaf in rows]
+    limits = validity_range_of(law, entry.validity_range)
+    fixed = bool(errors) or len(rows) > MAX_PARAMETERS
+    parameters = (
+        [] if fixed else [parameter_row(path, leaf, entry.provenance) for path, leaf in rows]
+    )
     known = entry.uncertainty
-    stated = {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
+    stated = (
+        {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
+    )
     for row in parameters:
-        row["standard_error"] = stated.get(row["path"], stated.get(row["path"].removeprefix("characteristic.")))
+        row["standard_error"] = stated.get(
+            row["path"], stated.get(row["path"].removeprefix("characteristic."))
+        )
     shape: dict[str, Any] | None = None
-    if geometry is not None:  # the number of its segments, and radii on a grid where there is no closed form
+    if (
+        geometry is not None
+    ):  # the number of its segments, and radii on a grid where there is no closed form
         low, high = geometry.contraction_range
         segments = geometry.segments if isinstance(geometry, FibreTube) else 1
-        shape = {"model": type(geometry).__name__, "segments": segments, "range": [float(low), float(high)]}
+        shape = {
+            "model": type(geometry).__name__,
+            "segments": segments,
+            "range": [float(low), float(high)],
+        }
         if "outline" not in functions:
             grid = np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS)
             shape |= sampled_outline(geometry, grid)
     sheet: dict[str, Any] = {
         **{key: getattr(entry, key) for key in ("name", "title", "provenance", "note", "warning")},
-        "law": kind.__name__, "formula": (kind.__doc__ or "").strip().partition("\n")[0],
+        "law": kind.__name__,
+        "formula": (kind.__doc__ or "").strip().partition("\n")[0],
         "kind": next(method for form, method, *_ in FORMS if isinstance(law, form)),
-        "functions": functions, "held": held, "limits": [float(limit) for limit in _limits(law)],
-        "values": [leaf.value for _, leaf in rows], "parameters": parameters,
-        "resting_length": next((i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None),
+        "functions": functions,
+        "held": held,
+        "limits": [float(limit) for limit in _limits(law)],
+        "values": [leaf.value for _, leaf in rows],
+        "parameters": parameters,
+        "resting_length": next(
+            (i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None
+        ),
         "validity_range": None if limits is None else dataclasses.asdict(limits),
         "ratings": {name: getattr(ratings, name) for name in (ratings.stated if ratings else ())},
         "geometry": shape,
-        "references": [str(reference) for reference in cite(entry)], "approximation": errors,
+        "references": [str(reference) for reference in cite(entry)],
+        "approximation": errors,
         "toml": _toml(entry, fixed),
-    }  # fmt: skip
+    }
     return with_script(sheet, text, ("prepare", *functions))
 
 
@@ -102,10 +145,15 @@ def identifier_of(sheet: Mapping[str, Any], text: str = "") -> str:
 
 
 def with_script(sheet: Mapping[str, Any], text: str, functions: Sequence[str]) -> dict[str, Any]:
-    """A sheet with its identifier, and its program as a script that enters functions into the table of the page."""
-    identifier, result = identifier_of(sheet, text), f"return {{ {', '.join(functions)} }};"
+    """A sheet with its identifier, and its program as a script that enters functions into the table
+    of the page.
+    """
+    identifier = identifier_of(sheet, text)
+    result = f"return {{ {', '.join(functions)} }};"
     text = re.sub(r"^export ", "", text, flags=re.MULTILINE)
-    script = f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
+    script = (
+        f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
+    )
     return {**sheet, "id": identifier, "script": script}
 
 
@@ -117,48 +165,71 @@ def _in_closed_form(entry: Entry) -> tuple[Law, dict[str, Any] | None]:
     limits = validity_range_of(law, entry.validity_range)
     if limits is None:
         raise TraceError(
-            f"{entry.name}: {type(law).__name__} has no closed form and no validity range, on which it could be "
-            "approximated. Add [validity_range] to its file, or see airmuscle approximate."
+            f"{entry.name}: {type(law).__name__} has no closed form and no validity range, on which"
+            " it could be approximated. Add [validity_range] to its file, or see airmuscle"
+            " approximate."
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        approximation: am.characteristic.PolynomialSurrogate = am.characteristic.as_force_law(law, limits)
+        approximation: am.characteristic.PolynomialSurrogate = am.characteristic.as_force_law(
+            law, limits
+        )
     errors = {key: getattr(approximation, key) for key in ("max_error", "rms_error", "coverage")}
     return approximation.surface, {**errors, "degree": approximation.surface.degree}
 
 
 def parameter_row(path: str, leaf: Leaf, source: str) -> dict[str, Any]:
-    """One parameter for the page: symbol, unit, meaning, bounds, source, and the unit in which it is shown."""
-    declared, value = leaf.declared, float(leaf.value)
+    """One parameter for the page: symbol, unit, meaning, bounds, source, and the unit in which it
+    is shown.
+    """
+    declared = leaf.declared
+    value = float(leaf.value)
     unit = declared.unit
     shown = next((shown for limit, shown in SHOWN_UNITS.get(unit, ()) if abs(value) < limit), unit)
     return {
-        "path": path, "symbol": declared.symbol, "unit": unit, "meaning": declared.meaning,
-        "bounds": [bound if math.isfinite(bound) else None for bound in declared.bounds], "value": value,
+        "path": path,
+        "symbol": declared.symbol,
+        "unit": unit,
+        "meaning": declared.meaning,
+        "bounds": [bound if math.isfinite(bound) else None for bound in declared.bounds],
+        "value": value,
         "shown_unit": "" if shown == unit == "1" else shown,
-        "factor": 1.0 if shown == unit else conversion(shown, unit).factor, "source": source,
-    }  # fmt: skip
+        "factor": 1.0 if shown == unit else conversion(shown, unit).factor,
+        "source": source,
+    }
 
 
 def sampled_outline(
-    geometry: am.geometry.Geometry, contractions: Array, points: int = OUTLINE_POINTS, decimals: int | None = None
+    geometry: am.geometry.Geometry,
+    contractions: Array,
+    points: int = OUTLINE_POINTS,
+    decimals: int | None = None,
 ) -> dict[str, Any]:
-    """Axial positions and radii of an outline at contractions (n,), rounded to decimals if given."""
+    """Axial positions and radii of an outline at contractions (n,), rounded to decimals if
+    given.
+    """
     outlines = [geometry.outline(float(c), points) for c in contractions]
     if decimals is not None:
-        outlines = [(np.round(axial, decimals), np.round(radius, decimals)) for axial, radius in outlines]
+        outlines = [
+            (np.round(axial, decimals), np.round(radius, decimals)) for axial, radius in outlines
+        ]
     axial, radius = ([each[i].tolist() for each in outlines] for i in (0, 1))
     return {"contractions": contractions.tolist(), "axial": axial, "radius": radius}
 
 
 def _toml(entry: Entry, fixed: bool) -> dict[str, Any]:
-    """The file of the entry as it is, and the template of its file with other parameters. Standard errors, checks and
-    the validity range of a fit belong to the parameters of the entry alone."""
-    note = f"Parameters of {entry.name} ({entry.provenance}) changed in airmuscle studio. {entry.note}".strip()
+    """The file of the entry as it is, and the template of its file with other parameters. Standard
+    errors, checks and the validity range of a fit belong to the parameters of the entry alone."""
+    note = f"Parameters of {entry.name} ({entry.provenance}) changed in airmuscle studio. {entry.note}".strip()  # noqa: E501
     changed = dataclasses.replace(
-        entry, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(), warning="",
+        entry,
+        title=f"{entry.title}, parameters changed",
+        provenance="chosen",
+        uncertainty=None,
+        checks=(),
+        warning="",
         note=note,
-    )  # fmt: skip
+    )
 
     def write(model: Any) -> str:
         law, geometry = law_and_geometry(model, entry.geometry)
@@ -169,18 +240,23 @@ def _toml(entry: Entry, fixed: bool) -> dict[str, Any]:
 
 
 def toml_template(write: Callable[[Any], str], model: Any) -> Template:
-    """The template of the text that `write` makes of a model, with a place for each leaf. Raises ParameterError."""
+    """The template of the text that `write` makes of a model, with a place for each leaf. Raises
+    ParameterError.
+    """
     marks = [_FIRST + i * _STEP for i, _ in enumerate(leaves(model))]
     place = {repr(mark): i for i, mark in enumerate(marks)}
     text = write(tree.unflatten(model, marks))
-    template, end = list[str | int](), 0
+    template = list[str | int]()
+    end = 0
     for match in _MARK.finditer(text):
         template += [text[end : match.start()], place[match.group()]]
         end = match.end()
     template.append(text[end:])
     missing = set(range(len(marks))) - {item for item in template if isinstance(item, int)}
     if missing:
-        raise ParameterError(f"{type(model).__name__}: {len(missing)} parameters do not appear in its file.")
+        raise ParameterError(
+            f"{type(model).__name__}: {len(missing)} parameters do not appear in its file."
+        )
     return template
 
 
@@ -188,11 +264,14 @@ def toml_template(write: Callable[[Any], str], model: Any) -> Template:
 
 
 def print_law(law: Law, geometry: am.geometry.Geometry | None) -> tuple[str, list[str], int]:
-    """The program of a traceable law, and of the outline where the geometry is in closed form, as JavaScript text; the
-    names of its functions, and the length of `c`. Raises TraceError for a law without a closed form."""
+    """The program of a traceable law, and of the outline where the geometry is in closed form, as
+    JavaScript text; the names of its functions, and the length of `c`. Raises TraceError for a law
+    without a closed form.
+    """
     model, p = autodiff.symbolic(parameter_model(law, geometry))
     model, shape = law_and_geometry(model, geometry)
-    printer, names = Printer(JavaScriptLanguage(exported=False)), []
+    printer = Printer(JavaScriptLanguage(exported=False))
+    names = []
     for name, inputs, outputs in _functions(model, shape):
         printer.add(name, {**inputs, "p": p}, {"f": outputs})
         names.append(name)
@@ -202,13 +281,19 @@ def print_law(law: Law, geometry: am.geometry.Geometry | None) -> tuple[str, lis
 
 
 def parameter_model(law: Law, geometry: am.geometry.Geometry | None) -> Any:
-    """What has the parameters of the page as leaves: the law, or the pair with a geometry that is not part of it."""
-    return law if geometry is None or geometry == getattr(law, "geometry", None) else (law, geometry)
+    """What has the parameters of the page as leaves: the law, or the pair with a geometry that is
+    not part of it.
+    """
+    return (
+        law if geometry is None or geometry == getattr(law, "geometry", None) else (law, geometry)
+    )
 
 
 def law_and_geometry(model: Any, geometry: am.geometry.Geometry | None) -> tuple[Any, Any]:
     """The law and its geometry in what `parameter_model` has made of them."""
-    return model if isinstance(model, tuple) else (model, None if geometry is None else model.geometry)
+    return (
+        model if isinstance(model, tuple) else (model, None if geometry is None else model.geometry)
+    )
 
 
 def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, Any], Any]]:
@@ -231,7 +316,9 @@ def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, Any], Any]]:
     outline = _traced(lambda: casadi.vertcat(*_outline(shape, a, b))) if shape is not None else None
     if outline is not None:
         functions.append(("outline", {"x": casadi.vertcat(a, b)}, outline))
-    return [(name, inputs, casadi.densify(casadi.cse(outputs))) for name, inputs, outputs in functions]
+    return [
+        (name, inputs, casadi.densify(casadi.cse(outputs))) for name, inputs, outputs in functions
+    ]
 
 
 def _traced(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -251,7 +338,9 @@ def _limits(model: Any) -> Sequence[Any]:
 
 
 def _outline(shape: Any, contraction: Any, t: Any) -> tuple[Any, Any]:
-    """Axial position from the middle of a segment [m] and radius [m]. Raises TraceError for another geometry."""
+    """Axial position from the middle of a segment [m] and radius [m]. Raises TraceError for another
+    geometry.
+    """
     if isinstance(shape, am.geometry.Braid):
         return t * shape.resting_length * (1.0 - contraction) / 2, shape.radius_at(contraction)
     if isinstance(shape, FibreTube) and shape.traceable:

@@ -1,4 +1,6 @@
-"""Page of the studio: its files, and one self-contained file of what is on the page or of given sheets."""
+"""Page of the studio: its files, and one self-contained file of what is on the page or of given
+sheets.
+"""
 
 import base64
 import hashlib
@@ -12,25 +14,32 @@ from ...core import FileError, ParameterError, atomic_file
 from .joint_sheet import joint_names, sheet_of_joint
 from .tasks import sheet_of_any
 
-MAX_PAGE_SHEETS, MAX_MUSCLES = 12, 6
-"""Maximum number of muscles and plants in a self-contained page, and of muscles in one chart (chosen)."""
+MAX_PAGE_SHEETS = 12
+MAX_MUSCLES = 6
+"""Maximum number of muscles and plants in a self-contained page, and of muscles in one chart
+(chosen).
+"""
 _NAMES = """
     numbers roots law elements source figure chart outline parameters muscle-chart muscle-point muscle-tab
     plant-start plant-run plant-drawing plant-traces plant-tab fit-source fit-scatter fit-data fit-arm fit-files
     fit-result fit-tab joint-loop joint-statics joint-linear joint-drawing joint-charts joint-tab size-tab main
-"""
+"""  # noqa: E501
 SCRIPTS = ("vendor/uPlot.iife.min.js", *(f"scripts/{name}.js" for name in _NAMES.split()))
 """Scripts in the order in which the page runs them."""
 STYLES = ("vendor/uPlot.min.css", "style.css", "fit.css")
 SERVER_ONLY = ("scripts/fit-", "fit.css")
-"""Beginnings of the names of files that need a server, which a self-contained page does not contain."""
+"""Beginnings of the names of files that need a server, which a self-contained page does not
+contain.
+"""
 LICENCE = "vendor/uPlot.LICENSE"
 TYPES = {".js": "text/javascript", ".css": "text/css", ".LICENSE": "text/plain"}
 
 
 def web_file(name: str) -> str:
     """The text of a file of the page."""
-    return resources.files(__package__).joinpath("web", *name.split("/")).read_text(encoding="utf-8")
+    return (
+        resources.files(__package__).joinpath("web", *name.split("/")).read_text(encoding="utf-8")
+    )
 
 
 def web_files() -> dict[str, tuple[str, str]]:
@@ -49,17 +58,25 @@ def server_page() -> str:
 
 
 def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str, Any]) -> str:
-    """One file without server and network: sheets with their programs, and the state of the page. Its policy allows the
-    scripts and styles in it by their digests, and nothing else."""
-    data = {"state": state, "sheets": [{k: v for k, v in s.items() if k != "script"} for s in sheets]}
-    embedded = json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    """One file without server and network: sheets with their programs, and the state of the page.
+    Its policy allows the scripts and styles in it by their digests, and nothing else."""
+    data = {
+        "state": state,
+        "sheets": [{k: v for k, v in s.items() if k != "script"} for s in sheets],
+    }
+    embedded = (
+        json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    )
     scripts = [web_file(name) for name in SCRIPTS[:-1] if not name.startswith(SERVER_ONLY)]
     scripts += [sheet["script"] for sheet in sheets] + [web_file(SCRIPTS[-1])]
-    scripts = [text.replace("</", "<\\/").replace("<!--", "<\\!--") for text in scripts]  # no text ends its element
+    scripts = [
+        text.replace("</", "<\\/").replace("<!--", "<\\!--") for text in scripts
+    ]  # no text ends its element
     styles = [web_file(name) for name in STYLES if not name.startswith(SERVER_ONLY)]
     policy = (
-        f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; "
-        f"style-src {' '.join(map(_digest, styles))}; img-src data: blob:; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; style-src"
+        f" {' '.join(map(_digest, styles))}; img-src data: blob:; base-uri 'none'; form-action"
+        " 'none'"
     )
     head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
     head += "\n".join(f"<style>{text}</style>" for text in styles)
@@ -75,20 +92,35 @@ def _digest(text: str) -> str:
 
 def _filled(comment: str, head: str, end: str) -> str:
     page = web_file("index.html").replace("@version@", metadata.version("airmuscle"))
-    return page.replace("<!--comment-->", comment).replace("<!--head-->", head).replace("<!--end-->", end)
+    return (
+        page.replace("<!--comment-->", comment)
+        .replace("<!--head-->", head)
+        .replace("<!--end-->", end)
+    )
 
 
 def open_sheets(names: Sequence[str]) -> tuple[dict[str, Any], ...]:
-    """The sheets of muscles, laws and plants by name or by path. Raises the errors of their loaders."""
+    """The sheets of muscles, laws and plants by name or by path. Raises the errors of their
+    loaders.
+    """
     if len(names) > MAX_PAGE_SHEETS:
-        raise ParameterError(f"{len(names)} names are given; allowed range: at most {MAX_PAGE_SHEETS}.")
+        raise ParameterError(
+            f"{len(names)} names are given; allowed range: at most {MAX_PAGE_SHEETS}."
+        )
     return tuple(sheet_of_any(name) for name in names)
 
 
 def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The state of a page that begins with these sheets."""
-    named = [{"text": sheet["own_text"]} if sheet.get("own_text") else {"name": sheet["name"]} for sheet in sheets]
-    muscles = [{**name, "values": {}} for name, sheet in zip(named, sheets, strict=True) if "plant" not in sheet]
+    named = [
+        {"text": sheet["own_text"]} if sheet.get("own_text") else {"name": sheet["name"]}
+        for sheet in sheets
+    ]
+    muscles = [
+        {**name, "values": {}}
+        for name, sheet in zip(named, sheets, strict=True)
+        if "plant" not in sheet
+    ]
     plants = [name for name, sheet in zip(named, sheets, strict=True) if "plant" in sheet]
     return {
         "tab": "muscle" if muscles else "plant",
@@ -98,18 +130,22 @@ def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def export_page(names: Sequence[str], path: str | Path) -> Path:
-    """Write a page without server and network that shows these muscles and plants; the file is complete or unchanged.
+    """Write a page without server and network that shows these muscles and plants; the file is
+    complete or unchanged.
 
-    A joint of the library appears in the tab Joint as well. Raises the errors of the loaders, ParameterError without a
-    name, FileError if the file cannot be written.
+    A joint of the library appears in the tab Joint as well. Raises the errors of the loaders,
+    ParameterError without a name, FileError if the file cannot be written.
     """
     if not names:
-        raise ParameterError("no muscle or plant is named; give at least one name of the library or a file.")
+        raise ParameterError(
+            "no muscle or plant is named; give at least one name of the library or a file."
+        )
     sheets = open_sheets(names)
     shown = {sheet["name"]: None for sheet in sheets if "plant" in sheet and not sheet["own_text"]}
     joints = tuple(sheet_of_joint(name) for name in shown if name in joint_names())
     state = first_state(sheets) | ({"joint": {"name": joints[0]["name"]}} if joints else {})
-    text, path = self_contained_page((*sheets, *joints), state), Path(path)
+    text = self_contained_page((*sheets, *joints), state)
+    path = Path(path)
     try:
         with atomic_file(path) as unfinished:
             unfinished.write_text(text, encoding="utf-8")

@@ -1,4 +1,6 @@
-"""Sheet of a plant: a scenario with its printed program, names, units and start, for a run in the page."""
+"""Sheet of a plant: a scenario with its printed program, names, units and start, for a run in the
+page.
+"""
 
 import base64
 import re
@@ -19,49 +21,69 @@ from .law_sheet import parameter_row, sampled_outline, toml_template, with_scrip
 
 NAMES = ("states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES")
 """What the page uses of a printed program; of one with a controller also the run of the loop."""
-MAX_DURATION, MAX_PARAMETERS = 1000.0, 120
+MAX_DURATION = 1000.0
+MAX_PARAMETERS = 120
 """Longest run in the page [s], and maximum number of parameters with a slider (chosen)."""
-OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
+OUTLINE_CONTRACTIONS = 31
+OUTLINE_POINTS = 25
 """Grid of an outline (chosen)."""
 OPENED = 0.01
 """Opening of the filling valves at whose closed position a loop has no slope (chosen)."""
 
 
 def sheet_of_tables(
-    tables: Mapping[str, Any], location: Location, name: str, sources: Mapping[str, str], text: str = ""
+    tables: Mapping[str, Any],
+    location: Location,
+    name: str,
+    sources: Mapping[str, str],
+    text: str = "",
 ) -> dict[str, Any]:
-    """The sheet of the tables of a scenario. Raises ParameterError for a run that the page cannot carry out."""
+    """The sheet of the tables of a scenario. Raises ParameterError for a run that the page cannot
+    carry out.
+    """
     scenario = build_scenario(tables, location)
     if scenario.problem.duration > MAX_DURATION:
         raise ParameterError(
-            f"{location}: the run lasts {scenario.problem.duration:g} s; allowed range in the page: up to "
-            f"{MAX_DURATION:g} s."
+            f"{location}: the run lasts {scenario.problem.duration:g} s; allowed range in the page:"
+            f" up to {MAX_DURATION:g} s."
         )
     program = make_run(scenario.problem, name="plant", title=scenario.title, with_loop=True)
     module = am.outlets.JavaScript().run_files(program)["plant.mjs"]
-    plant, system, columns = scenario.plant, program.system, list[dict[str, Any]]()
+    plant = scenario.plant
+    system = program.system
+    columns = list[dict[str, Any]]()
     for column in system.known.column_names:
         own = system.units[column]
         usual = {"rad": (180.0 / np.pi, "deg"), "Pa": (1e-3, "kPa")}.get(own, display_scale(column))
         factor, unit = usual if usual[1] else (1.0, own)
-        columns.append({"name": column, "factor": factor, "unit": "" if unit in ("1", "-") else unit})
+        columns.append(
+            {"name": column, "factor": factor, "unit": "" if unit in ("1", "-") else unit}
+        )
     sheet: dict[str, Any] = {
-        "plant": True, "name": name, "title": scenario.title,
+        "plant": True,
+        "name": name,
+        "title": scenario.title,
         "provenance": str(tables.get("provenance", "the file of the user")),
         **{key: str(tables.get(key, "")) for key in ("note", "warning")},
         "start_equilibrium": initial_pressure(tables, location, plant) is not None,
-        "duration": scenario.problem.duration, "values": system.defaults.tolist(),
+        "duration": scenario.problem.duration,
+        "values": system.defaults.tolist(),
         "temperature_index": [leaf.path for leaf in leaves(plant)].index("ambient.temperature"),
-        "parameters": _parameter_rows(plant, sources), "inputs": _input_rows(plant),
-        "controlled": program.loop is not None, "columns": columns,
-        "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))], "mechanism": _mechanism_row(plant),
+        "parameters": _parameter_rows(plant, sources),
+        "inputs": _input_rows(plant),
+        "controlled": program.loop is not None,
+        "columns": columns,
+        "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))],
+        "mechanism": _mechanism_row(plant),
         "references": [str(reference) for reference in cite(plant)],
         "toml": {
             "plant": toml_template(lambda model: part_toml("plant", model), plant),
-            "input": tables_toml({"input": tables.get("input", {})}), "run": tables_toml({"run": tables["run"]}),
+            "input": tables_toml({"input": tables.get("input", {})}),
+            "run": tables_toml({"run": tables["run"]}),
         },
-        "own_text": text, "loop": _loop_row(scenario),
-    }  # fmt: skip
+        "own_text": text,
+        "loop": _loop_row(scenario),
+    }
     return with_script(sheet, module, (*NAMES, "simulate") if program.loop else NAMES)
 
 
@@ -73,8 +95,9 @@ def sheet_of_plant(tables: Mapping[str, Any], location: Location, name: str) -> 
 
 
 def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The parameters of a plant by their paths, with the places of their values; tables of coefficients are left out. A
-    geometry that a muscle shares with its law is one parameter at two places."""
+    """The parameters of a plant by their paths, with the places of their values; tables of
+    coefficients are left out. A geometry that a muscle shares with its law is one parameter at two
+    places."""
     known = list(leaves(plant))
     places = {leaf.path: i for i, leaf in enumerate(known)}
     rows = []
@@ -82,17 +105,27 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
         own = leaf.path.replace(".contractile.geometry.", ".geometry.")
         law = re.sub(r"^(muscle(?:\[\d+\])?)\.geometry\.", r"\1.contractile.geometry.", leaf.path)
         twin = places.get(law) if law != leaf.path else None
-        if leaf.path.endswith("]") or any(part in leaf.path for part in ("validity_range", ".ratings.")):
+        if leaf.path.endswith("]") or any(
+            part in leaf.path for part in ("validity_range", ".ratings.")
+        ):
             continue
         if twin is not None and known[twin].value == leaf.value:
             continue
-        shared = [places[own]] if own != leaf.path and own in places and known[places[own]].value == leaf.value else []
-        path = re.sub(r"\[\d+\]", "", leaf.path)  # its source is that of the longest path in [sources] that begins it
+        shared = (
+            [places[own]]
+            if own != leaf.path and own in places and known[places[own]].value == leaf.value
+            else []
+        )
+        path = re.sub(
+            r"\[\d+\]", "", leaf.path
+        )  # its source is that of the longest path in [sources] that begins it
         matching = [key for key in sources if path == key or path.startswith(f"{key}.")]
         source = sources[max(matching, key=len)] if matching else "the model or its entry"
         rows.append({**parameter_row(leaf.path, leaf, source), "places": [i, *shared]})
     order = ("mechanism", "circuit", "ambient", "gas", "muscle", "")
-    rows.sort(key=lambda row: next(i for i, part in enumerate(order) if row["path"].startswith(part)))
+    rows.sort(
+        key=lambda row: next(i for i, part in enumerate(order) if row["path"].startswith(part))
+    )
     return rows[:MAX_PARAMETERS]
 
 
@@ -106,15 +139,22 @@ def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
 
 
 def _muscle_row(plant: am.Plant, index: int) -> dict[str, Any]:
-    muscle, prefix = plant.muscles[index], plant.prefixes[index]
+    muscle = plant.muscles[index]
+    prefix = plant.prefixes[index]
     paths = [leaf.path for leaf in leaves(plant)]
     start = "muscle" if not isinstance(plant.muscle, tuple) else f"muscle[{index}]"
     ends = (f"{start}.geometry.resting_length", f"{start}.contractile.geometry.resting_length")
     length = next((paths.index(path) for path in ends if path in paths), None)
-    value, (low, high) = float(muscle.geometry.resting_length), map(float, muscle.geometry.contraction_range)
+    value = float(muscle.geometry.resting_length)
+    low, high = map(float, muscle.geometry.contraction_range)
     grid = np.linspace(max(low, -0.05), min(high, 0.45), OUTLINE_CONTRACTIONS)
-    return {"name": muscle.name, "prefix": prefix, "length_index": length, "length": value,
-            "outline": sampled_outline(muscle.geometry, grid, OUTLINE_POINTS, 6)}  # fmt: skip
+    return {
+        "name": muscle.name,
+        "prefix": prefix,
+        "length_index": length,
+        "length": value,
+        "outline": sampled_outline(muscle.geometry, grid, OUTLINE_POINTS, 6),
+    }
 
 
 def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
@@ -126,23 +166,28 @@ def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
     drawn, word = kinds.get(len(plant.muscles), ((), ""))
     radius = getattr(mechanism, "radius", None)
     return {
-        "model": type(plant.mechanism).__name__, "kind": word if isinstance(mechanism, drawn) else "muscles",
+        "model": type(plant.mechanism).__name__,
+        "kind": word if isinstance(mechanism, drawn) else "muscles",
         "coordinates": [c.name for c in plant.mechanism.coordinates],
         "radius": float(radius) if isinstance(radius, float) else 0.04,
-    }  # fmt: skip
+    }
 
 
 def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
-    """Margins, Bode and Nyquist plot of the loop of a scenario, linearised where its run ends; the reason without them.
-    Where valves are closed there, whose slopes differ on both sides, they are open by OPENED. None without a loop."""
+    """Margins, Bode and Nyquist plot of the loop of a scenario, linearised where its run ends; the
+    reason without them. Where valves are closed there, whose slopes differ on both sides, they are
+    open by OPENED. None without a loop.
+    """
     loop = scenario.problem.input
     if not isinstance(loop, am.engine.ControlLoop):
         return None
     done = am.solve(scenario.problem)
     opened = {name: OPENED for name in loop.controller.inputs if name.rpartition(".")[2] == "fill"}
     reason = "the run of the scenario ended early."
-    for where, given in (("where its run ends", {"control_state": done.control_state}),
-                         (f"where its run ends, with valves open by {OPENED:g}", {"inputs": opened})):  # fmt: skip
+    for where, given in (
+        ("where its run ends", {"control_state": done.control_state}),
+        (f"where its run ends, with valves open by {OPENED:g}", {"inputs": opened}),
+    ):
         try:
             linear = am.control.linearise_loop(scenario.plant, loop, done.final_state, **given)
             values = linear.margins().chapter().values
@@ -151,10 +196,14 @@ def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
             continue
         rows = [(each.name, *value_cells(each)) for each in values]
         text = f"Open loop at {linear.law.measured[0]}, linearised {where}."
-        return {"text": text, "rows": rows, "figures": [svg_uri(linear.bode()), svg_uri(linear.nyquist())]}
+        return {
+            "text": text,
+            "rows": rows,
+            "figures": [svg_uri(linear.bode()), svg_uri(linear.nyquist())],
+        }
     return {"text": f"There are no margins: {reason}", "rows": [], "figures": []}
 
 
 def svg_uri(figure: Any) -> str:
     """A Matplotlib figure as an address of its SVG text; equal content gives equal texts."""
-    return f"data:image/svg+xml;base64,{base64.b64encode(plotting.rendered(figure, ('svg',))['svg']).decode()}"
+    return f"data:image/svg+xml;base64,{base64.b64encode(plotting.rendered(figure, ('svg',))['svg']).decode()}"  # noqa: E501

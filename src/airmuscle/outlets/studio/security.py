@@ -1,11 +1,12 @@
-"""Security of the studio: response headers, allowed hosts and origins, token, limits and sizes of requests, answers.
+"""Security of the studio: response headers, allowed hosts and origins, token, limits and sizes of
+requests, answers.
 
-The page has access to the programs that it computes and to nothing else: scripts and styles come from this server
-only, none are written in the page itself, and nothing is sent elsewhere. A request that changes something, or that
-costs computation, needs the header X-Airmuscle, which a page of another origin cannot send, and an Origin of this
-server. The token of the printed address is required of everyone, because the other users of this machine reach a
-loopback address as well. The Host of every request is compared, so that another name that leads to this machine is of
-no use.
+The page has access to the programs that it computes and to nothing else: scripts and styles come
+from this server only, none are written in the page itself, and nothing is sent elsewhere. A request
+that changes something, or that costs computation, needs the header X-Airmuscle, which a page of
+another origin cannot send, and an Origin of this server. The token of the printed address is
+required of everyone, because the other users of this machine reach a loopback address as well. The
+Host of every request is compared, so that another name that leads to this machine is of no use.
 """
 
 import contextlib
@@ -26,8 +27,8 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 Application = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:;"
+    " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 HEADERS = (
     (b"content-security-policy", POLICY.encode()),
@@ -68,7 +69,9 @@ class Access:
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Status and reason if a request is not allowed."""
-        headers = {n.decode("latin-1").lower(): value.decode("latin-1") for n, value in scope["headers"]}
+        headers = {
+            n.decode("latin-1").lower(): value.decode("latin-1") for n, value in scope["headers"]
+        }
         host = headers.get("host", "")
         name, _, port = host.rpartition(":")
         bare = name if name and port.isdecimal() else host
@@ -77,13 +80,18 @@ class Access:
         if len(scope.get("raw_path") or scope["path"]) > MAX_TARGET:
             return 414, "The path is too long."
         tokens = [cookie_value(headers.get("cookie", ""), cookie_name(scope)), *given_token(scope)]
-        if self.token and not any(secrets.compare_digest(each.encode(), self.token.encode()) for each in tokens):
+        if self.token and not any(
+            secrets.compare_digest(each.encode(), self.token.encode()) for each in tokens
+        ):
             return 401, "A token is required; open the address that the command printed."
         if scope["method"] in READING and not scope["path"].startswith(COMPUTING):
             return None
         if scope["method"] not in (*READING, "POST"):
             return 405, "This method is not allowed."
-        if headers.get("x-airmuscle") != "1" or headers.get("sec-fetch-site", "same-origin") != "same-origin":
+        if (
+            headers.get("x-airmuscle") != "1"
+            or headers.get("sec-fetch-site", "same-origin") != "same-origin"
+        ):
             return 403, "This request does not come from the page of this server."
         with contextlib.suppress(ValueError):  # an origin that is no address
             if "origin" not in headers or urlsplit(headers["origin"]).netloc == host:
@@ -91,22 +99,29 @@ class Access:
         return 403, "This request comes from another origin."
 
     def cookie(self, scope: Scope) -> dict[str, Any] | None:
-        """The cookie that keeps a token which the address of a request contains; None without one."""
+        """The cookie that keeps a token which the address of a request contains; None without
+        one.
+        """
         if not (self.token and given_token(scope)):
             return None
-        # "lax": a link to the page in a text opens it; requests that cost computation need their header as well
+        # "lax": a link to the page in a text opens it; requests that cost computation need their
+        # header as well
         return {"key": cookie_name(scope), "value": self.token, "httponly": True, "samesite": "lax"}
 
 
 def given_token(scope: Scope) -> list[str]:
     """The token in the query of a request."""
     with contextlib.suppress(ValueError):
-        return parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=5).get("token", [])
+        return parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=5).get(
+            "token", []
+        )
     return []
 
 
 def cookie_name(scope: Scope) -> str:
-    """The name of the cookie: browsers keep one for all ports of a host, and each server has its own token."""
+    """The name of the cookie: browsers keep one for all ports of a host, and each server has its
+    own token.
+    """
     return f"{COOKIE}_{(scope.get('server') or ('', 0))[1]}"
 
 
@@ -130,7 +145,9 @@ def secured(application: Application, access: Access) -> Application:
 
         async def send_with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                kept = [row for row in message.get("headers", []) if row[0].lower() not in dict(HEADERS)]
+                kept = [
+                    row for row in message.get("headers", []) if row[0].lower() not in dict(HEADERS)
+                ]
                 message = {**message, "headers": [*kept, *HEADERS]}
             await send(message)
 
@@ -140,7 +157,9 @@ def secured(application: Application, access: Access) -> Application:
             return
         status, text = refusal
         headers = [(b"content-type", b"text/plain; charset=utf-8")]
-        await send_with_headers({"type": "http.response.start", "status": status, "headers": headers})
+        await send_with_headers(
+            {"type": "http.response.start", "status": status, "headers": headers}
+        )
         await send({"type": "http.response.body", "body": text.encode()})
 
     return handle
@@ -155,7 +174,9 @@ class BadRequest(AirmuscleError):
 
 
 async def limited_text(request: Any, limit: int) -> str:
-    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes], and unless it is UTF-8."""
+    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes], and unless
+    it is UTF-8.
+    """
     body = b""
     async for part in request.stream():
         body += part

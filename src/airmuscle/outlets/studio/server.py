@@ -1,7 +1,7 @@
 """Server of the studio: address, token, the loop of uvicorn, and the limits of its connections.
 
-A connection that sends nothing, or slowly, costs nobody else an answer: it is closed at its limit, and before that if
-another one needs its place.
+A connection that sends nothing, or slowly, costs nobody else an answer: it is closed at its limit,
+and before that if another one needs its place.
 """
 
 import contextlib
@@ -22,16 +22,24 @@ from .tasks import warm_up
 from .worker import SPARE, WorkerPool
 
 MAX_CONNECTIONS = 128
-"""Maximum number of connections (chosen); a further one takes the place of the oldest without a request."""
+"""Maximum number of connections (chosen); a further one takes the place of the oldest without a
+request.
+"""
 HEAD_LIMIT = 10.0
-"""Limit [s] from the start of a connection, or from the end of an answer, to the end of the next head (chosen)."""
+"""Limit [s] from the start of a connection, or from the end of an answer, to the end of the next
+head (chosen).
+"""
 BODY_LIMIT = 120.0
 """Limit [s] from the end of the head to the end of the body (chosen: 32 MB at 270 kB/s)."""
 ANSWER_LIMIT = 300.0
-"""Limit [s] from the end of the body to the end of the answer (chosen: more than each computation may take)."""
+"""Limit [s] from the end of the body to the end of the answer (chosen: more than each computation
+may take).
+"""
 PACKAGES = ("starlette", "uvicorn")
 _OUTSIDE = "192.0.2.1"
-"""An address of another network, RFC 5737: its route names the address of this machine; nothing is sent to it."""
+"""An address of another network, RFC 5737: its route names the address of this machine; nothing is
+sent to it.
+"""
 
 
 def limited_protocol() -> Any:
@@ -76,25 +84,37 @@ def limited_protocol() -> Any:
 
 
 def limit_of(cycle: Any) -> float:
-    """The limit of time [s] of what a connection waits for: the head, the body or the answer of a request."""
+    """The limit of time [s] of what a connection waits for: the head, the body or the answer of a
+    request.
+    """
     if cycle is None or cycle.response_complete:
         return HEAD_LIMIT
     return BODY_LIMIT if cycle.more_body else ANSWER_LIMIT
 
 
 def close_one_of(connections: Any) -> None:
-    """If there are too many, close the one that has waited longest for the head of a request, or else the last one."""
+    """If there are too many, close the one that has waited longest for the head of a request, or
+    else the last one.
+    """
     kept = [each for each in connections if not each.transport.is_closing()]
     if len(kept) <= MAX_CONNECTIONS:
         return
     waiting = [each for each in kept if limit_of(each.cycle) == HEAD_LIMIT]
-    (min(waiting, key=lambda each: each.since) if waiting else max(kept, key=lambda each: each.since)).transport.abort()
+    (
+        min(waiting, key=lambda each: each.since)
+        if waiting
+        else max(kept, key=lambda each: each.since)
+    ).transport.abort()
 
 
 def access_of(host: str) -> Access:
-    """The rules of access: a token for all, and the names of this machine alone if the server is reached only there.
-    Other users of this machine reach a loopback address as well, so it has a token too."""
-    return Access((*LOOPBACK, _bracketed(host).lower()) if is_loopback(host) else (), secrets.token_urlsafe(32))
+    """The rules of access: a token for all, and the names of this machine alone if the server is
+    reached only there. Other users of this machine reach a loopback address as well, so it has a
+    token too."""
+    return Access(
+        (*LOOPBACK, _bracketed(host).lower()) if is_loopback(host) else (),
+        secrets.token_urlsafe(32),
+    )
 
 
 def _bracketed(host: str) -> str:
@@ -102,8 +122,14 @@ def _bracketed(host: str) -> str:
 
 
 def warning_of(host: str) -> str:
-    """The remark that belongs to an address that other machines reach; empty for this machine alone."""
-    return "" if is_loopback(host) else "the connection is not encrypted; use it only in a network that you trust."
+    """The remark that belongs to an address that other machines reach; empty for this machine
+    alone.
+    """
+    return (
+        ""
+        if is_loopback(host)
+        else "the connection is not encrypted; use it only in a network that you trust."
+    )
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
@@ -111,14 +137,17 @@ def bound_socket(host: str, port: int) -> socket.socket:
     if not 0 <= port <= 65535:
         raise InputError(f"--port is {port}; allowed range: 0 to 65535.")
     try:
-        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            host, port, type=socket.SOCK_STREAM
+        )[0]
         listening = socket.socket(family, kind, protocol)
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         listening.bind(address)
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
-            f"{host[:80]}, port {port}: no server can be started there ({reason}). Choose another --port."
+            f"{host[:80]}, port {port}: no server can be started there ({reason}). Choose another"
+            " --port."
         ) from None
     return listening
 
@@ -130,7 +159,9 @@ def address_of(listening: socket.socket, host: str, access: Access) -> str:
 
 
 def reachable_host(host: str) -> str:
-    """The host; for the unspecified address, on which no page is opened, the address of this machine in its network."""
+    """The host; for the unspecified address, on which no page is opened, the address of this
+    machine in its network.
+    """
     try:
         address = ipaddress.ip_address(host.strip("[]"))
     except ValueError:
@@ -147,9 +178,13 @@ def reachable_host(host: str) -> str:
 
 @contextlib.contextmanager
 def ending_signals(end: Callable[[], None]) -> Iterator[None]:
-    """Within the block SIGTERM and SIGHUP, the end of a session, call `end`; the process is not ended at once."""
+    """Within the block SIGTERM and SIGHUP, the end of a session, call `end`; the process is not
+    ended at once.
+    """
     is_main = threading.current_thread() is threading.main_thread()
-    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)]
+    signals = [
+        getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)
+    ]
     before = {each: signal.signal(each, lambda number, frame: end()) for each in signals}
     try:
         yield
@@ -158,26 +193,38 @@ def ending_signals(end: Callable[[], None]) -> Iterator[None]:
             signal.signal(each, handler)
 
 
-def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Callable[[str], None]) -> None:
+def serve(
+    host: str, port: int, opened: tuple[dict[str, Any], ...], started: Callable[[str], None]
+) -> None:
     """Serve the page until the process is interrupted; `started` receives its address.
 
     Raises InputError if a package is missing or the address cannot be used.
     """
     if missing := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
         raise InputError(
-            f"the studio needs {' and '.join(missing)}. Install them: pip install starlette uvicorn. A page "
-            "without a server needs neither: airmuscle studio NAME --export page.html"
+            f"the studio needs {' and '.join(missing)}. Install them: pip install starlette"
+            " uvicorn. A page without a server needs neither: airmuscle studio NAME --export"
+            " page.html"
         )
     import uvicorn
 
-    access, listening = access_of(host), bound_socket(host, port)
-    pool, long_pool = WorkerPool(WORKERS, warm_up), WorkerPool(LONG_WORKERS, warm_up)
+    access = access_of(host)
+    listening = bound_socket(host, port)
+    pool = WorkerPool(WORKERS, warm_up)
+    long_pool = WorkerPool(LONG_WORKERS, warm_up)
     settings: dict[str, Any] = {
-        "log_level": "warning", "access_log": False, "http": limited_protocol(), "timeout_keep_alive": 5,
-        "server_header": False, "lifespan": "off", "ws": "none",
-    }  # fmt: skip
+        "log_level": "warning",
+        "access_log": False,
+        "http": limited_protocol(),
+        "timeout_keep_alive": 5,
+        "server_header": False,
+        "lifespan": "off",
+        "ws": "none",
+    }
     fits = FitService(long_pool)
-    server = uvicorn.Server(uvicorn.Config(create_app(access, pool, opened, fits, long_pool), **settings))
+    server = uvicorn.Server(
+        uvicorn.Config(create_app(access, pool, opened, fits, long_pool), **settings)
+    )
 
     def end() -> None:
         server.should_exit = server.force_exit = True
@@ -185,7 +232,8 @@ def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Cal
     with ending_signals(end):
         try:
             pool.prepare(1 + SPARE)
-            listening.listen()  # a browser that is faster than the server waits instead of being refused
+            # a browser that is faster than the server waits instead of being refused
+            listening.listen()
             started(address_of(listening, host, access))
             server.run(sockets=[listening])
         finally:

@@ -1,7 +1,8 @@
-"""Tasks of the studio: sheets of laws, plants and sizings from the library or from a text of a user, within limits.
+"""Tasks of the studio: sheets of laws, plants and sizings from the library or from a text of a
+user, within limits.
 
-Files in the library folder may refer to other files. A text over the network must not, because it would read files of
-the machine of the server.
+Files in the library folder may refer to other files. A text over the network must not, because it
+would read files of the machine of the server.
 """
 
 import dataclasses
@@ -57,18 +58,24 @@ def sheet_of_scenario_text(text: str) -> dict[str, Any]:
     """The sheet of a scenario of a user."""
     tables = read_text_tables(text)
     if "plant" not in tables:
-        raise ParameterError("the text contains no [plant]; a scenario for airmuscle simulate is required.")
+        raise ParameterError(
+            "the text contains no [plant]; a scenario for airmuscle simulate is required."
+        )
     return sheet_of_tables(tables, Location("scenario.toml", "", Path()), "own scenario", {}, text)
 
 
 def sheet_of_any(name: str) -> dict[str, Any]:
-    """The sheet of a muscle, a law or a plant by its name, or of a muscle file or a scenario by its path."""
+    """The sheet of a muscle, a law or a plant by its name, or of a muscle file or a scenario by its
+    path.
+    """
     if name in list_plants():
         return sheet_of_library_plant(name)
     path = Path(name)
     tables = read_toml(path) if is_path(name) else {}
     if "plant" in tables:
-        return sheet_of_tables(tables, Location(str(path), "", path.parent), path.stem, {}, path.read_text("utf-8-sig"))
+        return sheet_of_tables(
+            tables, Location(str(path), "", path.parent), path.stem, {}, path.read_text("utf-8-sig")
+        )
     sheet = sheet_of_law(name)
     return {**sheet, "own_text": sheet["toml"]["unchanged"]} if is_path(name) else sheet
 
@@ -77,7 +84,10 @@ def sheet_of_law_text(text: str) -> dict[str, Any]:
     """The sheet of a muscle file of a user. Raises ParameterError for another kind of file."""
     tables = read_text_tables(text)
     check_describes_law(tables, "the text")
-    return {**law_sheet(dataclasses.replace(build_entry(tables, UPLOADED), name="own muscle")), "own_text": text}
+    return {
+        **law_sheet(dataclasses.replace(build_entry(tables, UPLOADED), name="own muscle")),
+        "own_text": text,
+    }
 
 
 def read_text_tables(text: str) -> dict[str, Any]:
@@ -105,8 +115,8 @@ def check_self_contained(value: Any, path: str = "") -> None:
 
 def _refusal(path: str) -> ParameterError:
     return ParameterError(
-        f"{path[:200]}: a text in the studio must not refer to files; write the numbers themselves, or a name of the "
-        "library. The command line reads files that refer to others."
+        f"{path[:200]}: a text in the studio must not refer to files; write the numbers themselves,"
+        " or a name of the library. The command line reads files that refer to others."
     )
 
 
@@ -125,15 +135,25 @@ OMITTED = ("count", "muscle")
 """Fields of the command that the page does not have."""
 FIELDS = tuple(each.name for each in options_of(SizeRequest) if each.name not in OMITTED)
 """Fields of the page; each is a text as a user types it, and may be empty where it is optional."""
-MAX_CHOICES, MAX_FIELD, POINTS = 30, 60, 81
-"""Maximum number of choices that the page receives, maximum length of a field, and points of a curve (chosen)."""
+MAX_CHOICES = 30
+MAX_FIELD = 60
+POINTS = 81
+"""Maximum number of choices that the page receives, maximum length of a field, and points of a
+curve (chosen).
+"""
 
 
 def size_form() -> dict[str, Any]:
     """The fields of the form of the page: those of a lift, of a joint, and of both."""
-    fields = {each["name"]: each for each in form_fields(SizeRequest) if each["name"] not in OMITTED}
+    fields = {
+        each["name"]: each for each in form_fields(SizeRequest) if each["name"] not in OMITTED
+    }
     common = [each for name, each in fields.items() if name not in (*LIFT, *JOINT)]
-    return {"lift": [fields[name] for name in LIFT], "joint": [fields[name] for name in JOINT], "all": common}
+    return {
+        "lift": [fields[name] for name in LIFT],
+        "joint": [fields[name] for name in JOINT],
+        "all": common,
+    }
 
 
 def size_sheet(text: str) -> dict[str, Any]:
@@ -143,12 +163,18 @@ def size_sheet(text: str) -> dict[str, Any]:
     result = request.evaluate()
     chapter = result.chapter(sizing_scenario(result.choices, "in the page"))
     sheet: dict[str, Any] = {
-        "tab": "size", "name": "sizing", "provenance": "the library", "request": given, "form": size_form(),
-        "own_text": text, **as_sheet(chapter), "title": result.requirement.describe(),
+        "tab": "size",
+        "name": "sizing",
+        "provenance": "the library",
+        "request": given,
+        "form": size_form(),
+        "own_text": text,
+        **as_sheet(chapter),
+        "title": result.requirement.describe(),
         "csv": "\n".join(csv_text(table) for table in chapter.tables[1:3]),
         "choices": [_choice(choice) for choice in result.choices[:MAX_CHOICES]],
         "left_out": max(0, len(result.choices) - MAX_CHOICES),
-    }  # fmt: skip
+    }
     return {**sheet, "id": identifier_of(sheet), "script": '"use strict";\n'}
 
 
@@ -158,38 +184,61 @@ def read_request(text: str) -> dict[str, str]:
     if set(given) - set(FIELDS):
         raise ParameterError(f"the request must have the fields {', '.join(FIELDS)} and no others.")
     if not all(isinstance(value, str) and len(value) <= MAX_FIELD for value in given.values()):
-        raise ParameterError(f"the fields of the request must be texts of at most {MAX_FIELD} characters.")
+        raise ParameterError(
+            f"the fields of the request must be texts of at most {MAX_FIELD} characters."
+        )
     return {name: given.get(name, "").strip() for name in FIELDS}
 
 
 def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
-    """A choice with its scenario, or the reason why it has none, and its chart: isobars of one muscle, its capacity,
-    the load and both end points; contractions as ratios, forces in N."""
+    """A choice with its scenario, or the reason why it has none, and its chart: isobars of one
+    muscle, its capacity, the load and both end points; contractions as ratios, forces in N."""
     try:
-        scenario, reason = am.design.scenario_text(choice), ""
+        scenario = am.design.scenario_text(choice)
+        reason = ""
     except AirmuscleError as error:
-        scenario, reason = "", str(error.message)
-    entry, muscle, design, radius = choice.entry, choice.muscle, choice.design, choice.design.radius
+        scenario = ""
+        reason = str(error.message)
+    entry = choice.entry
+    muscle = choice.muscle
+    design = choice.design
+    radius = choice.design.radius
     of_radius = "" if radius is None else f", pulley radius {1e3 * radius:.4g} mm"
     label = f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}"
-    curves = compute_isobars(entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range))
+    curves = compute_isobars(
+        entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range)
+    )
     grid = np.linspace(*muscle.contraction_range, POINTS)
     points = [point._asdict() for point in (design.extended, design.contracted)]
     shown = None
     if isinstance(choice.requirement, am.design.LiftRequirement):
         displacement, load = choice.requirement.path
         contractions = design.extended.contraction + displacement / choice.length
-        shown = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),
-                 "factor": choice.conditions.safety_factor}  # fmt: skip
+        shown = {
+            "contractions": _rounded(contractions),
+            "forces": _rounded(load / choice.count),
+            "factor": choice.conditions.safety_factor,
+        }
     chart = {
-        "pressures": curves.pressures.tolist(), "contractions": _rounded(curves.contractions),
+        "pressures": curves.pressures.tolist(),
+        "contractions": _rounded(curves.contractions),
         "forces": [_rounded(row) for row in curves.forces],
         "capacity": {"contractions": _rounded(grid), "forces": _rounded(muscle.capacity(grid))},
-        "points": [{key: float(value) for key, value in point.items()} for point in points], "load": shown,
-    }  # fmt: skip
-    return {"name": entry.name, "label": label, "chart": chart, "scenario": scenario, "reason": reason}
+        "points": [{key: float(value) for key, value in point.items()} for point in points],
+        "load": shown,
+    }
+    return {
+        "name": entry.name,
+        "label": label,
+        "chart": chart,
+        "scenario": scenario,
+        "reason": reason,
+    }
 
 
 def _rounded(values: Array) -> list[float | None]:
     """Numbers for a chart: seven digits, None where there is no value."""
-    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in np.asarray(values, dtype=float)]
+    return [
+        float(f"{value:.7g}") if np.isfinite(value) else None
+        for value in np.asarray(values, dtype=float)
+    ]

@@ -1,7 +1,7 @@
 """Worker processes of the studio: tasks on texts of users, with limits of time and memory.
 
-A task that exceeds its limit of time is ended with its process; the next task starts a new one. A text of a user is
-never read in the process of the server.
+A task that exceeds its limit of time is ended with its process; the next task starts a new one. A
+text of a user is never read in the process of the server.
 """
 
 import queue
@@ -25,15 +25,22 @@ class LimitError(InputError):
 
 
 class LimitedWorker:
-    """A process that runs one task at a time, with limits of time and memory and messages for a page. `kill` ends it
-    from another thread, and the call that waits for it raises LimitError; `stop` ends it between calls."""
+    """A process that runs one task at a time, with limits of time and memory and messages for a
+    page. `kill` ends it from another thread, and the call that waits for it raises LimitError;
+    `stop` ends it between calls.
+    """
 
     def __init__(self) -> None:
         self._worker = Worker(_prepare)
-        self.kill, self.stop = self._worker.kill, self._worker.stop
+        self.kill = self._worker.kill
+        self.stop = self._worker.stop
 
-    def call(self, task: Task, arguments: tuple[Any, ...], limit: float, report: Report | None = None) -> Any:
-        """The result of `task(*arguments)`, as `Worker.call`. Raises LimitError after `limit` [s]."""
+    def call(
+        self, task: Task, arguments: tuple[Any, ...], limit: float, report: Report | None = None
+    ) -> Any:
+        """The result of `task(*arguments)`, as `Worker.call`. Raises LimitError after `limit`
+        [s].
+        """
         try:
             return self._worker.call(run_task, (task, *arguments), limit, report)
         except WorkerError as error:
@@ -43,16 +50,22 @@ class LimitedWorker:
 
 
 def run_task(task: Task, *arguments: Any) -> Any:
-    """The result of a task in a process of its own. Raises AirmuscleError with a message for the page."""
+    """The result of a task in a process of its own. Raises AirmuscleError with a message for the
+    page.
+    """
     try:
         return task(*arguments)
     except AirmuscleError:
         raise
     except MemoryError:
-        raise LimitError("the computation needs more memory than is allowed; give a smaller model or file.") from None
+        raise LimitError(
+            "the computation needs more memory than is allowed; give a smaller model or file."
+        ) from None
     except Exception as error:  # the reason belongs to the terminal of the server, not to the page
         print(printable(f"airmuscle studio: {type(error).__name__}: {error}"), file=sys.stderr)
-        raise InputError("this input cannot be processed; the terminal of the server states the reason.") from None
+        raise InputError(
+            "this input cannot be processed; the terminal of the server states the reason."
+        ) from None
 
 
 def _prepare() -> None:
@@ -68,12 +81,16 @@ def _prepare() -> None:
 
 
 SPARE = 2
-"""Number of idle workers that a pool keeps ready (chosen): two long tasks may begin at once beside a short one."""
+"""Number of idle workers that a pool keeps ready (chosen): two long tasks may begin at once beside
+a short one.
+"""
 
 
 class WorkerPool:
-    """Some workers, which are started when they are needed, one at a time, so that the first one is ready soon; with
-    `warm`, a task that a new worker runs once for its imports, SPARE more than are occupied are kept ready."""
+    """Some workers, which are started when they are needed, one at a time, so that the first one is
+    ready soon; with `warm`, a task that a new worker runs once for its imports, SPARE more than are
+    occupied are kept ready.
+    """
 
     def __init__(self, count: int, warm: Callable[[], Any] | None = None) -> None:
         self._all = [LimitedWorker() for _ in range(count)]
@@ -85,9 +102,13 @@ class WorkerPool:
             self._free.put(worker)
 
     def prepare(self, idle: int = SPARE) -> None:
-        """Start workers in a thread until some are idle, as far as there are some that were never started."""
+        """Start workers in a thread until some are idle, as far as there are some that were never
+        started.
+        """
         if self._unused and self._free.qsize() < idle:
-            threading.Thread(target=self._start, args=(idle,), name="airmuscle studio spare", daemon=True).start()
+            threading.Thread(
+                target=self._start, args=(idle,), name="airmuscle studio spare", daemon=True
+            ).start()
 
     def _start(self, idle: int) -> None:
         with self._starting:
@@ -101,7 +122,9 @@ class WorkerPool:
                 self._free.put(worker)
 
     def call(self, task: Task, *arguments: Any, limit: float) -> Any:
-        """The result of a task in a free worker. Raises what it raises, LimitError after `limit` [s]."""
+        """The result of a task in a free worker. Raises what it raises, LimitError after `limit`
+        [s].
+        """
         end = time.monotonic() + limit
         if self._free.empty():
             self.prepare()

@@ -1,4 +1,6 @@
-"""Torque of a joint: traced functions of its muscles, limits of taut ones, pressures and angles that satisfy them."""
+"""Torque of a joint: traced functions of its muscles, limits of taut ones, pressures and angles
+that satisfy them.
+"""
 
 import dataclasses
 import functools
@@ -24,9 +26,9 @@ QUANTITIES = (
     "shut_valves",
     "moment_arm",
 )
-"""Quantities of a muscle of a joint: torque Q [N m], -dQ/dtheta at constant pressure [N m/rad], their derivatives with
-respect to the pressure, tension [N], -dQ/dtheta with closed valves, that is, at constant air mass [N m/rad], and moment
-arm [m]."""
+"""Quantities of a muscle of a joint: torque Q [N m], -dQ/dtheta at constant pressure [N m/rad],
+their derivatives with respect to the pressure, tension [N], -dQ/dtheta with closed valves, that is,
+at constant air mass [N m/rad], and moment arm [m]."""
 LEVELS = 129
 """Number of pressures of each muscle at which the reachable stiffnesses are evaluated (chosen)."""
 BISECTIONS = 50
@@ -53,7 +55,8 @@ Range = tuple[float, float]
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedRow:
-    """Function of one or two arguments with several outputs, evaluated on arrays; `names` are those of the outputs.
+    """Function of one or two arguments with several outputs, evaluated on arrays; `names` are those
+    of the outputs.
 
     `affine` is whether the first output of a muscle, its torque, is affine in the pressure.
     """
@@ -64,7 +67,9 @@ class TracedRow:
     programs: dict[tuple[str, ...], ArrayProgram | None] = dataclasses.field(default_factory=dict)
 
     def __call__(self, *arguments: Array | str) -> list[Array]:
-        """The outputs whose names follow the arguments, by default all, at arguments that broadcast."""
+        """The outputs whose names follow the arguments, by default all, at arguments that
+        broadcast.
+        """
         names = tuple(each for each in arguments if isinstance(each, str)) or self.names
         columns = [self.names.index(name) for name in names]
         if names not in self.programs:
@@ -81,7 +86,9 @@ class TracedRow:
 
     @functools.cached_property
     def compiled(self) -> Function:
-        """The first five QUANTITIES of a muscle, up to the tension, compiled for several points at once."""
+        """The first five QUANTITIES of a muscle, up to the tension, compiled for several points at
+        once.
+        """
         import casadi
 
         angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
@@ -93,11 +100,15 @@ Functions = Sequence[TracedRow]
 
 
 def load_function(plant: Plant) -> TracedRow:
-    """The torque [N m] of weights, springs and stops against the angle [rad], and its derivative."""
+    """The torque [N m] of weights, springs and stops against the angle [rad], and its
+    derivative.
+    """
     import casadi
 
     angle = casadi.SX.sym("angle")
-    energy = casadi.SX(plant.mechanism.potential_energy({plant.mechanism.coordinates[0].name: angle}))
+    energy = casadi.SX(
+        plant.mechanism.potential_energy({plant.mechanism.coordinates[0].name: angle})
+    )
     torque = casadi.jacobian(energy, angle)
     row = casadi.horzcat(torque, casadi.jacobian(torque, angle))
     return TracedRow(casadi.Function("load", [angle], [casadi.densify(row)]), ("torque", "slope"))
@@ -106,12 +117,15 @@ def load_function(plant: Plant) -> TracedRow:
 def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, ...]:
     """The QUANTITIES of each muscle of a joint as functions of angle [rad] and gauge pressure [Pa].
 
-    Unless `limited`, they are those of the static tension before the limits of law and slackness are applied.
+    Unless `limited`, they are those of the static tension before the limits of law and slackness
+    are applied.
     """
     import casadi
 
     angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
-    contractions = plant.mechanism.contractions({plant.mechanism.coordinates[0].name: angle}, plant.resting_lengths)
+    contractions = plant.mechanism.contractions(
+        {plant.mechanism.coordinates[0].name: angle}, plant.resting_lengths
+    )
     functions = []
     for muscle, contraction in zip(plant.muscles, contractions, strict=True):
         length = muscle.geometry.resting_length
@@ -128,12 +142,20 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
         by_pressure = casadi.jacobian(torque, pressure)
         own: Values = muscle.steady_state(pressure, contraction)
         volume = muscle.volume(contraction, own)
-        content = plant.gas.state_at(absolute_pressure(pressure, plant.ambient), volume, plant.ambient)
+        content = plant.gas.state_at(
+            absolute_pressure(pressure, plant.ambient), volume, plant.ambient
+        )
         air = plant.gas.air(content, volume, plant.ambient)
         by_contraction = enclosed_pressure_slope(plant, muscle, contraction, volume, air, content)
         squeezed = by_pressure * by_contraction * arm / length
         row = casadi.horzcat(
-            torque, stiffness, by_pressure, casadi.jacobian(stiffness, pressure), tension, stiffness - squeezed, arm
+            torque,
+            stiffness,
+            by_pressure,
+            casadi.jacobian(stiffness, pressure),
+            tension,
+            stiffness - squeezed,
+            arm,
         )
         function = casadi.Function("torque", [angle, pressure], [casadi.densify(casadi.cse(row))])
         affine = not any(casadi.which_depends(by_pressure, pressure, 1, False))
@@ -142,57 +164,85 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
 
 
 def taut_branch(function: TracedRow, angle: Array, levels: Array) -> tuple[Array, Array]:
-    """Torque and stiffness (N, LEVELS) at pressures from that at which the muscle becomes taut, to the maximum."""
+    """Torque and stiffness (N, LEVELS) at pressures from that at which the muscle becomes taut, to
+    the maximum.
+    """
     (tension,) = function(angle[:, None], levels, "tension")
     taut = tension > 0.0
     slack = np.where(taut.any(axis=1), taut.argmax(axis=1), 0)
-    low, start = levels[np.maximum(slack - 1, 0)], levels[slack]
-    for _ in range(BISECTIONS):  # to a pressure on the taut side, because the stiffness of a slack muscle is zero
+    low = levels[np.maximum(slack - 1, 0)]
+    start = levels[slack]
+    for _ in range(
+        BISECTIONS
+    ):  # to a pressure on the taut side, because the stiffness of a slack muscle is zero
         middle = 0.5 * (low + start)
         pulls = function(angle, middle, "tension")[0] > 0.0
-        low, start = np.where(pulls, low, middle), np.where(pulls, middle, start)
+        low = np.where(pulls, low, middle)
+        start = np.where(pulls, middle, start)
     inner = start[:, None] + np.linspace(0.0, 1.0, LEVELS) * (levels[-1] - start)[:, None]
     torque, stiffness = function(angle[:, None], inner, "torque", "stiffness")
     invalid = (~taut.any(axis=1)).reshape(-1, 1)
     return np.where(invalid, np.nan, torque), np.where(invalid, np.nan, stiffness)
 
 
-def affine_candidates(unlimited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:
-    """The pressures (N, 1, 2) for laws that are affine in the pressure; NaN where they are out of range.
+def affine_candidates(
+    unlimited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array
+) -> Array:
+    """The pressures (N, 1, 2) for laws that are affine in the pressure; NaN where they are out of
+    range.
 
-    A law without its limits is solved; a muscle at a limit of its law, such as a slack one, is no solution.
+    A law without its limits is solved; a muscle at a limit of its law, such as a slack one, is no
+    solution.
     """
     zero = np.zeros(1)
-    (q, k, a, c), (other_q, other_k, b, d) = (function(angle, zero, *AT_PRESSURE) for function in unlimited)
-    x, y = torque - q - other_q, stiffness - k - other_k
+    (q, k, a, c), (other_q, other_k, b, d) = (
+        function(angle, zero, *AT_PRESSURE) for function in unlimited
+    )
+    x = torque - q - other_q
+    y = stiffness - k - other_k
     with np.errstate(all="ignore"):
         determinant = a * d - b * c
         pairs = np.stack([(d * x - b * y) / determinant, (a * y - c * x) / determinant], axis=1)
         margin = _MARGIN * (pressures[1] - pressures[0])
-        inside = np.asarray(((pairs >= pressures[0] - margin) & (pairs <= pressures[1] + margin)).all(axis=1))
+        inside = np.asarray(
+            ((pairs >= pressures[0] - margin) & (pairs <= pressures[1] + margin)).all(axis=1)
+        )
     return np.asarray(np.where(inside[:, None], np.clip(pairs, *pressures), np.nan)[:, None, :])
 
 
-def general_candidates(limited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:
-    """All pressures (N, S, 2) of any force laws, by a search in cells and Newton's method, by ascending first pressure;
-    S is the maximum number of solutions of a point, at least 1.
+def general_candidates(
+    limited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array
+) -> Array:
+    """All pressures (N, S, 2) of any force laws, by a search in cells and Newton's method, by
+    ascending first pressure; S is the maximum number of solutions of a point, at least 1.
 
-    The torques and stiffnesses at the boundaries of CELLS cells of each pressure exclude most of the CELLS^2 cells; as
-    they need not be monotonic in a cell, its range is widened by half on both sides. Newton's method starts from the
-    centre of each cell that is left. All this is compiled, several levels or cells at once.
+    The torques and stiffnesses at the boundaries of CELLS cells of each pressure exclude most of
+    the CELLS^2 cells; as they need not be monotonic in a cell, its range is widened by half on both
+    sides. Newton's method starts from the centre of each cell that is left. All this is compiled,
+    several levels or cells at once.
     """
     first, second = (function.compiled for function in limited)
     levels = np.linspace(*pressures, CELLS + 1)
     padded = np.append(levels, np.full(-levels.size % LANES, levels[-1])).reshape(-1, LANES)
-    counts, room = np.zeros(angle.size, dtype=np.int64), ROOM
+    counts = np.zeros(angle.size, dtype=np.int64)
+    room = ROOM
     work = *(aligned_array((size, LANES)) for size in (3, 5, 5)), np.zeros((2, 3, 2, CELLS))
-    cells, points = np.zeros(CELLS**2 + LANES, dtype=np.int64), [np.array(v) for v in (angle, torque, stiffness)]
+    cells = np.zeros(CELLS**2 + LANES, dtype=np.int64)
+    points = [np.array(v) for v in (angle, torque, stiffness)]
     while True:
         pairs = np.full((angle.size, room, 2), np.nan)
         pair_solutions(
-            first.address, second.address, float(pressures[0]), float(pressures[1]), *points, padded, pairs, counts,
-            *work, cells,
-        )  # fmt: skip
+            first.address,
+            second.address,
+            float(pressures[0]),
+            float(pressures[1]),
+            *points,
+            padded,
+            pairs,
+            counts,
+            *work,
+            cells,
+        )
         most = int(counts.max(initial=1))
         if most <= room:
             break
@@ -203,23 +253,35 @@ def general_candidates(limited: Functions, pressures: Range, angle: Array, torqu
 
 
 def balanced_angles(
-    torques: Functions, load_torque: TracedRow, angles: Range, pressures: tuple[Array, Array], load: Array
+    torques: Functions,
+    load_torque: TracedRow,
+    angles: Range,
+    pressures: tuple[Array, Array],
+    load: Array,
 ) -> Array:
-    """All angles (N, S) at which the muscles balance weight and load, in ascending order; NaN where there are fewer."""
+    """All angles (N, S) at which the muscles balance weight and load, in ascending order; NaN where
+    there are fewer.
+    """
 
     def excess(angle: Array, rows: Rows) -> Array:
-        carried = sum(f(angle, p[rows], "torque")[0] for f, p in zip(torques, pressures, strict=True))
+        carried = sum(
+            f(angle, p[rows], "torque")[0] for f, p in zip(torques, pressures, strict=True)
+        )
         return np.asarray(carried - load_torque(angle, "torque")[0] - load[rows])
 
     def slope(angle: Array, rows: Rows) -> Array:
-        stiffness = sum(f(angle, p[rows], "stiffness")[0] for f, p in zip(torques, pressures, strict=True))
+        stiffness = sum(
+            f(angle, p[rows], "stiffness")[0] for f, p in zip(torques, pressures, strict=True)
+        )
         return np.asarray(-stiffness - load_torque(angle, "slope")[0])
 
     grid = np.linspace(*angles, STEPS + 1)
-    values = np.concatenate([
-        excess(np.broadcast_to(grid, (part.size, grid.size)), part[:, None])
-        for part in np.array_split(np.arange(load.size), 1 + load.size // CHUNK)
-    ])  # fmt: skip
+    values = np.concatenate(
+        [
+            excess(np.broadcast_to(grid, (part.size, grid.size)), part[:, None])
+            for part in np.array_split(np.arange(load.size), 1 + load.size // CHUNK)
+        ]
+    )
     row, step = np.nonzero((values[:, :-1] > 0.0) != (values[:, 1:] > 0.0))
     roots = _bracketed_root(excess, slope, row, grid[step], grid[step + 1], values[row, step] > 0.0)
     count = np.bincount(row, minlength=load.size)
@@ -229,15 +291,20 @@ def balanced_angles(
 
 
 def _bracketed_root(
-    excess: Callable[[Array, Rows], Array], slope: Callable[[Array, Rows], Array], row: Rows, low: Array, high: Array,
+    excess: Callable[[Array, Rows], Array],
+    slope: Callable[[Array, Rows], Array],
+    row: Rows,
+    low: Array,
+    high: Array,
     positive: Mask,
-) -> Array:  # fmt: skip
+) -> Array:
     """Roots by Newton's method, with bisection where a step would leave its interval."""
     x = 0.5 * (low + high)
     for _ in range(MAX_BISECTIONS):
         value = excess(x, row)
         same = (value > 0.0) == positive
-        low, high = np.where(same, x, low), np.where(same, high, x)
+        low = np.where(same, x, low)
+        high = np.where(same, high, x)
         with np.errstate(all="ignore"):
             newton = x - value / slope(x, row)
         inside = (newton > low) & (newton < high)

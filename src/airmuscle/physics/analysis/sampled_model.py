@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import BLACK, DASHES, LINES, RED, AirmuscleError, Array, ParameterError, legend_below, new_figure
+from ...core import (
+    BLACK,
+    DASHES,
+    LINES,
+    RED,
+    AirmuscleError,
+    Array,
+    ParameterError,
+    legend_below,
+    new_figure,
+)
 
 MAX_CURVES = 7
 """Curves of one figure that can be told apart."""
@@ -17,22 +27,27 @@ NYQUIST_LIMIT = 3.0
 
 
 def bode_figure(model: Any, frequencies: Array) -> Any:
-    """A Matplotlib figure of gain and phase of every output to every input of a model at frequencies (F,) [Hz].
+    """A Matplotlib figure of gain and phase of every output to every input of a model at
+    frequencies (F,) [Hz].
 
-    The model is a LinearModel or a SampledModel. Raises ParameterError for more than MAX_CURVES pairs.
+    The model is a LinearModel or a SampledModel. Raises ParameterError for more than MAX_CURVES
+    pairs.
     """
     pairs = [(i, j) for i in range(len(model.outputs)) for j in range(len(model.inputs))]
     if not pairs or len(pairs) > MAX_CURVES:
         raise ParameterError(
-            f"bode: {len(pairs)} pairs of an input and an output; allowed range: 1 to {MAX_CURVES}. Choose them with "
-            "model.select(inputs=[...], outputs=[...])."
+            f"bode: {len(pairs)} pairs of an input and an output; allowed range: 1 to {MAX_CURVES}."
+            " Choose them with model.select(inputs=[...], outputs=[...])."
         )
     response = model.frequency_response(frequencies)
     figure, (gain, phase) = new_figure(2, 1, height=4.6, sharex=True)
     for (i, j), colour, dashes in zip(pairs, LINES, DASHES, strict=False):
-        values, label = response[:, i, j], f"{model.outputs[i]} / {model.inputs[j]}"
+        values = response[:, i, j]
+        label = f"{model.outputs[i]} / {model.inputs[j]}"
         gain.plot(frequencies, np.abs(values), color=colour, linestyle=dashes, label=label)
-        phase.plot(frequencies, np.degrees(np.unwrap(np.angle(values))), color=colour, linestyle=dashes)
+        phase.plot(
+            frequencies, np.degrees(np.unwrap(np.angle(values))), color=colour, linestyle=dashes
+        )
     gain.set(xscale="log", yscale="log", ylabel="gain")
     phase.set(xscale="log", xlabel="frequency [Hz]", ylabel="phase [deg]")
     legend_below(figure, gain, columns=2)
@@ -40,16 +55,31 @@ def bode_figure(model: Any, frequencies: Array) -> Any:
 
 
 def nyquist_figure(response: npt.NDArray[np.complex128], sensitivity_peak: float) -> Any:
-    """A Matplotlib figure of an open loop (F,) near -1, with the circle that its sensitivity peak [1] touches."""
+    """A Matplotlib figure of an open loop (F,) near -1, with the circle that its sensitivity peak
+    [1] touches.
+    """
     figure, axes = new_figure(height=4.2, width=4.6)
     inside = np.abs(response) <= NYQUIST_LIMIT
     shown = np.where(inside, response, np.nan)
     axes.plot(shown.real, shown.imag, color=LINES[0], label="open loop")
-    axes.plot(shown.real, -shown.imag, color=LINES[0], linestyle=":", linewidth=1.0, label="negative frequencies")
+    axes.plot(
+        shown.real,
+        -shown.imag,
+        color=LINES[0],
+        linestyle=":",
+        linewidth=1.0,
+        label="negative frequencies",
+    )
     turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
     axes.plot(turn.real, turn.imag, color=BLACK, linestyle="--", linewidth=0.8, label="gain 1")
     circle = -1.0 + turn / sensitivity_peak
-    axes.plot(circle.real, circle.imag, color=RED, linewidth=0.9, label=f"sensitivity {sensitivity_peak:.3g}")
+    axes.plot(
+        circle.real,
+        circle.imag,
+        color=RED,
+        linewidth=0.9,
+        label=f"sensitivity {sensitivity_peak:.3g}",
+    )
     axes.plot([-1.0], [0.0], "+", color=RED, markersize=9)
     axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
     legend_below(figure, axes, columns=2)
@@ -58,7 +88,8 @@ def nyquist_figure(response: npt.NDArray[np.complex128], sensitivity_peak: float
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SampledModel:
-    """x_(k+1) = A x_k + B u_k,  y_k = C x_k + D u_k, with inputs that are held over a sample time [s].
+    """x_(k+1) = A x_k + B u_k,  y_k = C x_k + D u_k, with inputs that are held over a sample time
+    [s].
 
     A, B, C, D    (n, n), (n, m), (k, n), (k, m)
     states, inputs, outputs    names, in the order of rows and columns
@@ -85,16 +116,19 @@ class SampledModel:
         return 0.5 / self.sample_time
 
     def frequency_response(self, frequencies: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-        """H(z) = C (z I - A)^-1 B + D at z = exp(j 2 pi f h), frequencies f (F,) [Hz], of shape (F, k, m).
+        """H(z) = C (z I - A)^-1 B + D at z = exp(j 2 pi f h), frequencies f (F,) [Hz], of shape (F,
+        k, m).
 
-        Raises ParameterError for a frequency that is negative or not finite, and at a pole on the unit circle.
+        Raises ParameterError for a frequency that is negative or not finite, and at a pole on the
+        unit circle.
         """
         points = checked_frequencies(frequencies)
         return responses_at(self, np.exp(2j * math.pi * points * self.sample_time), points)
 
     def response(self, inputs: npt.ArrayLike) -> Array:
         """The outputs (K, k) at the samples for inputs (K, m) from rest."""
-        state, rows = np.zeros(len(self.A)), []
+        state = np.zeros(len(self.A))
+        rows = []
         for u in np.asarray(inputs, dtype=float).reshape(-1, len(self.inputs)):
             rows.append(self.C @ state + self.D @ u)
             state = self.A @ state + self.B @ u
@@ -105,16 +139,20 @@ class SampledModel:
         return control_model(self, self.sample_time)
 
 
-def responses_at(model: Any, points: npt.NDArray[np.complex128], frequencies: Array) -> npt.NDArray[np.complex128]:
-    """C (s I - A)^-1 B + D (F, k, m) of a model at points s (F,), which belong to frequencies (F,) [Hz]."""
+def responses_at(
+    model: Any, points: npt.NDArray[np.complex128], frequencies: Array
+) -> npt.NDArray[np.complex128]:
+    """C (s I - A)^-1 B + D (F, k, m) of a model at points s (F,), which belong to frequencies (F,)
+    [Hz].
+    """
     matrices = points[:, None, None] * np.eye(len(model.A)) - model.A
     try:
         states = np.linalg.solve(matrices, np.broadcast_to(model.B, (len(points), *model.B.shape)))
     except np.linalg.LinAlgError:
         f = frequencies[int(np.argmin(np.abs(np.linalg.det(matrices))))]
         raise ParameterError(
-            f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for enclosed air at "
-            "0 Hz). Choose another frequency."
+            f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for"
+            " enclosed air at 0 Hz). Choose another frequency."
         ) from None
     return np.asarray(model.C @ states + model.D, dtype=complex).reshape(-1, *model.D.shape)
 
@@ -125,14 +163,18 @@ def checked_frequencies(frequencies: npt.ArrayLike) -> Array:
     wrong = points[~(np.isfinite(points) & (points >= 0))]
     if wrong.size:
         raise ParameterError(
-            f"frequency_response: a frequency is {float(wrong[0])!r} Hz; it must be finite and not negative."
+            f"frequency_response: a frequency is {float(wrong[0])!r} Hz; it must be finite and not"
+            " negative."
         )
     return points
 
 
 def control_model(model: Any, sample_time: float | None = None) -> Any:
-    """A control.StateSpace of a model, with its names; raises AirmuscleError without the package `control`."""
-    control, names = imported_control(), control_names(model)
+    """A control.StateSpace of a model, with its names; raises AirmuscleError without the package
+    `control`.
+    """
+    control = imported_control()
+    names = control_names(model)
     return control.StateSpace(model.A, model.B, model.C, model.D, sample_time or 0, **names)
 
 
@@ -148,17 +190,26 @@ def imported_control() -> Any:
 
 
 def control_names(model: Any) -> dict[str, list[str]]:
-    """The names of states, inputs and outputs, as python-control takes them: a dot would separate systems."""
-    kinds: dict[str, Sequence[str]] = {"states": model.states, "inputs": model.inputs, "outputs": model.outputs}
+    """The names of states, inputs and outputs, as python-control takes them: a dot would separate
+    systems.
+    """
+    kinds: dict[str, Sequence[str]] = {
+        "states": model.states,
+        "inputs": model.inputs,
+        "outputs": model.outputs,
+    }
     return {kind: [name.replace(".", "_") for name in given] for kind, given in kinds.items()}
 
 
 def held(a: Array, b: Array, duration: float) -> tuple[Array, Array]:
-    """exp(A t) (n, n), and the integral of exp(A s) B over a duration t [s] (n, m): the effect of held inputs."""
+    """exp(A t) (n, n), and the integral of exp(A s) B over a duration t [s] (n, m): the effect of
+    held inputs.
+    """
     from scipy.linalg import expm, matrix_balance
 
     n, m = b.shape
-    # states of units as different as kilograms of air and pascals: scaled, the exponential keeps its digits
+    # states of units as different as kilograms of air and pascals: scaled, the exponential keeps
+    # its digits
     both = np.block([[a, b], [np.zeros((m, n + m))]]) * duration
     balanced, (scale, _) = matrix_balance(both, permute=False, separate=True)
     both = expm(balanced) * scale[:, None] / scale
@@ -166,34 +217,45 @@ def held(a: Array, b: Array, duration: float) -> tuple[Array, Array]:
 
 
 def sampled(model: Any, sample_time: float, *, before: bool = False) -> SampledModel:
-    """A LinearModel between samples, exact for held inputs that arrive after their delays, also parts of a sample.
+    """A LinearModel between samples, exact for held inputs that arrive after their delays, also
+    parts of a sample.
 
-    before  whether outputs are those just before a sample, on which its input has no influence even without a delay
+    before  whether outputs are those just before a sample, on which its input has no influence even
+    without a delay
 
     A delay tau = d h + theta, 0 <= theta < h, of an input u is
 
         x_(k+1) = exp(A h) x_k + exp(A (h - theta)) G(theta) u_(k-d-1) + G(h - theta) u_(k-d),
         G(t) = integral of exp(A s) B ds from 0 to t,
 
-    with the last values of u as further states, `u.1` the newest. Raises ParameterError for a sample time that is not
-    positive.
+    with the last values of u as further states, `u.1` the newest. Raises ParameterError for a
+    sample time that is not positive.
     """
     if not 0 < sample_time < math.inf:
-        raise ParameterError(f"the sample time is {sample_time!r} s; it must be positive and finite.")
-    n, columns = len(model.states), []
+        raise ParameterError(
+            f"the sample time is {sample_time!r} s; it must be positive and finite."
+        )
+    n = len(model.states)
+    columns = []
     for name in model.inputs:
         whole, rest = divided(float(model.delays.get(name, 0.0)), sample_time)
         columns.append((whole, rest, whole + (1 if rest > 0 or before else 0)))
     total = n + sum(length for *_, length in columns)
-    a, b = np.zeros((total, total)), np.zeros((total, len(columns)))
-    c, d = np.zeros((len(model.outputs), total)), np.zeros((len(model.outputs), len(columns)))
-    a[:n, :n], c[:, :n] = held(model.A, model.B[:, :0], sample_time)[0], model.C
-    names, place = list(model.states), n
+    a = np.zeros((total, total))
+    b = np.zeros((total, len(columns)))
+    c = np.zeros((len(model.outputs), total))
+    d = np.zeros((len(model.outputs), len(columns)))
+    a[:n, :n] = held(model.A, model.B[:, :0], sample_time)[0]
+    c[:, :n] = model.C
+    names = list(model.states)
+    place = n
     for j, (whole, rest, length) in enumerate(columns):
         # where the values of each age stand: age 0 is the present input
         at = {0: b[:, j], **{age: a[:, place + age - 1] for age in range(1, length + 1)}}
         feed = {0: d[:, j], **{age: c[:, place + age - 1] for age in range(1, length + 1)}}
-        (_, late), (moved, early) = (held(model.A, model.B[:, j : j + 1], t) for t in (rest, sample_time - rest))
+        (_, late), (moved, early) = (
+            held(model.A, model.B[:, j : j + 1], t) for t in (rest, sample_time - rest)
+        )
         at[whole][:n] += early[:, 0]
         if rest > 0:
             at[whole + 1][:n] += (moved @ late)[:, 0]
@@ -213,14 +275,20 @@ def divided(delay: float, sample_time: float) -> tuple[int, float]:
 
 
 def pade(delay: float, order: int) -> tuple[Array, Array, Array, float]:
-    """A (p, p), b (p,), c (p,), d of the Pade approximation exp(-s T) = P(-s)/P(s) of a delay [s] in state space."""
+    """A (p, p), b (p,), c (p,), d of the Pade approximation exp(-s T) = P(-s)/P(s) of a delay [s]
+    in state space.
+    """
     factorial = math.factorial
-    # P(s T) = sum of these times (s T)^k, the last one 1; controllable canonical form in the time t/T
-    below = np.array([factorial(2 * order - k) / (factorial(order - k) * factorial(k)) for k in range(order + 1)])
+    # P(s T) = sum of these times (s T)^k, the last one 1; controllable canonical form in the time
+    # t/T
+    below = np.array(
+        [factorial(2 * order - k) / (factorial(order - k) * factorial(k)) for k in range(order + 1)]
+    )
     below /= below[-1]
     above = below * (-1.0) ** np.arange(order + 1)
     a = np.eye(order, k=1)
     a[-1] = -below[:-1]
-    b, d = np.zeros(order), float(above[-1])
+    b = np.zeros(order)
+    d = float(above[-1])
     b[-1] = 1.0
     return a / delay, b / delay, above[:-1] - d * below[:-1], d

@@ -1,4 +1,6 @@
-"""Equilibria of a plant, and the stable equilibrium nearest to full length of each of many plants."""
+"""Equilibria of a plant, and the stable equilibrium nearest to full length of each of many
+plants.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -7,7 +9,15 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ...core import AirmuscleError, Array, EquilibriumError, ParameterError, System, one_line, quantity
+from ...core import (
+    AirmuscleError,
+    Array,
+    EquilibriumError,
+    ParameterError,
+    System,
+    one_line,
+    quantity,
+)
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.inputs import check_input_names
 from ..plant.static_plant import StaticPlant
@@ -20,31 +30,38 @@ MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 
 
 def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[str, float]:
-    """Every input of a system, 0 unless given. Raises ParameterError for an unknown name or one beyond its range."""
+    """Every input of a system, 0 unless given. Raises ParameterError for an unknown name or one
+    beyond its range.
+    """
     given = dict(inputs or {})
     check_input_names(list(given), system.inputs)
     for variable in system.input_variables:
         value = given.get(variable.name, 0.0)
         if isinstance(value, str) or not np.ndim(value) == 0 or not np.isfinite(value):
             raise ParameterError(
-                f"the input '{variable.name}' is {value!r}; it must be one finite number, in SI units."
+                f"the input '{variable.name}' is {value!r}; it must be one finite number, in SI"
+                " units."
             )
         if not variable.minimum <= value <= variable.maximum:
             unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
             raise ParameterError(
-                f"the input '{variable.name}' is {value:g}{unit}; allowed range: {variable.minimum:g} to "
-                f"{variable.maximum:g}{unit} ({variable.meaning})."
+                f"the input '{variable.name}' is {value:g}{unit}; allowed range:"
+                f" {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
             )
     return {name: float(given.get(name, 0.0)) for name in system.inputs}
 
 
 TABLE_SIZE = 500_000
-"""Size of a table of states of several plants; a greater one takes memory and saves little time (measured)."""
+"""Size of a table of states of several plants; a greater one takes memory and saves little time
+(measured).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class Equilibrium:
-    """One equilibrium: its state, and whether it is stable for small displacements of the mechanism."""
+    """One equilibrium: its state, and whether it is stable for small displacements of the
+    mechanism.
+    """
 
     state: dict[str, float]
     stable: bool
@@ -57,29 +74,39 @@ def find_equilibria(
     air_mass: MuscleValues = None,
     inputs: Mapping[str, float] | None = None,
 ) -> tuple[Equilibrium, ...]:
-    """Static equilibria for given pressures or air masses of the muscles, sorted by ascending coordinates.
+    """Static equilibria for given pressures or air masses of the muscles, sorted by ascending
+    coordinates.
 
-    pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each; also texts with a unit
-    air_mass   alternatively: mass of the air [kg] with closed valves; the gas law determines the pressure at the
+    pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each;
+    also texts with a unit air_mass   alternatively: mass of the air [kg] with closed valves; the
+    gas law determines the pressure at the
                temperature of the air at rest
     inputs     0 by default, so that a latch is open
 
-    Walls, series springs, tubes and tanks are in steady state, friction and creep relaxed. `stable` follows from the
-    eigenvalues of the motion, without friction, at constant pressure or with enclosed air.
+    Walls, series springs, tubes and tanks are in steady state, friction and creep relaxed. `stable`
+    follows from the eigenvalues of the motion, without friction, at constant pressure or with
+    enclosed air.
 
-    With one coordinate, the whole range of the muscles is searched; a pair of equilibria closer than 1/100 of the range
-    is found by the extremum of the force between them. With several, Newton's method starts from many points and may
-    miss an equilibrium to which none of them converges. Raises ParameterError or UnitError for invalid values,
-    GeometryLimitError if the mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every
-    position is an equilibrium.
+    With one coordinate, the whole range of the muscles is searched; a pair of equilibria closer
+    than 1/100 of the range is found by the extremum of the force between them. With several,
+    Newton's method starts from many points and may miss an equilibrium to which none of them
+    converges. Raises ParameterError or UnitError for invalid values, GeometryLimitError if the
+    mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every position
+    is an equilibrium.
     """
     one = _statics(plant, pressure, air_mass, inputs)
     rows, x = _balances(one)
     count = len(one.plants.mechanism.coordinates)
     if not rows.size and count < 2:
         everywhere = grid(one) if count else None
-        f = np.empty(0) if everywhere is None else one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None])
-        if not f.size or (f == 0.0).any():  # without a permitted position, or in equilibrium everywhere
+        f = (
+            np.empty(0)
+            if everywhere is None
+            else one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None])
+        )
+        if (
+            not f.size or (f == 0.0).any()
+        ):  # without a permitted position, or in equilibrium everywhere
             raise no_equilibrium(one)
     states, stable = _judged(one, rows, x)
     named = (dict(zip(one.names, state.tolist(), strict=True)) for state in states)
@@ -93,10 +120,11 @@ def find_equilibrium(
     air_mass: MuscleValues = None,
     inputs: Mapping[str, float] | None = None,
 ) -> dict[str, float]:
-    """The stable equilibrium whose muscles are nearest to full length; arguments are those of `find_equilibria`.
+    """The stable equilibrium whose muscles are nearest to full length; arguments are those of
+    `find_equilibria`.
 
-    Nearest to full length is the smallest sum of squared contractions. Raises EquilibriumError, with the muscles and
-    their forces, if no stable equilibrium is found.
+    Nearest to full length is the smallest sum of squared contractions. Raises EquilibriumError,
+    with the muscles and their forces, if no stable equilibrium is found.
     """
     one = _statics(plant, pressure, air_mass, inputs)
     state = _nearest(one)[0]
@@ -108,19 +136,24 @@ def find_equilibrium(
 def find_equilibrium_of_each(
     compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
 ) -> Array:
-    """The states (N, n) of `find_equilibrium` for plants of one structure with parameters (N, P); NaN if none exists.
+    """The states (N, n) of `find_equilibrium` for plants of one structure with parameters (N, P);
+    NaN if none exists.
 
-    The gauge pressures [Pa] of the muscles and the inputs (m,) are the same for all; `compiled` is any of the plants.
+    The gauge pressures [Pa] of the muscles and the inputs (m,) are the same for all; `compiled` is
+    any of the plants.
     """
     size = len(compiled.description.state_names)
-    table, block = np.full((len(parameters), size), np.nan), max(1, TABLE_SIZE // (GRID_POINTS * size))
+    table = np.full((len(parameters), size), np.nan)
+    block = max(1, TABLE_SIZE // (GRID_POINTS * size))
     for begin in range(0, len(parameters), block):
         part = slice(begin, begin + block)
         table[part] = _each_nearest(compiled, parameters[part], pressures, inputs)
     return table
 
 
-def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> Array:
+def _each_nearest(
+    compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
+) -> Array:
     try:
         return _nearest(Statics.of_plants(compiled, parameters, pressures, inputs))
     except (TypeError, ValueError, ArithmeticError, AirmuscleError):  # one of the plants is invalid
@@ -130,35 +163,54 @@ def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[
 
 
 def _statics(
-    plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues, inputs: Mapping[str, float] | None
+    plant: StaticPlant,
+    pressure: MuscleValues,
+    air_mass: MuscleValues,
+    inputs: Mapping[str, float] | None,
 ) -> Statics:
     """The arguments as a table of one plant. Raises ParameterError or UnitError."""
     if (pressure is None) == (air_mass is None):
-        raise ParameterError("find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
-    name, given, unit = ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
+        raise ParameterError(
+            "find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles."
+        )
+    name, given, unit = (
+        ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
+    )
     where = f"find_equilibrium: {name}"
-    several: Sequence[Any] = given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
+    several: Sequence[Any] = (
+        given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
+    )
     ambient = plant.ambient.pressure
-    values = [quantity(v, unit, ambient=ambient, where=where) if isinstance(v, str) else v for v in several]
+    values = [
+        quantity(v, unit, ambient=ambient, where=where) if isinstance(v, str) else v
+        for v in several
+    ]
     if len(values) != len(plant.muscles):
         raise ParameterError(
-            f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."
+            f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)}"
+            " muscles."
         )
     for value in values:
         if not isinstance(value, float | int | np.floating) or not np.isfinite(value):
             names = ", ".join(prefix.removesuffix(".") for prefix in plant.prefixes)
             raise ParameterError(
-                f"find_equilibrium: {name} is {one_line(value)}; it must be a finite number in {unit}"
+                f"find_equilibrium: {name} is {one_line(value)}; it must be a finite number in"
+                f" {unit}"
                 f"{f', or a tuple with the values of {names}' if len(plant.muscles) > 1 else ''}."
             )
         if air_mass is not None and not value > 0:
-            raise ParameterError(f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0.")
+            raise ParameterError(
+                f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0."
+            )
     air = tuple(float(value) for value in values if value is not None)
-    commands, compiled = np.array(list(complete_inputs(plant, inputs).values()), dtype=float), compile_system(plant)
+    commands = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
+    compiled = compile_system(plant)
     one = Statics.of_plants(compiled, compiled.parameters[None], air, commands, pressure is None)
     if not one.shut and not one.allowed().all():
         plant.state_at(pressure=air)
-        raise EquilibriumError(f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed.")
+        raise EquilibriumError(
+            f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed."
+        )
     return one
 
 
@@ -169,7 +221,9 @@ def _balances(statics: Statics) -> tuple[Rows, Array]:
         return equilibria_of_one_coordinate(statics)
     if count > 1:
         return equilibria_of_several_coordinates(statics)
-    possible = np.isfinite(statics.states(np.empty((len(statics.parameters), 1, 0)))[:, 0]).all(axis=1)
+    possible = np.isfinite(statics.states(np.empty((len(statics.parameters), 1, 0)))[:, 0]).all(
+        axis=1
+    )
     rows = np.flatnonzero(possible)
     return rows, np.empty((rows.size, 0))
 
@@ -180,11 +234,15 @@ def _judged(statics: Statics, rows: Rows, x: Array) -> tuple[Array, npt.NDArray[
         return np.empty((0, len(statics.names))), np.empty(0, dtype=bool)
     there = statics.of(rows)
     states = there.states(x[:, None])[:, 0]
-    return states, are_stable(there.compiled, there.parameters, states, there.inputs, shut=there.shut)
+    return states, are_stable(
+        there.compiled, there.parameters, states, there.inputs, shut=there.shut
+    )
 
 
 def _nearest(statics: Statics) -> Array:
-    """State (N, n) of the stable equilibrium nearest to full length of each plant; NaN if none exists."""
+    """State (N, n) of the stable equilibrium nearest to full length of each plant; NaN if none
+    exists.
+    """
     table = np.full((len(statics.parameters), len(statics.names)), np.nan)
     rows = np.flatnonzero(statics.allowed())
     if not rows.size:

@@ -1,4 +1,6 @@
-"""Equilibria of plants with one coordinate: grid over the permitted range, and roots between its points."""
+"""Equilibria of plants with one coordinate: grid over the permitted range, and roots between its
+points.
+"""
 
 import functools
 from collections.abc import Callable
@@ -11,10 +13,12 @@ from .statics import Rows, Statics
 
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 JUMP = 1e-6
-"""Residual at a root relative to the median of all points; with a greater residual, the sign changes by a
-discontinuity (chosen)."""
+"""Residual at a root relative to the median of all points; with a greater residual, the sign
+changes by a discontinuity (chosen)."""
 CLOSE = 1e-13
-"""Step at which a root search ends, relative to the initial interval; the remaining error is far smaller (chosen)."""
+"""Step at which a root search ends, relative to the initial interval; the remaining error is far
+smaller (chosen).
+"""
 GRID_POINTS = 101
 """Number of points that are evaluated between the ends of the range."""
 
@@ -29,7 +33,9 @@ def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
     plain = np.flatnonzero(((f != 0.0) & np.isfinite(f)).any(axis=1))
     if not plain.size:
         return plain, np.empty((0, 1))
-    balanced, place = balances(statics if plain.size == len(f) else statics.of(plain), x[plain], f[plain])
+    balanced, place = balances(
+        statics if plain.size == len(f) else statics.of(plain), x[plain], f[plain]
+    )
     return plain[balanced], place[:, None]
 
 
@@ -60,7 +66,9 @@ def grid(statics: Statics) -> Array:
 
 
 def _ends_if_linear(plants: Statics) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Both ends of the range (N,), and whether the contractions are linear functions of the coordinate."""
+    """Both ends of the range (N,), and whether the contractions are linear functions of the
+    coordinate.
+    """
     size, low, high = plants.limits(0)
     linear = np.ones(size.shape, dtype=bool)
     at = [plants.contractions(_places(k * size)) for k in (0.0, 1.0, -3.0)]
@@ -82,7 +90,9 @@ def _inside(plants: Statics) -> Array:
     inside = plants.within_reach(_places(x))
     rows, i = np.nonzero(inside[:, :-1] != inside[:, 1:])
     first = inside[rows, i]
-    edges = _edges(plants.of(rows), *(np.where(first, x[rows, i + k], x[rows, i + 1 - k]) for k in (0, 1)))
+    edges = _edges(
+        plants.of(rows), *(np.where(first, x[rows, i + k], x[rows, i + 1 - k]) for k in (0, 1))
+    )
     columns = np.full((len(x), np.bincount(rows, minlength=1).max(initial=0)), np.nan)
     columns[rows, np.arange(rows.size) - np.searchsorted(rows, rows)] = edges
     places = np.sort(np.hstack([np.where(inside, x, np.nan), columns]), axis=1)
@@ -95,15 +105,18 @@ def _edges(plants: Statics, inside: Array, outside: Array) -> Array:
     for _ in range(60 if inside.size else 0):
         middle = 0.5 * (inside + outside)
         there = plants.within_reach(_places(middle))[:, 0]
-        inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
+        inside = np.where(there, middle, inside)
+        outside = np.where(there, outside, middle)
     return inside
 
 
 def balances(plants: Statics, x: Array, f: Array) -> tuple[Rows, Array]:
-    """Rows of the plants and coordinates of all roots, in ascending order, from accelerations f (N, K) at ascending x.
+    """Rows of the plants and coordinates of all roots, in ascending order, from accelerations f (N,
+    K) at ascending x.
 
-    Roots are the points with f = 0 (both ends of an interval with f = 0), one point between neighbours of different
-    sign, and two points where f crosses zero twice between neighbours of equal sign.
+    Roots are the points with f = 0 (both ends of an interval with f = 0), one point between
+    neighbours of different sign, and two points where f crosses zero twice between neighbours of
+    equal sign.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
@@ -127,12 +140,15 @@ def balances(plants: Statics, x: Array, f: Array) -> tuple[Rows, Array]:
 
 
 def _roots(plants: Statics, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
-    """The roots between points of different sign; there is none where the function passes through infinity."""
+    """The roots between points of different sign; there is none where the function passes through
+    infinity.
+    """
     if not rows.size:
         return rows, low
     there = plants.of(rows)
     root = between(there, low, high)
-    left, size = np.abs(_accelerations(there, root)), np.abs(f)[rows]
+    left = np.abs(_accelerations(there, root))
+    size = np.abs(f)[rows]
     kept = left <= JUMP * np.nanmin(size, axis=1)
     doubtful = np.flatnonzero(~kept)
     kept[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
@@ -140,10 +156,16 @@ def _roots(plants: Statics, f: Array, rows: Rows, low: Array, high: Array) -> tu
 
 
 def between(plants: Statics, low: Array, high: Array) -> Array:
-    """The roots between points (R,) of different sign by the false position method (Illinois variant)."""
-    at_low, at_high, last = _accelerations(plants, low), _accelerations(plants, high), low
+    """The roots between points (R,) of different sign by the false position method (Illinois
+    variant).
+    """
+    at_low = _accelerations(plants, low)
+    at_high = _accelerations(plants, high)
+    last = low
     close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
-    rows, roots, ended = np.arange(low.size), low.copy(), np.zeros(low.size, dtype=bool)
+    rows = np.arange(low.size)
+    roots = low.copy()
+    ended = np.zeros(low.size, dtype=bool)
     for _ in range(200):
         with np.errstate(all="ignore"):
             crossing = low + (high - low) * at_low / (at_low - at_high)
@@ -151,32 +173,50 @@ def between(plants: Statics, low: Array, high: Array) -> Array:
         middle = np.where(np.isfinite(crossing), np.clip(crossing, low, high), 0.5 * (low + high))
         at = _accelerations(plants, middle)
         roots[rows] = np.where(ended, roots[rows], middle)
-        ended |= (at == 0.0) | (np.abs(middle - last) <= close[rows]) | ~((low < middle) & (middle < high))
+        ended |= (
+            (at == 0.0)
+            | (np.abs(middle - last) <= close[rows])
+            | ~((low < middle) & (middle < high))
+        )
         if ended.all():
             break
-        replaces_low = at * at_low > 0.0  # the value at an end that is retained twice is halved (Illinois)
+        replaces_low = (
+            at * at_low > 0.0
+        )  # the value at an end that is retained twice is halved (Illinois)
         at_low = np.where(replaces_low, at, at_low * np.where(last >= high, 0.5, 1.0))
         at_high = np.where(replaces_low, at_high * np.where(last <= low, 0.5, 1.0), at)
-        low, high, last = np.where(replaces_low, middle, low), np.where(replaces_low, high, middle), middle
+        low = np.where(replaces_low, middle, low)
+        high = np.where(replaces_low, high, middle)
+        last = middle
         if 2 * ended.sum() > ended.size:  # continue with the unfinished rows only
             kept = np.flatnonzero(~ended)
-            plants, rows, ended = plants.of(kept), rows[kept], ended[kept]
+            plants = plants.of(kept)
+            rows = rows[kept]
+            ended = ended[kept]
             low, high, at_low, at_high, last = (v[kept] for v in (low, high, at_low, at_high, last))
     return roots
 
 
-def _pairs(plants: Statics, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
-    """The two roots between three points x (3, R) of equal sign, if the function crosses zero twice there."""
+def _pairs(
+    plants: Statics, f: Array, rows: Rows, x: Array, sign: Array
+) -> list[tuple[Rows, Array]]:
+    """The two roots between three points x (3, R) of equal sign, if the function crosses zero twice
+    there.
+    """
     if not rows.size:
         return []
     turn = _across(functools.partial(_accelerations, plants.of(rows)), x[0], x[2], sign)
     there = np.isfinite(turn)
-    rows, x, turn = rows[there], x[:, there], turn[there]
+    rows = rows[there]
+    x = x[:, there]
+    turn = turn[there]
     return [_roots(plants, f, rows, low, high) for low, high in ((x[0], turn), (turn, x[2]))]
 
 
 def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:
-    """A point between two at which the function has the opposite sign, by golden-section search; NaN without one."""
+    """A point between two at which the function has the opposite sign, by golden-section search;
+    NaN without one.
+    """
     inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
     values = np.stack([sign * function(v) for v in inner])
     turn = np.full(low.shape, np.nan)
@@ -186,8 +226,10 @@ def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: A
         if np.isfinite(turn).all():
             break
         left = values[0] < values[1]
-        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
-        kept, of_kept = np.where(left, inner[0], inner[1]), np.where(left, values[0], values[1])
+        low = np.where(left, low, inner[0])
+        high = np.where(left, inner[1], high)
+        kept = np.where(left, inner[0], inner[1])
+        of_kept = np.where(left, values[0], values[1])
         asked = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
         at = sign * function(asked)
         inner = np.stack([np.where(left, asked, kept), np.where(left, kept, asked)])

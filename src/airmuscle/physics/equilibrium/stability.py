@@ -1,4 +1,6 @@
-"""Stability of equilibria, messages where there is none, and equilibria of several coordinates by Newton's method."""
+"""Stability of equilibria, messages where there is none, and equilibria of several coordinates by
+Newton's method.
+"""
 
 import weakref
 from typing import Any
@@ -13,22 +15,29 @@ from .single_dof import grid
 from .statics import MAX_PRESSURE, Rows, Statics
 
 MARGIN = 1e-9
-"""Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero (chosen)."""
+"""Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero
+(chosen).
+"""
 _functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
 
 
 def are_stable(
     compiled: CompiledSystem, parameters: Array, states: Array, inputs: Array, *, shut: bool = False
 ) -> npt.NDArray[np.bool_]:
-    """Whether no eigenvalue of the motion has a positive real part, for plants with parameters (R, P) at states (R, n).
+    """Whether no eigenvalue of the motion has a positive real part, for plants with parameters (R,
+    P) at states (R, n).
 
-    The motion is that of coordinates, series springs, creep and walls. At given pressures, the states of the air
-    are proportional to the volume, m = m_0 V/V_0; with `shut` valves they are constant. Friction is excluded, because
-    it would hold any position. A state without finite derivatives is not stable.
+    The motion is that of coordinates, series springs, creep and walls. At given pressures, the
+    states of the air are proportional to the volume, m = m_0 V/V_0; with `shut` valves they are
+    constant. Friction is excluded, because it would hold any position. A state without finite
+    derivatives is not stable.
     """
-    plant, names = compiled.system, [s.name for s in compiled.system.states]
+    plant = compiled.system
+    names = [s.name for s in compiled.system.states]
     assert isinstance(plant, StaticPlant)
-    air, friction, moving = set[str](), set[str](), {n for c in plant.mechanism.coordinates for n in (c.name, c.speed)}
+    air = set[str]()
+    friction = set[str]()
+    moving = {n for c in plant.mechanism.coordinates for n in (c.name, c.speed)}
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
         air |= {prefix + s.name for s in air_states(muscle, plant.gas, plant.ambient)}
         friction |= {prefix + s.name for s in muscle.friction.states}
@@ -54,34 +63,46 @@ def are_stable(
 def _slopes(
     compiled: CompiledSystem, free: list[int], parameters: Array, states: Array, inputs: Array
 ) -> tuple[Array, Array, Array]:
-    """Jacobian of the rates of f states (R, f, n), the volumes of the muscles (R, k), and their Jacobian (R, k, n)."""
+    """Jacobian of the rates of f states (R, f, n), the volumes of the muscles (R, k), and their
+    Jacobian (R, k, n).
+    """
     count, size = states.shape
-    results = _function(compiled, free)(states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T)
+    results = _function(compiled, free)(
+        states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T
+    )
     by_state, volumes, growths = (r.full() for r in results)
     stacked = [part.reshape(-1, count, size).transpose(1, 0, 2) for part in (by_state, growths)]
     return stacked[0], volumes.T, stacked[1]
 
 
 def _function(compiled: CompiledSystem, free: list[int]) -> Any:
-    """(x, u, p) -> (df/dx of the states of the motion, V, dV/dx), differentiated once for each structure."""
-    program, plant = compiled.program, compiled.system
+    """(x, u, p) -> (df/dx of the states of the motion, V, dV/dx), differentiated once for each
+    structure.
+    """
+    program = compiled.program
+    plant = compiled.system
     assert isinstance(plant, StaticPlant)
     if program not in _functions:
         import casadi
 
         t = program.traced
-        volumes = casadi.vertcat(*(t.o[compiled.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes))
+        volumes = casadi.vertcat(
+            *(t.o[compiled.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes)
+        )
         wanted = [casadi.jacobian(t.f[free], t.x), volumes, casadi.jacobian(volumes, t.x)]
         _functions[program] = casadi.Function("motion", [t.x, t.u, t.p], casadi.cse(wanted))
     return _functions[program]
 
 
 def no_equilibrium(one: Statics) -> PhysicsError:
-    """The error for one plant without a stable equilibrium, with the forces at both ends of its range.
+    """The error for one plant without a stable equilibrium, with the forces at both ends of its
+    range.
 
-    GeometryLimitError if no position is within the limits of all muscles, EquilibriumError otherwise.
+    GeometryLimitError if no position is within the limits of all muscles, EquilibriumError
+    otherwise.
     """
-    kind, count = type(one.plants.mechanism).__name__, len(one.plants.mechanism.coordinates)
+    kind = type(one.plants.mechanism).__name__
+    count = len(one.plants.mechanism.coordinates)
     if count == 0:
         return EquilibriumError(_without_coordinates(one))
     x = grid(one)[0][:, None] if count == 1 else starts(one)
@@ -89,24 +110,32 @@ def no_equilibrium(one: Statics) -> PhysicsError:
     if count == 1 and not len(x):
         muscles = ", ".join(m.name for m in one.separate[0].muscles)
         return GeometryLimitError(
-            f"{kind} has no position within the contraction limits of {muscles}; change offsets, radius or arms."
+            f"{kind} has no position within the contraction limits of {muscles}; change offsets,"
+            " radius or arms."
         )
     f = one.accelerations(x[None])[0] if len(x) else x
-    x, f = x[np.isfinite(f).all(axis=1)], f[np.isfinite(f).all(axis=1)]
+    x = x[np.isfinite(f).all(axis=1)]
+    f = f[np.isfinite(f).all(axis=1)]
     if not len(x):
-        return EquilibriumError(f"{kind} has no equilibrium: no position permits the given air masses.")
+        return EquilibriumError(
+            f"{kind} has no equilibrium: no position permits the given air masses."
+        )
     if not f.any():
         return EquilibriumError(
-            f"{kind} is in equilibrium at every position: no force acts on it under these inputs. Choose an initial "
-            f"state by plant.state_at(pressure=..., {one.plants.mechanism.coordinates[0].name}=...)."
+            f"{kind} is in equilibrium at every position: no force acts on it under these inputs."
+            " Choose an initial state by plant.state_at(pressure=...,"
+            f" {one.plants.mechanism.coordinates[0].name}=...)."
         )
     if count == 1:
-        places, load = [x[0], x[-1]], _required_tension(one, x[0])
+        places = [x[0], x[-1]]
+        load = _required_tension(one, x[0])
     else:
-        places, load = [x[int(np.argmin(np.abs(f).max(axis=1)))]], ""
+        places = [x[int(np.argmin(np.abs(f).max(axis=1)))]]
+        load = ""
     lines = "; ".join(_line(one, place) for place in places)
     return EquilibriumError(
-        f"{kind} has no stable equilibrium: {lines}.{load} Change the load, the pressure or the parallel spring."
+        f"{kind} has no stable equilibrium: {lines}.{load} Change the load, the pressure or the"
+        " parallel spring."
     )
 
 
@@ -120,15 +149,19 @@ def _without_coordinates(one: Statics) -> str:
         )
         return f"{texts}: no pressure below {MAX_PRESSURE:g} Pa belongs to it."
     plant.state_at(pressure=one.air)
-    return f"{type(plant.mechanism).__name__} has no stable equilibrium: a muscle in series or its wall is unstable."
+    return (
+        f"{type(plant.mechanism).__name__} has no stable equilibrium: a muscle in series or its"
+        " wall is unstable."
+    )
 
 
 def _line(one: Statics, x: Array) -> str:
     plant = one.separate[0]
     states = plant.muscle_states(one.state(x))
     pulls = ", ".join(
-        f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa "
-        f"and a contraction of {100 * float(state.contraction):.1f} %"
+        f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at"
+        f" {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa and a contraction of"
+        f" {100 * float(state.contraction):.1f} %"
         for m, state in zip(plant.muscles, states, strict=True)
     )
     accelerations = one.accelerations(x[None, None])[0, 0]
@@ -145,13 +178,18 @@ def _required_tension(one: Statics, x: Array) -> str:
     plant = one.separate[0]
     if len(plant.muscles) > 1:
         return ""
-    state, mechanism = one.state(x), plant.mechanism
+    state = one.state(x)
+    mechanism = plant.mechanism
     inputs = dict(zip(plant.inputs, one.inputs.tolist(), strict=True))
     accelerations = []
     for tension in (0.0, 1.0):
         forces = mechanism.generalised_forces(state, [tension], plant.resting_lengths)
         accelerations.append(
-            float(mechanism.acceleration(state, state, forces, inputs)[one.plants.mechanism.coordinates[0].name])
+            float(
+                mechanism.acceleration(state, state, forces, inputs)[
+                    one.plants.mechanism.coordinates[0].name
+                ]
+            )
         )
     slope = accelerations[1] - accelerations[0]
     return f" The load requires a tension of {-accelerations[0] / slope:.4g} N." if slope else ""
@@ -163,26 +201,39 @@ ITERATIONS = 40
 RESIDUAL_TOLERANCE = 1e-8
 """Residual acceleration of an equilibrium, relative to the largest at the start points (chosen)."""
 DISTINCT = 1e-6
-"""Equilibria closer than this fraction of the nominal sizes of the coordinates are the same (chosen)."""
+"""Equilibria closer than this fraction of the nominal sizes of the coordinates are the same
+(chosen).
+"""
 
 
 def equilibria_of_several_coordinates(statics: Statics) -> tuple[Rows, Array]:
-    """Row of the plant and coordinates (d,) of every equilibrium that start points lead to, in ascending order."""
-    rows, places = list[int](), list[Array]()
+    """Row of the plant and coordinates (d,) of every equilibrium that start points lead to, in
+    ascending order.
+    """
+    rows = list[int]()
+    places = list[Array]()
     for row in range(len(statics.parameters)):
-        one, equilibria = statics.of(np.array([row])), list[Array]()
-        x, sizes = starts(one), one.nominal_sizes()
+        one = statics.of(np.array([row]))
+        equilibria = list[Array]()
+        x = starts(one)
+        sizes = one.nominal_sizes()
         f = one.accelerations(x[None])[0]
-        for place in _newton(one, x, f, sizes, RESIDUAL_TOLERANCE * np.abs(f).max()) if len(x) else ():
+        for place in (
+            _newton(one, x, f, sizes, RESIDUAL_TOLERANCE * np.abs(f).max()) if len(x) else ()
+        ):
             if all(np.abs((place - other) / sizes).max() > DISTINCT for other in equilibria):
                 equilibria.append(place)
         rows += [row] * len(equilibria)
         places += sorted(equilibria, key=tuple)
-    return np.array(rows, dtype=np.intp), np.array(places).reshape(len(rows), len(statics.plants.mechanism.coordinates))
+    return np.array(rows, dtype=np.intp), np.array(places).reshape(
+        len(rows), len(statics.plants.mechanism.coordinates)
+    )
 
 
 def starts(one: Statics) -> Array:
-    """Start points (K, d) within the permitted range of one plant: evenly spread contractions (additive recurrence)."""
+    """Start points (K, d) within the permitted range of one plant: evenly spread contractions
+    (additive recurrence).
+    """
     limits = [[float(np.asarray(end).flat[0]) for end in ends] for ends in one.contraction_limits]
     low, high = np.array(limits).T
     high = np.minimum(high, 0.5)  # at greater contractions a muscle is beyond its maximum volume
@@ -215,30 +266,45 @@ def _coordinates_of(one: Statics, targets: Array) -> Array:
 
 
 def _least_squares(matrices: Array, right: Array, rcond: float) -> Array:
-    """Least-squares solutions (K, d) for matrices (K, r, d); NaN for matrices that are not finite."""
+    """Least-squares solutions (K, d) for matrices (K, r, d); NaN for matrices that are not
+    finite.
+    """
     solution: Array = np.full((len(matrices), matrices.shape[2]), np.nan)
     finite = np.isfinite(matrices).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
-    solution[finite] = np.einsum("kdr,kr->kd", np.linalg.pinv(matrices[finite], rcond=rcond), right[finite])
+    solution[finite] = np.einsum(
+        "kdr,kr->kd", np.linalg.pinv(matrices[finite], rcond=rcond), right[finite]
+    )
     return solution
 
 
 def _newton(one: Statics, x: Array, f: Array, sizes: Array, tolerance: float) -> list[Array]:
-    """Equilibria that Newton's method finds from x (K, d); its steps are halved until the residual decreases."""
+    """Equilibria that Newton's method finds from x (K, d); its steps are halved until the residual
+    decreases.
+    """
     equilibria = []
     for _ in range(ITERATIONS):
         step = _steps(one, x, f, sizes)
         following, after, decreased = _descend(one, x, f, step)
         ended = (np.abs(step / sizes).max(axis=1) < 1e-13) | ~decreased
-        equilibria += list(x[ended & np.isfinite(step).all(axis=1) & (np.abs(f).max(axis=1) <= tolerance)])
-        x, f = following[~ended], after[~ended]
+        equilibria += list(
+            x[ended & np.isfinite(step).all(axis=1) & (np.abs(f).max(axis=1) <= tolerance)]
+        )
+        x = following[~ended]
+        f = after[~ended]
         if not len(x):
             break
     return equilibria
 
 
-def _descend(one: Statics, x: Array, f: Array, step: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Next points, their residuals, and for which of them a fraction of the step decreases the residual."""
-    following, after, decreased = x.copy(), f.copy(), np.zeros(len(x), dtype=bool)
+def _descend(
+    one: Statics, x: Array, f: Array, step: Array
+) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Next points, their residuals, and for which of them a fraction of the step decreases the
+    residual.
+    """
+    following = x.copy()
+    after = f.copy()
+    decreased = np.zeros(len(x), dtype=bool)
     waiting = np.flatnonzero(np.isfinite(step).all(axis=1))
     for part in 0.5 ** np.arange(12):
         if not waiting.size:
@@ -249,16 +315,23 @@ def _descend(one: Statics, x: Array, f: Array, step: Array) -> tuple[Array, Arra
             better = np.abs(at).max(axis=1) < np.abs(f[waiting]).max(axis=1)
         better &= one.within_reach(trial[None])[0]
         rows = waiting[better]
-        following[rows], after[rows], decreased[rows] = trial[better], at[better], True
+        following[rows] = trial[better]
+        after[rows] = at[better]
+        decreased[rows] = True
         waiting = waiting[~better]
     return following, after, decreased
 
 
 def _steps(one: Statics, x: Array, f: Array, sizes: Array) -> Array:
-    """Newton's step (K, d) by central differences, one-sided at the ends of the range; NaN if it does not exist."""
+    """Newton's step (K, d) by central differences, one-sided at the ends of the range; NaN if it
+    does not exist.
+    """
     slopes = np.empty((len(x), f.shape[1], x.shape[1]))
     for k, perturbation in enumerate(np.diag(1e-5 * sizes)):
-        ends = [np.where(one.within_reach(p[None])[0][:, None], p, x) for p in (x + perturbation, x - perturbation)]
+        ends = [
+            np.where(one.within_reach(p[None])[0][:, None], p, x)
+            for p in (x + perturbation, x - perturbation)
+        ]
         span = (ends[0] - ends[1])[:, k] / sizes[k]
         difference = one.accelerations(ends[0][None])[0] - one.accelerations(ends[1][None])[0]
         with np.errstate(divide="ignore", invalid="ignore"):

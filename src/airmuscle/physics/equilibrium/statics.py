@@ -23,15 +23,20 @@ _TOLERANCE = 1e-13
 """Relative error of the air mass at which the search ends."""
 
 
-def shut_air_pressure(plant: StaticPlant, muscle: Muscle, air_mass: float, contraction: Array) -> Array:
-    """Gauge pressure [Pa] of a mass of air [kg] in a muscle at rest, wall and series spring in steady state.
+def shut_air_pressure(
+    plant: StaticPlant, muscle: Muscle, air_mass: float, contraction: Array
+) -> Array:
+    """Gauge pressure [Pa] of a mass of air [kg] in a muscle at rest, wall and series spring in
+    steady state.
 
-    Contractions are arrays that broadcast with the parameters of the plant; NaN if the pressure would exceed
-    1000 bar.
+    Contractions are arrays that broadcast with the parameters of the plant; NaN if the pressure
+    would exceed 1000 bar.
     """
 
     def excess(x: Array) -> Array:
-        """Logarithm of the ratio of the air mass at the absolute pressure exp(x) to the given air mass."""
+        """Logarithm of the ratio of the air mass at the absolute pressure exp(x) to the given air
+        mass.
+        """
         p = gauge_pressure(np.exp(x), plant.ambient)
         own = muscle.steady_state(p, contraction)
         volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
@@ -47,11 +52,12 @@ def shut_air_pressure(plant: StaticPlant, muscle: Muscle, air_mass: float, contr
 
 
 def _secant(excess: Callable[[Array], Array], a: Array) -> Array:
-    """The root of every element by the secant method; NaN if it fails. For a rigid wall and a polytropic process it is
-    exact."""
+    """The root of every element by the secant method; NaN if it fails. For a rigid wall and a
+    polytropic process it is exact."""
     at_a = excess(a)
     b = a - at_a
-    root, lost = np.full(a.shape, np.nan), np.zeros(a.shape, dtype=bool)
+    root = np.full(a.shape, np.nan)
+    lost = np.zeros(a.shape, dtype=bool)
     for _ in range(20):
         at_b = np.where(np.isfinite(b) & (b < math.log(MAX_PRESSURE)), excess(b), np.nan)
         open_ = np.isnan(root) & ~lost
@@ -64,27 +70,34 @@ def _secant(excess: Callable[[Array], Array], a: Array) -> Array:
 
 
 def _bisection(excess: Callable[[Array], Array], shape: tuple[int, ...]) -> Array:
-    """The root of every element between 1 Pa and the maximum pressure, by bisection; NaN if there is none."""
-    low, high = np.zeros(shape), np.full(shape, math.log(MAX_PRESSURE))
+    """The root of every element between 1 Pa and the maximum pressure, by bisection; NaN if there
+    is none.
+    """
+    low = np.zeros(shape)
+    high = np.full(shape, math.log(MAX_PRESSURE))
     possible = (excess(low) < 0.0) & (excess(high) > 0.0)
     while True:
         middle = 0.5 * (low + high)
         if not ((low < middle) & (middle < high)).any():
             return np.where(possible, low, np.nan)
         below = excess(middle) < 0.0
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
+        low = np.where(below, middle, low)
+        high = np.where(below, high, middle)
 
 
 Rows = npt.NDArray[np.intp]
 LOWEST_CONTRACTION = -0.5
-"""Smallest contraction in the search for equilibria; a geometry may be defined far below it (chosen)."""
+"""Smallest contraction in the search for equilibria; a geometry may be defined far below it
+(chosen).
+"""
 _NO_ARRAYS = (TypeError, ValueError, ArithmeticError, AirmuscleError)
 """Errors of a law that accepts scalars only, or that is not defined for one of the plants."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Statics:
-    """N plants of one structure at rest, as functions of their d coordinates at K points each, x (N, K, d).
+    """N plants of one structure at rest, as functions of their d coordinates at K points each, x
+    (N, K, d).
 
     compiled     any of the plants
     parameters   (N, P) all parameters of each
@@ -104,19 +117,30 @@ class Statics:
 
     @classmethod
     def of_plants(
-        cls, compiled: CompiledSystem, parameters: Array, air: tuple[float, ...], inputs: Array, shut: bool = False
+        cls,
+        compiled: CompiledSystem,
+        parameters: Array,
+        air: tuple[float, ...],
+        inputs: Array,
+        shut: bool = False,
     ) -> "Statics":
         """The plants with these parameters (N, P)."""
-        precomputed = np.array([compiled.program.precompute(row) for row in np.ascontiguousarray(parameters)])
+        precomputed = np.array(
+            [compiled.program.precompute(row) for row in np.ascontiguousarray(parameters)]
+        )
         plant = compiled.system
         assert isinstance(plant, StaticPlant)
-        return cls(compiled, parameters, precomputed, air, shut, inputs, _with_arrays(plant, parameters))
+        return cls(
+            compiled, parameters, precomputed, air, shut, inputs, _with_arrays(plant, parameters)
+        )
 
     def of(self, rows: Rows) -> "Statics":
         """A selection of the plants, possibly with repetitions."""
         parameters = self.parameters[rows]
         plants = self.plants if len(self.parameters) == 1 else _with_arrays(self.plants, parameters)
-        return dataclasses.replace(self, parameters=parameters, precomputed=self.precomputed[rows], plants=plants)
+        return dataclasses.replace(
+            self, parameters=parameters, precomputed=self.precomputed[rows], plants=plants
+        )
 
     @functools.cached_property
     def separate(self) -> list[StaticPlant]:
@@ -129,13 +153,18 @@ class Statics:
 
     def limits(self, index: int) -> tuple[Array, Array, Array]:
         """Nominal size and limits (N, 1) of a coordinate."""
-        c, shape = self.plants.mechanism.coordinates[index], (len(self.parameters), 1)
-        nominal, low, high = (np.array(np.broadcast_to(v, shape)) for v in (c.nominal, c.lower_limit, c.upper_limit))
+        c = self.plants.mechanism.coordinates[index]
+        shape = (len(self.parameters), 1)
+        nominal, low, high = (
+            np.array(np.broadcast_to(v, shape)) for v in (c.nominal, c.lower_limit, c.upper_limit)
+        )
         return nominal, low, high
 
     def nominal_sizes(self) -> Array:
         """Nominal sizes (d,) of the coordinates of the first plant."""
-        return np.array([self.limits(i)[0][0, 0] for i in range(len(self.plants.mechanism.coordinates))])
+        return np.array(
+            [self.limits(i)[0][0, 0] for i in range(len(self.plants.mechanism.coordinates))]
+        )
 
     @functools.cached_property
     def contraction_limits(self) -> list[tuple[Value, Value]]:
@@ -160,13 +189,17 @@ class Statics:
     def contractions(self, x: Array) -> list[Array]:
         """Contraction of every muscle (N, K)."""
         try:
-            values = self.plants.mechanism.contractions(self._coordinate_values(x), self.plants.resting_lengths)
+            values = self.plants.mechanism.contractions(
+                self._coordinate_values(x), self.plants.resting_lengths
+            )
             return [np.broadcast_to(np.asarray(eps, dtype=float), x.shape[:2]) for eps in values]
         except _NO_ARRAYS:
             table = np.empty((len(self.plants.muscles), *x.shape[:2]))
             for i, k in np.ndindex(*x.shape[:2]):
                 plant = self.separate[i]
-                table[:, i, k] = plant.mechanism.contractions(self.place(x[i, k]), plant.resting_lengths)
+                table[:, i, k] = plant.mechanism.contractions(
+                    self.place(x[i, k]), plant.resting_lengths
+                )
             return list(table)
 
     def within_reach(self, x: Array) -> npt.NDArray[np.bool_]:
@@ -192,9 +225,13 @@ class Statics:
             return self._states_one_by_one(x)
 
     def _states(self, x: Array) -> Array:
-        plant, shape = self.plants, x.shape[:2]
-        known = self._coordinate_values(x) | {c.speed: 0.0 for c in self.plants.mechanism.coordinates}
-        contractions, possible = self.contractions(x), np.ones(shape, dtype=bool)
+        plant = self.plants
+        shape = x.shape[:2]
+        known = self._coordinate_values(x) | {
+            c.speed: 0.0 for c in self.plants.mechanism.coordinates
+        }
+        contractions = self.contractions(x)
+        possible = np.ones(shape, dtype=bool)
         for eps, muscle in zip(contractions, plant.muscles, strict=True):
             low, high = muscle.geometry.contraction_range
             possible &= (eps >= low) & (eps <= high)
@@ -222,7 +259,10 @@ class Statics:
                 if self.shut:
                     contractions = plant.mechanism.contractions(place, plant.resting_lengths)
                     air = zip(plant.muscles, self.air, contractions, strict=True)
-                    pressures = tuple(float(shut_air_pressure(plant, m, mass, np.array(eps))) for m, mass, eps in air)
+                    pressures = tuple(
+                        float(shut_air_pressure(plant, m, mass, np.array(eps)))
+                        for m, mass, eps in air
+                    )
                 state = plant.state_at(pressure=pressures, **place)
             except (AirmuscleError, ValueError, ArithmeticError):
                 continue
@@ -234,9 +274,15 @@ class Statics:
         states = np.ascontiguousarray(self.states(x))
         rates = np.empty_like(states)
         if states.size:
-            evaluate_rates(self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates)
-        accelerations = rates[..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]]
-        accelerations[np.isnan(states).any(axis=-1)] = np.nan  # a limited force is finite also there
+            evaluate_rates(
+                self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates
+            )
+        accelerations = rates[
+            ..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]
+        ]
+        accelerations[np.isnan(states).any(axis=-1)] = (
+            np.nan
+        )  # a limited force is finite also there
         return accelerations
 
     def state(self, x: Array) -> dict[str, float]:
@@ -245,6 +291,7 @@ class Statics:
 
 
 def _with_arrays(plant: StaticPlant, parameters: Array) -> StaticPlant:
-    """The plant with an array (N, 1) for every parameter, also if N = 1: powers of scalars and arrays differ in the
-    last digit, and the equilibrium of a plant must not depend on the number of plants."""
+    """The plant with an array (N, 1) for every parameter, also if N = 1: powers of scalars and
+    arrays differ in the last digit, and the equilibrium of a plant must not depend on the number of
+    plants."""
     return tree.unflatten(plant, [column[:, None].copy() for column in parameters.T])

@@ -14,7 +14,12 @@ INFINITY = float("inf")
 def gravity_parameter() -> Any:
     """Declare the acceleration of gravity of a mechanism."""
     return parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
+        "m/s^2",
+        "g",
+        "acceleration of gravity",
+        bounds=(0.0, 20.0),
+        fitted=False,
+        default=STANDARD_GRAVITY,
     )
 
 
@@ -27,8 +32,8 @@ def angle_limit(symbol: str, meaning: str, default: float) -> Any:
 class Coordinate:
     """One generalised coordinate and the name of its speed.
 
-    `nominal` and `nominal_speed` are the scales of the absolute tolerances. `lower_limit` and `upper_limit` bound the
-    search for equilibria; they are not end stops.
+    `nominal` and `nominal_speed` are the scales of the absolute tolerances. `lower_limit` and
+    `upper_limit` bound the search for equilibria; they are not end stops.
     """
 
     name: str
@@ -41,7 +46,9 @@ class Coordinate:
 
     @property
     def acceleration(self) -> str:
-        """Name of the acceleration: the name of the speed with "acceleration" instead of "speed"."""
+        """Name of the acceleration: the name of the speed with "acceleration" instead of
+        "speed".
+        """
         name = self.speed.replace("speed", "acceleration")
         return name if name != self.speed else f"{self.name}.acceleration"
 
@@ -50,7 +57,9 @@ class Coordinate:
         """The coordinate and its speed, as states of a plant."""
         return (
             StateVariable(self.name, self.unit, self.nominal, f"{self.name} of the load"),
-            StateVariable(self.speed, f"{self.unit}/s", self.nominal_speed, f"{self.speed} of the load"),
+            StateVariable(
+                self.speed, f"{self.unit}/s", self.nominal_speed, f"{self.speed} of the load"
+            ),
         )
 
 
@@ -77,7 +86,9 @@ class Mechanism(abc.ABC):
 
     @property
     def inner_states(self) -> tuple[StateVariable, ...]:
-        """States besides coordinates and speeds, 0 when relaxed, such as the bristles of a friction."""
+        """States besides coordinates and speeds, 0 when relaxed, such as the bristles of a
+        friction.
+        """
         return ()
 
     def inner_rates(self, q: Values, v: Values, forces: Values) -> Mapping[str, Value]:
@@ -88,41 +99,69 @@ class Mechanism(abc.ABC):
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         """Contraction of each muscle at coordinates q, for resting lengths [m]."""
 
-    def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        """Speed of shortening [m/s] of each muscle, the time derivative of `contractions` times the resting length."""
+    def contraction_speeds(
+        self, q: Values, v: Values, resting_lengths: Sequence[Value]
+    ) -> tuple[Value, ...]:
+        """Speed of shortening [m/s] of each muscle, the time derivative of `contractions` times the
+        resting length.
+        """
         names = [c.name for c in self.coordinates]
         if not names:
             return tuple(0.0 for _ in resting_lengths)
-        at, speeds = [q[name] for name in names], [v[c.speed] for c in self.coordinates]
-        rates = autodiff.jvp(lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths), at, speeds)
+        at = [q[name] for name in names]
+        speeds = [v[c.speed] for c in self.coordinates]
+        rates = autodiff.jvp(
+            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
+            at,
+            speeds,
+        )
         return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
 
-    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
-        """Generalised force on each coordinate from the muscle tensions [N], by virtual work: J^T F.
+    def generalised_forces(
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> Values:
+        """Generalised force on each coordinate from the muscle tensions [N], by virtual work: J^T
+        F.
 
-        J is the Jacobian of the muscle shortenings by the coordinates, from `contractions`. Units: [N] for a coordinate
-        in metres, [N m] for an angle.
+        J is the Jacobian of the muscle shortenings by the coordinates, from `contractions`. Units:
+        [N] for a coordinate in metres, [N m] for an angle.
         """
         names = [c.name for c in self.coordinates]
         if not names:
             return {}
-        pulls = [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)]
+        pulls = [
+            tension * length for tension, length in zip(tensions, resting_lengths, strict=True)
+        ]
         at = [q[name] for name in names]
-        forces = autodiff.vjp(lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths), at, pulls)
+        forces = autodiff.vjp(
+            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
+            at,
+            pulls,
+        )
         return dict(zip(names, forces, strict=True))
 
     @abc.abstractmethod
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
-        """Acceleration of each coordinate under the generalised muscle forces and the forces of the mechanism."""
+        """Acceleration of each coordinate under the generalised muscle forces and the forces of the
+        mechanism.
+        """
 
     def driving_force(self, q: Values, v: Values, acceleration: Value) -> Value:
-        """Generalised force of the muscles for an acceleration of the only coordinate, without inputs."""
-        (coordinate,), inputs = self.coordinates, {each.name: 0.0 for each in self.inputs}
-        free, driven = (self.acceleration(q, v, {coordinate.name: f}, inputs)[coordinate.name] for f in (0.0, 1.0))
+        """Generalised force of the muscles for an acceleration of the only coordinate, without
+        inputs.
+        """
+        (coordinate,) = self.coordinates
+        inputs = {each.name: 0.0 for each in self.inputs}
+        free, driven = (
+            self.acceleration(q, v, {coordinate.name: f}, inputs)[coordinate.name]
+            for f in (0.0, 1.0)
+        )
         return (acceleration - free) / (driven - free)
 
     def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        """Power [W] that leaves the mechanism through its dampers, end stops, drives and external loads."""
+        """Power [W] that leaves the mechanism through its dampers, end stops, drives and external
+        loads.
+        """
         return 0.0
 
     def potential_energy(self, q: Values) -> Value:
@@ -152,7 +191,9 @@ class DampedCoordinate(Mechanism, abc.ABC):
 
 
 class Translation(DampedCoordinate):
-    """One coordinate: the position y [m], which is the shortening of the muscles from their resting length."""
+    """One coordinate: the position y [m], which is the shortening of the muscles from their resting
+    length.
+    """
 
     mass: float
 
@@ -162,5 +203,7 @@ class Translation(DampedCoordinate):
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
 
-    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
+    def generalised_forces(
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> Values:
         return {"position": sum(tensions, 0.0)}

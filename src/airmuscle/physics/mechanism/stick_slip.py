@@ -1,4 +1,6 @@
-"""Stick-slip of joints: dry friction that holds at rest and grows with the tensions of the muscles."""
+"""Stick-slip of joints: dry friction that holds at rest and grows with the tensions of the
+muscles.
+"""
 
 from collections.abc import Sequence
 from typing import cast
@@ -11,45 +13,70 @@ from .wrapper import ForceWrapper
 
 @model
 class StickSlip:
-    """Dry friction of one joint: Q_f = -T (z + w/w_1)/(1 + |w|/w_1),   z' = (w - |w| z)/(theta_s (1 + |w|/w_1)).
+    """Dry friction of one joint: Q_f = -T (z + w/w_1)/(1 + |w|/w_1),   z' = (w - |w| z)/(theta_s (1
+    + |w|/w_1)).
 
         T = (T_c + sum_i mu_i F_i + r_1 R_r + r_2 R_a) (1 + s/(1 + (w/w_s)^2)),   w_1 = theta_s/tau
 
-    w angular speed, z deflection of the bristle relative to its sliding value, F_i tension of muscle i. At rest the
-    bristle holds like a spring up to T_c (1 + s); sliding faster than w_s, the friction is T_c. The friction of
-    tendons, sheaths and bearings grows with their load: mu_i is a moment arm of the friction of tendon i, r_1 and r_2
-    are those of the bearing, which carries and accelerates the links beyond the joint with the forces R_r across its
-    axis and R_a along it. They are computed at the accelerations of the other joints without this share of friction,
-    and at none of the joint's own: what holds at rest is exact, and so is a link balanced about its axis. Above w_1 the
-    torque follows the sign of the speed itself, so that the rate of z is bounded by 1/tau and a step of that length is
-    stable. For constant tension and s = 0 the energy T theta_s z^2/2 of the bristle never grows by more than the work
-    done on it. The normalised form of Dahl's model (Dahl 1968) with these additions, which are chosen.
+    w angular speed, z deflection of the bristle relative to its sliding value, F_i tension of
+    muscle i. At rest the bristle holds like a spring up to T_c (1 + s); sliding faster than w_s,
+    the friction is T_c. The friction of tendons, sheaths and bearings grows with their load: mu_i
+    is a moment arm of the friction of tendon i, r_1 and r_2 are those of the bearing, which carries
+    and accelerates the links beyond the joint with the forces R_r across its axis and R_a along it.
+    They are computed at the accelerations of the other joints without this share of friction, and
+    at none of the joint's own: what holds at rest is exact, and so is a link balanced about its
+    axis. Above w_1 the torque follows the sign of the speed itself, so that the rate of z is
+    bounded by 1/tau and a step of that length is stable. For constant tension and s = 0 the energy
+    T theta_s z^2/2 of the bristle never grows by more than the work done on it. The normalised form
+    of Dahl's model (Dahl 1968) with these additions, which are chosen.
     """
 
-    coulomb_torque: float = parameter("N m", "T_c", "friction torque without load", bounds=(1e-9, 1e5))
+    coulomb_torque: float = parameter(
+        "N m", "T_c", "friction torque without load", bounds=(1e-9, 1e5)
+    )
     load_arms: tuple[float, ...] = parameter(
         "m", "mu_i", "friction torque per tension of each muscle", bounds=(0.0, 10.0), default=()
     )
     static_excess: float = parameter(
-        "1", "s", "static friction above that of sliding, relative to it", bounds=(0.0, 20.0), default=0.0
+        "1",
+        "s",
+        "static friction above that of sliding, relative to it",
+        bounds=(0.0, 20.0),
+        default=0.0,
     )
     stribeck_speed: float = parameter(
         "rad/s", "w_s", "speed at which half of the excess is left", bounds=(1e-3, 1e3), default=1.0
     )
     presliding_angle: float = parameter(
-        "rad", "theta_s", "angle over which the bristle deflects before sliding", bounds=(1e-5, 1.0), default=2e-3
+        "rad",
+        "theta_s",
+        "angle over which the bristle deflects before sliding",
+        bounds=(1e-5, 1.0),
+        default=2e-3,
     )
     bearing_arms: tuple[float, ...] = parameter(
-        "m", "r_k", "friction torque per force across the axis of the joint, and along it", bounds=(0.0, 10.0),
+        "m",
+        "r_k",
+        "friction torque per force across the axis of the joint, and along it",
+        bounds=(0.0, 10.0),
         default=(),
-    )  # fmt: skip
+    )
     turnover_time: float = parameter(
-        "s", "tau", "shortest time in which the bristle turns over", bounds=(1e-5, 0.1), fitted=False, default=2e-3
+        "s",
+        "tau",
+        "shortest time in which the bristle turns over",
+        bounds=(1e-5, 0.1),
+        fitted=False,
+        default=2e-3,
     )
 
     def level(self, load: Value, speed: Value) -> Value:
-        """Friction torque [N m] in sliding at an angular speed [rad/s]; `load` is the sum of mu_i F_i [N m]."""
-        return (self.coulomb_torque + load) * (1.0 + self.static_excess / (1.0 + (speed / self.stribeck_speed) ** 2))
+        """Friction torque [N m] in sliding at an angular speed [rad/s]; `load` is the sum of mu_i
+        F_i [N m].
+        """
+        return (self.coulomb_torque + load) * (
+            1.0 + self.static_excess / (1.0 + (speed / self.stribeck_speed) ** 2)
+        )
 
     def torque(self, bristle: Value, load: Value, speed: Value) -> Value:
         """Friction torque [N m] on the joint, positive in the direction of the angle."""
@@ -60,50 +87,68 @@ class StickSlip:
     def bristle_rate(self, bristle: Value, speed: Value) -> Value:
         """Time derivative of the relative deflection of the bristle [1/s]."""
         magnitude = ops.absolute_value(speed)
-        return (speed - magnitude * bristle) / (self.presliding_angle + self.turnover_time * magnitude)
+        return (speed - magnitude * bristle) / (
+            self.presliding_angle + self.turnover_time * magnitude
+        )
 
 
 @model
 class GaussianResidual:
-    """Torques and friction that physics leaves, as Gaussian functions of angles and pressures, which fade out.
+    """Torques and friction that physics leaves, as Gaussian functions of angles and pressures,
+    which fade out.
 
         phi_k = exp(-sum_i (x_i/s_i - c_ki)^2/(2 d)),   tau_j = -dV/dtheta_j,   V = sum_k E_k phi_k,
         T_j = f_j T_j,physics,   f_j = exp(sum_k g_jk phi_k)
 
-    x the J angles of a mechanism and the gauge pressures `pressures` (names in a plant, `m0.pressure`), d their number.
-    Passive by construction: at constant pressures V is a bounded potential of the angles, whose torques give no energy
-    in a closed cycle, and the friction, multiplied by a positive factor, takes some. Pressures that change may change
-    V, as they change the force of a muscle. Far from all centres tau is 0 and f is 1: the physics alone. A caller who
+    x the J angles of a mechanism and the gauge pressures `pressures` (names in a plant,
+    `m0.pressure`), d their number. Passive by construction: at constant pressures V is a bounded
+    potential of the angles, whose torques give no energy in a closed cycle, and the friction,
+    multiplied by a positive factor, takes some. Pressures that change may change V, as they change
+    the force of a muscle. Far from all centres tau is 0 and f is 1: the physics alone. A caller who
     gives angles without pressures has the residual at the mean of its centres. The form is chosen.
     """
 
     pressures: tuple[str, ...]
-    angle_scales: tuple[float, ...] = parameter("rad", "s_i", "scale of each angle", bounds=(1e-6, 1e3), fitted=False)
+    angle_scales: tuple[float, ...] = parameter(
+        "rad", "s_i", "scale of each angle", bounds=(1e-6, 1e3), fitted=False
+    )
     pressure_scales: tuple[float, ...] = parameter(
         "Pa", "s_i", "scale of each pressure", bounds=(1.0, 1e8), fitted=False
     )
     centres: tuple[float, ...] = parameter(
-        "1", "c_ki", "centres relative to the scales, one after the other", bounds=(-1e3, 1e3), fitted=False
+        "1",
+        "c_ki",
+        "centres relative to the scales, one after the other",
+        bounds=(-1e3, 1e3),
+        fitted=False,
     )
     energies: tuple[float, ...] = parameter("J", "E_k", "energy of each centre", bounds=(-1e4, 1e4))
     friction_logs: tuple[float, ...] = parameter(
-        "1", "g_jk", "logarithmic factor of the friction of each centre, joint after joint", bounds=(-10.0, 10.0)
+        "1",
+        "g_jk",
+        "logarithmic factor of the friction of each centre, joint after joint",
+        bounds=(-10.0, 10.0),
     )
 
     def check(self) -> None:
-        count, joints = len(self.energies), len(self.angle_scales)
+        count = len(self.energies)
+        joints = len(self.angle_scales)
         wanted = (len(self.pressures), count * (joints + len(self.pressures)), count * joints)
         found = (len(self.pressure_scales), len(self.centres), len(self.friction_logs))
         if found != wanted or not count:
             raise ParameterError(
-                f"GaussianResidual: {count} energies, {joints} angle_scales and {len(self.pressures)} pressures need "
-                f"{wanted[0]} pressure_scales, {wanted[1]} centres and {wanted[2]} friction_logs; there are "
-                f"{found[0]}, {found[1]} and {found[2]}."
+                f"GaussianResidual: {count} energies, {joints} angle_scales and"
+                f" {len(self.pressures)} pressures need {wanted[0]} pressure_scales, {wanted[1]}"
+                f" centres and {wanted[2]} friction_logs; there are {found[0]}, {found[1]} and"
+                f" {found[2]}."
             )
 
     def evaluate(self, angles: Sequence[Value], q: Values) -> tuple[list[Value], list[Value]]:
-        """Torque [N m] on every joint and the factor of its friction, at its angles [rad] and the pressures in q."""
-        size, joints = len(self.angle_scales) + len(self.pressures), len(angles)
+        """Torque [N m] on every joint and the factor of its friction, at its angles [rad] and the
+        pressures in q.
+        """
+        size = len(self.angle_scales) + len(self.pressures)
+        joints = len(angles)
         own = [angle / scale for angle, scale in zip(angles, self.angle_scales, strict=True)]
         means = [sum(self.centres[i::size]) / len(self.energies) for i in range(joints, size)]
         own += [
@@ -113,7 +158,9 @@ class GaussianResidual:
         torques: list[Value] = [0.0] * joints
         logs: list[Value] = [0.0] * joints
         for k, energy in enumerate(self.energies):
-            away = [x - c for x, c in zip(own, self.centres[size * k : size * (k + 1)], strict=True)]
+            away = [
+                x - c for x, c in zip(own, self.centres[size * k : size * (k + 1)], strict=True)
+            ]
             level = ops.exp(-sum(a * a for a in away) / (2.0 * size))
             for j, scale in enumerate(self.angle_scales):
                 torques[j] = torques[j] + energy * level * away[j] / (size * scale)
@@ -123,10 +170,12 @@ class GaussianResidual:
 
 @model
 class WithStickSlip(ForceWrapper):
-    """Mechanism whose joints have the friction of `elements`, one for each of its angles; the bristles are states.
+    """Mechanism whose joints have the friction of `elements`, one for each of its angles; the
+    bristles are states.
 
-    Equilibria are those with relaxed bristles. A caller of `acceleration` who gives torques alone has the friction
-    without load. A `residual` adds its torques to those of the muscles and multiplies the friction.
+    Equilibria are those with relaxed bristles. A caller of `acceleration` who gives torques alone
+    has the friction without load. A `residual` adds its torques to those of the muscles and
+    multiplies the friction.
     """
 
     inner: Mechanism
@@ -134,27 +183,30 @@ class WithStickSlip(ForceWrapper):
     residual: GaussianResidual | None = None
 
     def check(self) -> None:
-        angles, owner = self._angles, type(self.inner).__name__
+        angles = self._angles
+        owner = type(self.inner).__name__
         if len(angles) != len(self.elements) or not angles:
             raise ParameterError(
-                f"WithStickSlip: {owner} has {len(angles)} angles and {len(self.elements)} elements are given; give "
-                "one for each angle."
+                f"WithStickSlip: {owner} has {len(angles)} angles and {len(self.elements)} elements"
+                " are given; give one for each angle."
             )
         if self.residual is not None and len(self.residual.angle_scales) != len(angles):
             raise ParameterError(
-                f"WithStickSlip: the residual has {len(self.residual.angle_scales)} angles, {owner} has {len(angles)}; "
-                "give one scale for each angle."
+                f"WithStickSlip: the residual has {len(self.residual.angle_scales)} angles, {owner}"
+                f" has {len(angles)}; give one scale for each angle."
             )
         for element in self.elements:
             if len(element.bearing_arms) > 2 * isinstance(self.inner, SerialArm):
                 raise ParameterError(
-                    f"WithStickSlip: {len(element.bearing_arms)} bearing_arms are given for a joint of {owner}; a "
-                    "SerialArm takes one or two, across and along the axis, any other mechanism none."
+                    f"WithStickSlip: {len(element.bearing_arms)} bearing_arms are given for a joint"
+                    f" of {owner}; a SerialArm takes one or two, across and along the axis, any"
+                    " other mechanism none."
                 )
             if element.load_arms and self.muscle_count not in (None, len(element.load_arms)):
                 raise ParameterError(
-                    f"WithStickSlip: {owner} takes {self.muscle_count} muscles, and {len(element.load_arms)} load_arms "
-                    "are given; give one for each muscle, or none."
+                    f"WithStickSlip: {owner} takes {self.muscle_count} muscles, and"
+                    f" {len(element.load_arms)} load_arms are given; give one for each muscle, or"
+                    " none."
                 )
 
     @property
@@ -163,22 +215,38 @@ class WithStickSlip(ForceWrapper):
 
     @property
     def inner_states(self) -> tuple[StateVariable, ...]:
-        own = (StateVariable(_bristle(c), "1", 1.0, f"bristle of the friction of {c.name}") for c in self._angles)
+        own = (
+            StateVariable(_bristle(c), "1", 1.0, f"bristle of the friction of {c.name}")
+            for c in self._angles
+        )
         return (*self.inner.inner_states, *own)
 
     def inner_rates(self, q: Values, v: Values, forces: Values) -> dict[str, Value]:
         joints = zip(self._angles, self.elements, strict=True)
-        own = {_bristle(c): element.bristle_rate(q.get(_bristle(c), 0.0), v[c.speed]) for c, element in joints}
+        own = {
+            _bristle(c): element.bristle_rate(q.get(_bristle(c), 0.0), v[c.speed])
+            for c, element in joints
+        }
         return {**self.inner.inner_rates(q, v, forces), **own}
 
-    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
-        """Those of the inner mechanism, and for each angle the load of its friction [N m]; with the residual."""
+    def generalised_forces(
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> Values:
+        """Those of the inner mechanism, and for each angle the load of its friction [N m]; with the
+        residual.
+        """
         forces = dict(self.inner.generalised_forces(q, tensions, resting_lengths))
         for c, element in zip(self._angles, self.elements, strict=True):
-            forces[friction_load(c)] = sum((mu * t for mu, t in zip(element.load_arms, tensions, strict=False)), 0.0)
+            forces[friction_load(c)] = sum(
+                (mu * t for mu, t in zip(element.load_arms, tensions, strict=False)), 0.0
+            )
         if self.residual is not None:
-            further = zip(*self.residual.evaluate([q[c.name] for c in self._angles], q), strict=True)
-            for c, element, (torque, factor) in zip(self._angles, self.elements, further, strict=True):
+            further = zip(
+                *self.residual.evaluate([q[c.name] for c in self._angles], q), strict=True
+            )
+            for c, element, (torque, factor) in zip(
+                self._angles, self.elements, further, strict=True
+            ):
                 forces[c.name] = forces[c.name] + torque
                 loaded = element.coulomb_torque + forces[friction_load(c)]
                 forces[friction_load(c)] = factor * loaded - element.coulomb_torque
@@ -188,26 +256,43 @@ class WithStickSlip(ForceWrapper):
         return self._with_friction(q, v, self._with_bearings(q, v, forces, inputs))
 
     def bearing_load(self, joint: int, q: Values, v: Values, accelerations: Values) -> Value:
-        """Friction torque [N m] of a joint, from 0, by its bearing, at the accelerations of the other joints."""
+        """Friction torque [N m] of a joint, from 0, by its bearing, at the accelerations of the
+        other joints.
+        """
         others = {**accelerations, self._angles[joint].name: 0.0}
         forces = cast(SerialArm, self.inner).bearing_force(joint, q, v, others)
-        return sum(r * force for r, force in zip(self.elements[joint].bearing_arms, forces, strict=False))
+        return sum(
+            r * force for r, force in zip(self.elements[joint].bearing_arms, forces, strict=False)
+        )
 
     def _with_bearings(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         """The forces, in whose friction loads are those of the bearings."""
-        loaded = {j: friction_load(c) for j, c in enumerate(self._angles) if self.elements[j].bearing_arms}
+        loaded = {
+            j: friction_load(c) for j, c in enumerate(self._angles) if self.elements[j].bearing_arms
+        }
         if not loaded:
             return forces
         free = self.inner.acceleration(q, v, self._with_friction(q, v, forces), inputs)
-        loads = {name: forces.get(name, 0.0) + self.bearing_load(j, q, v, free) for j, name in loaded.items()}
+        loads = {
+            name: forces.get(name, 0.0) + self.bearing_load(j, q, v, free)
+            for j, name in loaded.items()
+        }
         return {**forces, **loads}
 
     def _with_friction(self, q: Values, v: Values, forces: Values) -> dict[str, Value]:
-        return {**forces, **{c.name: forces[c.name] + torque for c, torque in self._friction(q, v, forces)}}
+        return {
+            **forces,
+            **{c.name: forces[c.name] + torque for c, torque in self._friction(q, v, forces)},
+        }
 
     def _friction(self, q: Values, v: Values, forces: Values) -> list[tuple[Coordinate, Value]]:
         return [
-            (c, element.torque(q.get(_bristle(c), 0.0), forces.get(friction_load(c), 0.0), v[c.speed]))
+            (
+                c,
+                element.torque(
+                    q.get(_bristle(c), 0.0), forces.get(friction_load(c), 0.0), v[c.speed]
+                ),
+            )
             for c, element in zip(self._angles, self.elements, strict=True)
         ]
 
@@ -218,7 +303,9 @@ class WithStickSlip(ForceWrapper):
         if self.residual is None:
             return taken
         torques, _ = self.residual.evaluate([q[c.name] for c in self._angles], q)
-        return taken - sum(torque * v[c.speed] for c, torque in zip(self._angles, torques, strict=True))
+        return taken - sum(
+            torque * v[c.speed] for c, torque in zip(self._angles, torques, strict=True)
+        )
 
 
 def _bristle(coordinate: Coordinate) -> str:

@@ -1,4 +1,6 @@
-"""Quantity arguments of public methods: texts with a unit and lists become numbers, anything else is an error."""
+"""Quantity arguments of public methods: texts with a unit and lists become numbers, anything else
+is an error.
+"""
 
 import functools
 import inspect
@@ -15,19 +17,24 @@ _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}
 Units = Mapping[str, Sequence[str]]
 """Units of the leading arguments of methods, by the name of the method."""
 RatioCheck = Callable[[Any, object], None]
-"""Check of a ratio, of the value and the object: called for every value that is not a float of at most 1."""
+"""Check of a ratio, of the value and the object: called for every value that is not a float of at
+most 1.
+"""
 
 
 def accept_quantities(
     method: Callable[..., Any], units: Sequence[str], check_ratio: RatioCheck | None = None
 ) -> Callable[..., Any]:
-    """The method, whose leading arguments after `self` may also be texts with a unit, lists and arrays of integers.
+    """The method, whose leading arguments after `self` may also be texts with a unit, lists and
+    arrays of integers.
 
-    `check_ratio` is called with the argument whose unit is "1". Symbols and arrays of other libraries are passed on. A
-    call with two numbers takes 0.2 us longer.
+    `check_ratio` is called with the argument whose unit is "1". Symbols and arrays of other
+    libraries are passed on. A call with two numbers takes 0.2 us longer.
     """
     arguments = inspect.signature(method).parameters.values()
-    names = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)][1 : 1 + len(units)]
+    names = [a.name for a in arguments if a.kind in (a.POSITIONAL_ONLY, a.POSITIONAL_OR_KEYWORD)][
+        1 : 1 + len(units)
+    ]
     unit_of = dict(zip(names, units, strict=False))  # a user's method may have fewer
     place = units.index("1") if check_ratio is not None and "1" in units[: len(names)] else -1
 
@@ -46,14 +53,21 @@ def accept_quantities(
                         check_ratio(given[place], self)  # type: ignore[misc]
                     return method(self, a, b)
             owner = owner_of(self)
-            values = [_as_number(value, name, unit_of, owner) for value, name in zip(given, names, strict=False)]
+            values = [
+                _as_number(value, name, unit_of, owner)
+                for value, name in zip(given, names, strict=False)
+            ]
             named = {name: _as_number(value, name, unit_of, owner) for name, value in named.items()}
             if place >= 0:
-                check_ratio(values[place] if place < len(values) else named.get(names[place], 0.0), self)  # type: ignore[misc]
+                check_ratio(
+                    values[place] if place < len(values) else named.get(names[place], 0.0), self
+                )  # type: ignore[misc]
             return method(self, *values, *given[len(values) :], **named)
         except (TypeError, OverflowError):
             for name, value in (*zip(names, given, strict=False), *named.items()):
-                if name in unit_of and (isinstance(value, int | type) or not hasattr(value, "__add__")):
+                if name in unit_of and (
+                    isinstance(value, int | type) or not hasattr(value, "__add__")
+                ):
                     _as_array(value, name, unit_of[name], owner_of(self))
             raise
 
@@ -61,7 +75,9 @@ def accept_quantities(
 
 
 class QuantityMethods:
-    """Base of classes that let the methods which they define accept quantities, as `accept_quantities` does."""
+    """Base of classes that let the methods which they define accept quantities, as
+    `accept_quantities` does.
+    """
 
     argument_units: ClassVar[Units]
     check_ratio: ClassVar[Any] = None
@@ -82,7 +98,11 @@ def _as_number(value: Any, name: str, units: Mapping[str, str], owner: str) -> A
         return value
     if kind is str:
         return quantity(value, units[name], where=f"{owner}: {name}")
-    if value is None or kind in (bool, list, tuple, dict, set, bytes, complex) or kind is np.ndarray:
+    if (
+        value is None
+        or kind in (bool, list, tuple, dict, set, bytes, complex)
+        or kind is np.ndarray
+    ):
         return _as_array(value, name, units[name], owner)
     return value
 
@@ -96,6 +116,7 @@ def _as_array(value: Any, name: str, unit: str, owner: str) -> Any:
         if array.dtype.kind in "iuf":
             return array.astype(float)
     raise ParameterError(
-        f"{owner}: {name} is {one_line(value)}; give a number or an array of numbers in {unit if unit != '1' else 'SI'}"
-        f", or a text with a unit, such as {_EXAMPLES.get(unit, f'1 {unit}')}."
+        f"{owner}: {name} is {one_line(value)}; give a number or an array of numbers in"
+        f" {unit if unit != '1' else 'SI'}, or a text with a unit, such as"
+        f" {_EXAMPLES.get(unit, f'1 {unit}')}."
     )

@@ -1,4 +1,6 @@
-"""Ratings of a muscle: values that its maker permits for force, pressure, contraction, length and temperature."""
+"""Ratings of a muscle: values that its maker permits for force, pressure, contraction, length and
+temperature.
+"""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -50,7 +52,9 @@ class RatedRange(NamedTuple):
 
 
 def _lower_limit(unit: str, symbol: str, description: str, bounds: tuple[float, float]) -> Any:
-    """A parameter that is not fitted; unless it is stated, it is equal to the lower bound and does not limit."""
+    """A parameter that is not fitted; unless it is stated, it is equal to the lower bound and does
+    not limit.
+    """
     return parameter(unit, symbol, description, bounds=bounds, fitted=False, default=bounds[0])
 
 
@@ -60,24 +64,40 @@ def _upper_limit(unit: str, symbol: str, description: str, bounds: tuple[float, 
 
 @model
 class Ratings:
-    """Permitted values of a muscle, as its maker states them; a value that is not stated does not limit.
+    """Permitted values of a muscle, as its maker states them; a value that is not stated does not
+    limit.
 
-    They belong to the product and protect it; the validity range of a characteristic belongs to the measurements.
-    Points may be permitted and not measured, or measured and not permitted.
+    They belong to the product and protect it; the validity range of a characteristic belongs to the
+    measurements. Points may be permitted and not measured, or measured and not permitted.
     """
 
     max_force: float = _upper_limit("N", "F_max", "permitted force", FORCE_BOUNDS)
-    min_pressure: float = _lower_limit("Pa", "p_min", "minimum permitted gauge pressure", PRESSURE_BOUNDS)
-    max_pressure: float = _upper_limit("Pa", "p_max", "maximum permitted gauge pressure", PRESSURE_BOUNDS)
-    max_contraction: float = _upper_limit("1", "eps_max", "maximum permitted contraction", (0.0, CONTRACTION_BOUNDS[1]))
+    min_pressure: float = _lower_limit(
+        "Pa", "p_min", "minimum permitted gauge pressure", PRESSURE_BOUNDS
+    )
+    max_pressure: float = _upper_limit(
+        "Pa", "p_max", "maximum permitted gauge pressure", PRESSURE_BOUNDS
+    )
+    max_contraction: float = _upper_limit(
+        "1", "eps_max", "maximum permitted contraction", (0.0, CONTRACTION_BOUNDS[1])
+    )
     max_prestretch: float = _upper_limit(
-        "1", "eps_pre", "maximum permitted elongation beyond the resting length", (0.0, -CONTRACTION_BOUNDS[0])
+        "1",
+        "eps_pre",
+        "maximum permitted elongation beyond the resting length",
+        (0.0, -CONTRACTION_BOUNDS[0]),
     )
     min_length: float = _lower_limit("m", "L_min", "minimum nominal length", LENGTH_BOUNDS)
     max_length: float = _upper_limit("m", "L_max", "maximum nominal length", LENGTH_BOUNDS)
-    diameter: float = _lower_limit("m", "D", "nominal inner diameter at rest; 0 is not stated", (0.0, 1.0))
-    min_temperature: float = _lower_limit("K", "T_min", "minimum permitted ambient temperature", TEMPERATURE_BOUNDS)
-    max_temperature: float = _upper_limit("K", "T_max", "maximum permitted ambient temperature", TEMPERATURE_BOUNDS)
+    diameter: float = _lower_limit(
+        "m", "D", "nominal inner diameter at rest; 0 is not stated", (0.0, 1.0)
+    )
+    min_temperature: float = _lower_limit(
+        "K", "T_min", "minimum permitted ambient temperature", TEMPERATURE_BOUNDS
+    )
+    max_temperature: float = _upper_limit(
+        "K", "T_max", "maximum permitted ambient temperature", TEMPERATURE_BOUNDS
+    )
 
     @property
     def stated(self) -> tuple[str, ...]:
@@ -85,24 +105,36 @@ class Ratings:
         return tuple(p.name for p in parameters(self) if getattr(self, p.name) != p.default)
 
     def ranges(self) -> Iterator[RatedRange]:
-        """Permitted ranges of force, pressure, contraction, length and temperature that state a limit."""
+        """Permitted ranges of force, pressure, contraction, length and temperature that state a
+        limit.
+        """
         stated = {name: getattr(self, name) for name in self.stated}
-        limits = {q: (stated.get(f"min_{q}", -INFINITY), stated.get(f"max_{q}", INFINITY)) for q in QUANTITIES}
+        limits = {
+            q: (stated.get(f"min_{q}", -INFINITY), stated.get(f"max_{q}", INFINITY))
+            for q in QUANTITIES
+        }
         limits["contraction"] = (-stated.get("max_prestretch", INFINITY), limits["contraction"][1])
-        rows = (RatedRange(quantity, *limits[quantity], *display) for quantity, display in QUANTITIES.items())
+        rows = (
+            RatedRange(quantity, *limits[quantity], *display)
+            for quantity, display in QUANTITIES.items()
+        )
         return (row for row in rows if row.low > -INFINITY or row.high < INFINITY)
 
     def excesses(self, **values: float) -> tuple[str, ...]:
-        """Texts on the given quantities [SI] that are not permitted, with the allowed ranges; empty if all are.
+        """Texts on the given quantities [SI] that are not permitted, with the allowed ranges; empty
+        if all are.
 
-        The quantities are `force`, `pressure`, `contraction`, `length` and `temperature`. Raises ParameterError for
-        another name.
+        The quantities are `force`, `pressure`, `contraction`, `length` and `temperature`. Raises
+        ParameterError for another name.
         """
         unknown = set(values) - set(QUANTITIES)
         if unknown:
-            raise ParameterError(f"Ratings: '{min(unknown)}' is not rated; there are {', '.join(QUANTITIES)}.")
+            raise ParameterError(
+                f"Ratings: '{min(unknown)}' is not rated; there are {', '.join(QUANTITIES)}."
+            )
         return tuple(
-            f"the {row.quantity} {row.display(values[row.quantity])} is not permitted; allowed range: {row}"
+            f"the {row.quantity} {row.display(values[row.quantity])} is not permitted; allowed"
+            f" range: {row}"
             for row in self.ranges()
             if row.quantity in values and not row.contains(values[row.quantity])
         )

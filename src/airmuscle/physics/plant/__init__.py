@@ -1,4 +1,6 @@
-"""Plant: one or more muscles with their pneumatic circuits, a mechanism, a gas and the ambient air."""
+"""Plant: one or more muscles with their pneumatic circuits, a mechanism, a gas and the ambient
+air.
+"""
 
 from ...core.stubs import attach_stub
 

@@ -1,4 +1,6 @@
-"""Display of a plant: card in a notebook, and animation of a run with the muscles coloured by pressure."""
+"""Display of a plant: card in a notebook, and animation of a run with the muscles coloured by
+pressure.
+"""
 
 import os
 import tempfile
@@ -8,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ...core import BLACK, LINES, ColumnError, FileError, ParameterError, as_finite_float, new_figure, quantity_text
+from ...core import (
+    BLACK,
+    LINES,
+    ColumnError,
+    FileError,
+    ParameterError,
+    as_finite_float,
+    new_figure,
+    quantity_text,
+)
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
 from ..muscle.isobars import plot_isobars
@@ -18,7 +29,8 @@ FRAMES = 25.0
 """Frames a second (chosen)."""
 MOST_FRAMES = 3000
 """Largest number of frames of an animation (chosen)."""
-_METAL, _BAR = "#8a8f98", 1e5
+_METAL = "#8a8f98"
+_BAR = 1e5
 
 
 class Animation:
@@ -31,15 +43,19 @@ class Animation:
     def __init__(self, scene: Scene, recording: Recording, speed: float = 1.0) -> None:
         speed = as_finite_float("animate: speed", speed)
         if not speed > 0:
-            raise ParameterError(f"animate: the speed is {speed:g}; it must be positive: 1 for real time.")
+            raise ParameterError(
+                f"animate: the speed is {speed:g}; it must be positive: 1 for real time."
+            )
         time = recording["time"]
         if time.size < 2:
-            raise ColumnError(f"{recording.origin}: an animation needs two rows or more; there are {time.size}.")
+            raise ColumnError(
+                f"{recording.origin}: an animation needs two rows or more; there are {time.size}."
+            )
         count = 1 + int((time[-1] - time[0]) * FRAMES / speed)
         if count > MOST_FRAMES:
             raise ParameterError(
-                f"animate: {count} frames; at most {MOST_FRAMES} are allowed. Raise the speed, or select rows with "
-                "recording.rows(...)."
+                f"animate: {count} frames; at most {MOST_FRAMES} are allowed. Raise the speed, or"
+                " select rows with recording.rows(...)."
             )
         self.times = time[0] + np.arange(count) * speed / FRAMES
         prefixes = scene.muscles.prefixes
@@ -64,32 +80,43 @@ class Animation:
         left, right, lower, upper = self._scene.limits
         drawn.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
         drawn.set_axis_off()
-        time, coordinate = recording["time"], self._scene.coordinates[0]
+        time = recording["time"]
+        coordinate = self._scene.coordinates[0]
         factor, unit = (180 / np.pi, "°") if coordinate != "position" else (1e3, "mm")
         for name, colour in zip(self._scene.coordinates, LINES, strict=False):
             axes[0, 1].plot(time, factor * recording[name], color=colour)
-        axes[0, 1].set_ylabel(f"{coordinate if len(self._scene.coordinates) == 1 else 'angles'} [{unit}]")
+        axes[0, 1].set_ylabel(
+            f"{coordinate if len(self._scene.coordinates) == 1 else 'angles'} [{unit}]"
+        )
         for i, name in enumerate(pressures):
             label = name.removesuffix(".pressure") if len(pressures) > 1 else None
             dashes = "-" if i == 0 else "--"
-            axes[1, 1].plot(time, recording[name] / _BAR, color=LINES[i], linestyle=dashes, label=label)
+            axes[1, 1].plot(
+                time, recording[name] / _BAR, color=LINES[i], linestyle=dashes, label=label
+            )
         axes[1, 1].set(xlabel="time [s]", ylabel="gauge pressure [bar]")
         if len(pressures) > 1:
             axes[1, 1].legend(loc="best", frameon=False, fontsize=8)
         self._cursors = [axis.axvline(time[0], color=BLACK, linewidth=0.8) for axis in axes[:, 1]]
         self._colours = mpl.colormaps["YlOrRd"]
-        scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0.0, self._full_scale / _BAR), self._colours)
+        scale = mpl.cm.ScalarMappable(
+            mpl.colors.Normalize(0.0, self._full_scale / _BAR), self._colours
+        )
         colour_bar = figure.colorbar(scale, ax=drawn, location="left", shrink=0.6)
         colour_bar.set_label("gauge pressure [bar]", fontsize=9)
         colour_bar.ax.tick_params(labelsize=8)
         return figure, drawn
 
     def draw(self, frame: int) -> Any:
-        """Draw one frame, from 0 on; the figure. Raises ParameterError for a frame that does not exist."""
+        """Draw one frame, from 0 on; the figure. Raises ParameterError for a frame that does not
+        exist.
+        """
         from matplotlib.patches import Circle, Polygon
 
         if not 0 <= frame < self.times.size:
-            raise ParameterError(f"animation: there is no frame {frame}; allowed range: 0 to {self.times.size - 1}.")
+            raise ParameterError(
+                f"animation: there is no frame {frame}; allowed range: 0 to {self.times.size - 1}."
+            )
         axes = self._drawn
         for artist in [*axes.patches, *axes.lines, *axes.texts]:
             artist.remove()
@@ -98,10 +125,16 @@ class Animation:
         for line in drawing.lines:
             axes.plot(*line.T, color=BLACK, linewidth=1.6, zorder=2)
         for x, y, radius in drawing.circles:
-            axes.add_patch(Circle((x, y), radius, facecolor="white", edgecolor=BLACK, linewidth=1.2, zorder=3))
+            axes.add_patch(
+                Circle((x, y), radius, facecolor="white", edgecolor=BLACK, linewidth=1.2, zorder=3)
+            )
         for points, pressure in drawing.shapes:
-            colour = _METAL if pressure is None else self._colours(max(pressure, 0.0) / self._full_scale)
-            axes.add_patch(Polygon(points, facecolor=colour, edgecolor=BLACK, linewidth=0.8, zorder=4))
+            colour = (
+                _METAL if pressure is None else self._colours(max(pressure, 0.0) / self._full_scale)
+            )
+            axes.add_patch(
+                Polygon(points, facecolor=colour, edgecolor=BLACK, linewidth=0.8, zorder=4)
+            )
         axes.text(0.02, 0.0, f"{self.times[frame]:.2f} s", transform=axes.transAxes, fontsize=9)
         for cursor in self._cursors:
             cursor.set_xdata([self.times[frame]] * 2)
@@ -109,7 +142,9 @@ class Animation:
 
     def still(self, time: float) -> Any:
         """The figure at the frame nearest to a time [s]."""
-        return self.draw(int(np.argmin(np.abs(self.times - as_finite_float("animation: time", time)))))
+        return self.draw(
+            int(np.argmin(np.abs(self.times - as_finite_float("animation: time", time))))
+        )
 
     def save(self, path: str | Path) -> Path:
         """Write the animation: .gif, .mp4 (needs ffmpeg) or .html, by the suffix; the path.
@@ -121,11 +156,14 @@ class Animation:
         path = Path(path)
         writers = {".gif": "pillow", ".mp4": "ffmpeg", ".html": "html"}
         if path.suffix.lower() not in writers:
-            raise FileError(f"{path}: an animation is written as {', '.join(writers)}; change the suffix.")
+            raise FileError(
+                f"{path}: an animation is written as {', '.join(writers)}; change the suffix."
+            )
         writer = writers[path.suffix.lower()]
         if writer != "html" and not animation.writers.is_available(writer):
             raise FileError(
-                f"{path}: writing {path.suffix} needs {writer}, which is not installed; write .gif or .html."
+                f"{path}: writing {path.suffix} needs {writer}, which is not installed; write .gif"
+                " or .html."
             )
         try:
             with tempfile.TemporaryDirectory(prefix=".animation-", dir=path.parent) as folder:
@@ -142,7 +180,9 @@ class Animation:
     def _matplotlib(self) -> Any:
         from matplotlib.animation import FuncAnimation
 
-        return FuncAnimation(self.figure, self.draw, frames=self.times.size, interval=1000 / FRAMES, blit=False)
+        return FuncAnimation(
+            self.figure, self.draw, frames=self.times.size, interval=1000 / FRAMES, blit=False
+        )
 
     def _repr_html_(self) -> str:
         return str(self._matplotlib().to_jshtml(fps=FRAMES))
@@ -159,7 +199,9 @@ class PlantDisplay(NotebookDisplay):
         """Animation of a run of this plant; see Recording.animate."""
         plant: Any = self
         geometries = [muscle.geometry for muscle in plant.muscles]
-        return Animation(scene_of(geometries, plant.prefixes, plant.mechanism, recording), recording, speed)
+        return Animation(
+            scene_of(geometries, plant.prefixes, plant.mechanism, recording), recording, speed
+        )
 
     def _card(self) -> Card:
         plant: Any = self
@@ -171,10 +213,16 @@ class PlantDisplay(NotebookDisplay):
         circuits = zip(plant.circuit_prefixes, plant.circuits, strict=True)
         rows += [(f"circuit {prefix}".rstrip("."), _brief(circuit)) for prefix, circuit in circuits]
         rows += [("mechanism", _brief(plant.mechanism)), ("gas", _brief(plant.gas))]
-        rows.append(("ambient", f"{quantity_text(plant.ambient.pressure, 'Pa', 'kPa', 6)} absolute"))
+        rows.append(
+            ("ambient", f"{quantity_text(plant.ambient.pressure, 'Pa', 'kPa', 6)} absolute")
+        )
         rows.append((f"{len(plant.states)} states", ", ".join(s.name for s in plant.states)))
         rows.append((f"{len(plant.inputs)} inputs", ", ".join(plant.inputs)))
-        return Card(f"Plant with {len(plant.muscles)} muscle{'s' * (len(plant.muscles) > 1)}", rows, self._draw)
+        return Card(
+            f"Plant with {len(plant.muscles)} muscle{'s' * (len(plant.muscles) > 1)}",
+            rows,
+            self._draw,
+        )
 
     def _draw(self) -> Any:
         plant: Any = self

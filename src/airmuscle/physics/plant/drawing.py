@@ -1,4 +1,6 @@
-"""Drawing of a plant in the plane: outlines of the muscles, cables, pulley or load, at one row of a recording."""
+"""Drawing of a plant in the plane: outlines of the muscles, cables, pulley or load, at one row of a
+recording.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -38,14 +40,17 @@ class Drawing(NamedTuple):
 def muscle_outline(geometry: Geometry, contraction: float) -> Array:
     """Closed outline (N, 2) [m] about the middle of a muscle, whose axis is vertical.
 
-    The radius is that of the geometry. Where it does not end at the fittings, as that of a cylinder, the ends are
-    rounded for the drawing.
+    The radius is that of the geometry. Where it does not end at the fittings, as that of a
+    cylinder, the ends are rounded for the drawing.
     """
     low, high = geometry.contraction_range
     axial, radius = geometry.outline(min(max(contraction, low), high), POINTS)
-    half, widest = float(axial[-1]), float(radius.max())
+    half = float(axial[-1])
+    widest = float(radius.max())
     end = min(widest, half)
-    rounding = np.sqrt(np.clip(1.0 - ((np.abs(axial) - (half - end)) / end).clip(0.0) ** 2, 0.0, None))
+    rounding = np.sqrt(
+        np.clip(1.0 - ((np.abs(axial) - (half - end)) / end).clip(0.0) ** 2, 0.0, None)
+    )
     smallest = 0.45 * widest if radius[0] > 0.9 * widest else float(radius[0])
     radius = np.maximum(radius * rounding, smallest) if radius[0] > 0.9 * widest else radius
     right = np.column_stack([radius, axial])
@@ -55,21 +60,34 @@ def muscle_outline(geometry: Geometry, contraction: float) -> Array:
 class MuscleShapes:
     """The muscles of a plant along a run, with the space that they need."""
 
-    def __init__(self, geometries: Sequence[Geometry], prefixes: Sequence[str], recording: Recording) -> None:
-        self.geometries, self.prefixes = geometries, prefixes
+    def __init__(
+        self, geometries: Sequence[Geometry], prefixes: Sequence[str], recording: Recording
+    ) -> None:
+        self.geometries = geometries
+        self.prefixes = prefixes
         self.length = max(g.resting_length for g in geometries)
         self.fitting_radii = [0.5 * float(muscle_outline(g, 0.0)[:, 0].max()) for g in geometries]
-        pressures, contractions = ([recording[f"{p}{each}"] for p in prefixes] for each in ("pressure", "contraction"))
+        pressures, contractions = (
+            [recording[f"{p}{each}"] for p in prefixes] for each in ("pressure", "contraction")
+        )
         self.pressure = max(float(pressure.max(initial=0.0)) for pressure in pressures)
         """Maximum gauge pressure [Pa], 0 or more."""
         largest = zip(geometries, (float(c.max(initial=0.0)) for c in contractions), strict=True)
-        widths = [float(muscle_outline(geometry, contraction)[:, 0].max()) for geometry, contraction in largest]
+        widths = [
+            float(muscle_outline(geometry, contraction)[:, 0].max())
+            for geometry, contraction in largest
+        ]
         self.spacing = 1.08 * max(widths)
         """Distance [m] of a muscle from the middle at which it does not touch another one."""
 
-    def shapes(self, index: int, row: Row, x: float, y: float, upwards: float) -> tuple[list[Shape], float]:
-        """A muscle with both fittings, from y on upwards (1) or downwards (-1); its shapes and its other end."""
-        geometry, own = self.geometries[index], select_prefix(self.prefixes[index], row)
+    def shapes(
+        self, index: int, row: Row, x: float, y: float, upwards: float
+    ) -> tuple[list[Shape], float]:
+        """A muscle with both fittings, from y on upwards (1) or downwards (-1); its shapes and its
+        other end.
+        """
+        geometry = self.geometries[index]
+        own = select_prefix(self.prefixes[index], row)
         fitting = FITTING * geometry.resting_length
         length = geometry.resting_length * (1.0 - own["contraction"])
         outline = muscle_outline(geometry, own["contraction"])
@@ -96,12 +114,14 @@ class Scene(NamedTuple):
 
 def _joint_scene(muscles: MuscleShapes, joint: AntagonisticJoint) -> Scene:
     """Two muscles side by side below a pulley, whose angle a pointer shows."""
-    length, radius = muscles.length, joint.radius
+    length = muscles.length
+    radius = joint.radius
     base, place = -1.35 * length, max(radius, muscles.spacing)
     half = max(0.62 * length, 2.05 * muscles.spacing)
 
     def draw(row: Row) -> Drawing:
-        shapes, lines = [_box(0.0, 0.5 * length, base - 0.03 * length, base)], []
+        shapes = [_box(0.0, 0.5 * length, base - 0.03 * length, base)]
+        lines = []
         for index, side in enumerate((-1.0, 1.0)):
             muscle, top = muscles.shapes(index, row, side * place, base, 1.0)
             shapes += muscle
@@ -121,9 +141,13 @@ def _lift_scene(muscles: MuscleShapes, load: Translation) -> Scene:
         muscle, end = muscles.shapes(0, row, 0.0, 0.0, -1.0)
         ceiling = _box(0.0, 0.3 * length, 0.0, 0.03 * length)
         mass = _box(0.0, 0.13 * length, end - 0.2 * length, end - 0.04 * length)
-        return Drawing([ceiling, *muscle, mass], [np.array([[0.0, end], [0.0, end - 0.04 * length]])], [])
+        return Drawing(
+            [ceiling, *muscle, mass], [np.array([[0.0, end], [0.0, end - 0.04 * length]])], []
+        )
 
-    return Scene(muscles, (-0.5 * length, 0.5 * length, -1.5 * length, 0.1 * length), ("position",), draw)
+    return Scene(
+        muscles, (-0.5 * length, 0.5 * length, -1.5 * length, 0.1 * length), ("position",), draw
+    )
 
 
 def _arm_scene(muscles: MuscleShapes, arm: PlanarArm) -> Scene:
@@ -135,7 +159,10 @@ def _arm_scene(muscles: MuscleShapes, arm: PlanarArm) -> Scene:
 
     def draw(row: Row) -> Drawing:
         angles = np.cumsum([row[name] for name in coordinates])
-        steps = [length * np.array([np.sin(a), -np.cos(a)]) for length, a in zip(lengths, angles, strict=True)]
+        steps = [
+            length * np.array([np.sin(a), -np.cos(a)])
+            for length, a in zip(lengths, angles, strict=True)
+        ]
         points = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
         shapes = [_box(0.0, 0.15 * reach, 0.03 * reach, 0.06 * reach)]
         for index in range(count):
@@ -148,26 +175,33 @@ def _arm_scene(muscles: MuscleShapes, arm: PlanarArm) -> Scene:
 
 
 def scene_of(
-    geometries: Sequence[Geometry], prefixes: Sequence[str], mechanism: Mechanism, recording: Recording
+    geometries: Sequence[Geometry],
+    prefixes: Sequence[str],
+    mechanism: Mechanism,
+    recording: Recording,
 ) -> Scene:
-    """The scene of a plant along a run. Raises ParameterError for a mechanism that is neither a joint of two muscles, a
-    planar arm nor a translation by one muscle."""
+    """The scene of a plant along a run. Raises ParameterError for a mechanism that is neither a
+    joint of two muscles, a planar arm nor a translation by one muscle."""
     inner: Any = mechanism
     while isinstance(inner, MechanismWrapper):
         inner = inner.inner
-    scenes: dict[type, Callable[[MuscleShapes, Any], Scene]] = {AntagonisticJoint: _joint_scene, PlanarArm: _arm_scene}
+    scenes: dict[type, Callable[[MuscleShapes, Any], Scene]] = {
+        AntagonisticJoint: _joint_scene,
+        PlanarArm: _arm_scene,
+    }
     if len(geometries) == 1:
         scenes[Translation] = _lift_scene
     for kind, scene in scenes.items():
         if isinstance(inner, kind):
             return scene(MuscleShapes(geometries, prefixes, recording), inner)
     raise ParameterError(
-        f"animate: {type(inner).__name__} with {len(geometries)} muscles cannot be drawn; possible are an "
-        "AntagonisticJoint, a PlanarArm, and a load on one muscle (HangingMass, SpringLoad). "
-        "recording.plot() plots any columns."
+        f"animate: {type(inner).__name__} with {len(geometries)} muscles cannot be drawn; possible"
+        " are an AntagonisticJoint, a PlanarArm, and a load on one muscle (HangingMass,"
+        " SpringLoad). recording.plot() plots any columns."
     )
 
 
 def _box(x: float, half_width: float, lower: float, upper: float) -> Shape:
-    left, right = x - half_width, x + half_width
+    left = x - half_width
+    right = x + half_width
     return Shape(np.array([[left, lower], [right, lower], [right, upper], [left, upper]]))

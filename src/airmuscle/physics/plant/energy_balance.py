@@ -1,4 +1,6 @@
-"""WithEnergyMeters: a plant with integrated powers of its components, for checks of its energy balances."""
+"""WithEnergyMeters: a plant with integrated powers of its components, for checks of its energy
+balances.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
@@ -12,31 +14,49 @@ from .static_plant import MuscleState
 
 _METERS = (
     StateVariable("work_of_tension", "J", 1.0, "work of all tensions on the mechanism"),
-    StateVariable("work_of_air", "J", 1.0, "work of the air on its enclosures, against their absolute pressure"),
+    StateVariable(
+        "work_of_air",
+        "J",
+        1.0,
+        "work of the air on its enclosures, against their absolute pressure",
+    ),
     StateVariable("energy_of_flow", "J", 1.0, "energy that flowed into the muscles with the air"),
     StateVariable("heat_to_air", "J", 1.0, "heat from the walls to the air in the muscles"),
     StateVariable("damping_heat", "J", 1.0, "work dissipated by the dampers"),
     StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
-    StateVariable("element_work", "J", 1.0, "work done on springs, creep and end stops: dissipated, and stored"),
-    StateVariable("mechanism_loss", "J", 1.0, "work of the mechanism on dampers, stops, drives and external loads"),
+    StateVariable(
+        "element_work",
+        "J",
+        1.0,
+        "work done on springs, creep and end stops: dissipated, and stored",
+    ),
+    StateVariable(
+        "mechanism_loss",
+        "J",
+        1.0,
+        "work of the mechanism on dampers, stops, drives and external loads",
+    ),
     StateVariable("air_supplied", "kg", 1e-3, "air mass that entered the plant"),
     StateVariable("air_exhausted", "kg", 1e-3, "air mass that left the plant to the surroundings"),
 )
-_FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction: dissipated, and stored in bristles")
+_FRICTION = StateVariable(
+    "friction_work", "J", 1.0, "work done against friction: dissipated, and stored in bristles"
+)
 
 
 @model
 class WithEnergyMeters(System):
-    """A plant with energy and mass meters as further states, and its energies and its air mass as outputs.
+    """A plant with energy and mass meters as further states, and its energies and its air mass as
+    outputs.
 
-    Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`, which includes the
-    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only; the energies
-    of an ExternalLoad are outside the plant, and the work on it is part of `mechanism_loss`, from which the work of the
-    torques of a residual is subtracted. Muscle:
-    `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
-    provided that no muscle is slack. Air: `air_energy`, of the air in the muscles, increases by `energy_of_flow` +
-    `heat_to_air` minus `work_of_air`. Mass: `air_total`, of all air, increases by `air_supplied` minus
-    `air_exhausted`.
+    Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`,
+    which includes the contact force of an end stop, minus `mechanism_loss`, provided that a latch
+    is operated at rest only; the energies of an ExternalLoad are outside the plant, and the work on
+    it is part of `mechanism_loss`, from which the work of the torques of a residual is subtracted.
+    Muscle: `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` +
+    `friction_work` (with friction), provided that no muscle is slack. Air: `air_energy`, of the air
+    in the muscles, increases by `energy_of_flow` + `heat_to_air` minus `work_of_air`. Mass:
+    `air_total`, of all air, increases by `air_supplied` minus `air_exhausted`.
     """
 
     from_file: ClassVar[bool] = False
@@ -88,28 +108,39 @@ class WithEnergyMeters(System):
         return self.rates_and_outputs(state, inputs)[0]
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Any]:
-        """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
+        """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air
+        [kg].
+        """
         return self.rates_and_outputs(state, inputs)[1]
 
-    def rates_and_outputs(self, state: Values, inputs: Values) -> tuple[dict[str, Value], dict[str, Any]]:
+    def rates_and_outputs(
+        self, state: Values, inputs: Values
+    ) -> tuple[dict[str, Value], dict[str, Any]]:
         """Both from one evaluation of the plant."""
-        plant, at = self.plant, self.plant.evaluate(state, inputs)
+        plant = self.plant
+        at = self.plant.evaluate(state, inputs)
         powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
         for part, muscle, flow in zip(plant.muscles, at.muscles, at.flows, strict=True):
             powers["work_of_tension"] += muscle.tension * muscle.speed
             powers["work_of_air"] += muscle.air.pressure * muscle.volume_rate
-            powers["energy_of_flow"] += plant.gas.energy_flow(muscle.states, flow, muscle.volume, plant.ambient)
+            powers["energy_of_flow"] += plant.gas.energy_flow(
+                muscle.states, flow, muscle.volume, plant.ambient
+            )
             powers["heat_to_air"] += plant.gas.heat_flow(muscle.states, muscle.air, plant.ambient)
             for name, power in _muscle_powers(part, muscle).items():
                 powers[name] += power
-        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, at.forces, inputs)
+        powers["mechanism_loss"] += plant.mechanism.dissipated_power(
+            state, state, at.forces, inputs
+        )
         for circuit in at.circuits:
             powers["air_supplied"] += circuit.drawn.mass
             powers["air_exhausted"] += circuit.exhausted.mass
         energies = {
             "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
             "potential_energy": plant.mechanism.potential_energy(state),
-            "air_energy": sum(plant.gas.available_energy(m.states, m.volume, plant.ambient) for m in at.muscles),
+            "air_energy": sum(
+                plant.gas.available_energy(m.states, m.volume, plant.ambient) for m in at.muscles
+            ),
             "air_total": total_air({s.name: state[s.name] for s in plant.states}),
         }
         return {**plant.rates_of(at, state), **powers}, {**plant.outputs_of(at), **energies}
@@ -122,7 +153,9 @@ def total_air(state: Mapping[str, Any]) -> Value:
 
 def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
     """Power that the elements of a muscle deliver and absorb [W]."""
-    pressure, inner, speed = muscle.pressure, muscle.inner_contraction, muscle.inner_speed
+    pressure = muscle.pressure
+    inner = muscle.inner_contraction
+    speed = muscle.inner_speed
     length = part.geometry.resting_length
     opposing = part.spring.force(pressure, inner, length) + part.stop.force(inner, speed, length)
     if part.creep.states:

@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ParameterError, TraceError, at_ambient, check_above_vacuum, one_line, quantity, with_ambient
+from ...core import (
+    ParameterError,
+    TraceError,
+    at_ambient,
+    check_above_vacuum,
+    one_line,
+    quantity,
+    with_ambient,
+)
 from ...core.declaration import as_finite_float, check_structure, parameters
 from ..mechanism import Mechanism
 from ..muscle import Muscle
@@ -15,42 +23,64 @@ from ..pneumatics import Ambient, Circuit, Gas, check_not_shared
 
 
 def check_parts(plant: Any) -> None:
-    """Raise ParameterError for parts that do not form a plant, TraceError for a law without closed form."""
-    parts: list[tuple[str, Any, type[Any]]] = [("mechanism", plant.mechanism, Mechanism), ("gas", plant.gas, Gas)]
+    """Raise ParameterError for parts that do not form a plant, TraceError for a law without closed
+    form.
+    """
+    parts: list[tuple[str, Any, type[Any]]] = [
+        ("mechanism", plant.mechanism, Mechanism),
+        ("gas", plant.gas, Gas),
+    ]
     parts += [("ambient", plant.ambient, Ambient)]
-    parts += [("muscle", m, Muscle) for m in plant.muscles] + [("circuit", c, Circuit) for c in plant.circuits]
+    parts += [("muscle", m, Muscle) for m in plant.muscles] + [
+        ("circuit", c, Circuit) for c in plant.circuits
+    ]
     for field, part, kind in parts:
         if not isinstance(part, kind):
             hint = " Put several into a tuple." if isinstance(part, list) else ""
             hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
-            raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {one_line(part)}.{hint}")
+            raise ParameterError(
+                f"Plant: its {field} must be a {kind.__name__}; it is {one_line(part)}.{hint}"
+            )
     for muscle, part in ((m, part) for m in plant.muscles for part in (m.contractile, m.geometry)):
         if not part.traceable:
             raise TraceError(
-                f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
-                "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
+                f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a"
+                " plant. Use as_force_law(law, validity_range) for a characteristic,"
+                " as_polynomial(geometry) for a geometry."
             )
     limits = parameters(ValidityRange)
-    ranged = (m.contractile for m in plant.muscles if all(hasattr(m.contractile, each.name) for each in limits))
+    ranged = (
+        m.contractile
+        for m in plant.muscles
+        if all(hasattr(m.contractile, each.name) for each in limits)
+    )
     for law, declared in itertools.product(ranged, limits):
-        limit, (low, high) = getattr(law, declared.name), declared.bounds
-        smallest, largest = float(np.min(limit)), float(np.max(limit))  # a limit may be a column (N,)
+        limit = getattr(law, declared.name)
+        low, high = declared.bounds
+        # a limit may be a column (N,)
+        smallest = float(np.min(limit))
+        largest = float(np.max(limit))
         if not low <= smallest <= largest <= high:
             unit = "" if declared.unit == "1" else f" {declared.unit}"
             raise ParameterError(
-                f"{type(law).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
-                f"{smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
+                f"{type(law).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is"
+                f" {smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to"
+                f" {high:g}{unit}."
             )
     check_structure((tuple(plant.muscles), tuple(plant.circuits), plant.mechanism))
     _check_counts(plant.muscles, plant.circuits, plant.mechanism)
     if isinstance(plant.circuit, tuple) and any(c.port_count != 1 for c in plant.circuits):
-        raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
+        raise ParameterError(
+            "Plant: give a circuit that feeds several muscles alone, not in a tuple."
+        )
 
 
 def convert_pressures(plant: Any) -> None:
-    """Convert the pressures that parts of a plant state as absolute with its ambient air, then check supplies.
+    """Convert the pressures that parts of a plant state as absolute with its ambient air, then
+    check supplies.
 
-    Raises ParameterError for a placeholder of a supply, and for a supply that cannot exist in the ambient air.
+    Raises ParameterError for a placeholder of a supply, and for a supply that cannot exist in the
+    ambient air.
     """
     for name in ("muscle", "circuit", "mechanism"):
         part = with_ambient(getattr(plant, name), plant.ambient.pressure)
@@ -62,7 +92,9 @@ def convert_pressures(plant: Any) -> None:
         each.supply.check_ambient(plant.ambient)
 
 
-def _check_counts(muscles: Sequence[Muscle], circuits: Sequence[Circuit], mechanism: Mechanism) -> None:
+def _check_counts(
+    muscles: Sequence[Muscle], circuits: Sequence[Circuit], mechanism: Mechanism
+) -> None:
     names = [m.name for m in muscles]
     if not names:
         raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
@@ -71,13 +103,16 @@ def _check_counts(muscles: Sequence[Muscle], circuits: Sequence[Circuit], mechan
         raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
     if mechanism.muscle_count not in (None, len(names)):
         owner = type(mechanism).__name__
-        raise ParameterError(f"Plant: {owner} takes {mechanism.muscle_count} muscles; {len(names)} are given.")
+        raise ParameterError(
+            f"Plant: {owner} takes {mechanism.muscle_count} muscles; {len(names)} are given."
+        )
     if len(set(names)) < len(names):
         raise ParameterError(f"Plant: muscles need different names; they are {names}.")
 
 
 def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:
-    """A finite number in SI, also from a text with a unit; absolute pressures are converted with `ambient`.
+    """A finite number in SI, also from a text with a unit; absolute pressures are converted with
+    `ambient`.
 
     Raises ParameterError or UnitError.
     """
@@ -86,11 +121,14 @@ def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:
     return as_finite_float(where, at_ambient(value, ambient.pressure))
 
 
-def check_pressures(pressure: float | str | Sequence[float | str], muscles: int, ambient: Ambient) -> list[float]:
-    """The gauge pressure [Pa] of each muscle, from one for all or one for each; also texts with a unit.
+def check_pressures(
+    pressure: float | str | Sequence[float | str], muscles: int, ambient: Ambient
+) -> list[float]:
+    """The gauge pressure [Pa] of each muscle, from one for all or one for each; also texts with a
+    unit.
 
-    Raises UnitError, and ParameterError for a pressure that is not above absolute vacuum and for another number than of
-    muscles.
+    Raises UnitError, and ParameterError for a pressure that is not above absolute vacuum and for
+    another number than of muscles.
     """
     given = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
     pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient) for p in given]

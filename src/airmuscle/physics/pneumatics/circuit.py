@@ -1,4 +1,6 @@
-"""Circuit (interface) from an air supply through valves to the muscles; circuits of on/off valves, closed chamber."""
+"""Circuit (interface) from an air supply through valves to the muscles; circuits of on/off valves,
+closed chamber.
+"""
 
 import abc
 import dataclasses
@@ -20,8 +22,9 @@ SUPPLY = "supply."
 class CircuitFlows:
     """Flows, rates and outputs of a circuit at one instant.
 
-    `flows` are the flows into each muscle, `drawn` is the flow from the supply, `exhausted` the flow to the
-    surroundings, `rates` are the time derivatives of the circuit's states and `outputs` additional quantities by name.
+    `flows` are the flows into each muscle, `drawn` is the flow from the supply, `exhausted` the
+    flow to the surroundings, `rates` are the time derivatives of the circuit's states and `outputs`
+    additional quantities by name.
     """
 
     flows: tuple[Flow, ...]
@@ -33,13 +36,18 @@ class CircuitFlows:
     def __add__(self, other: "CircuitFlows") -> "CircuitFlows":
         """The flows of two circuits on one supply."""
         return CircuitFlows(
-            self.flows + other.flows, self.drawn + other.drawn, self.exhausted + other.exhausted,
-            {**self.rates, **other.rates}, {**self.outputs, **other.outputs},
-        )  # fmt: skip
+            self.flows + other.flows,
+            self.drawn + other.drawn,
+            self.exhausted + other.exhausted,
+            {**self.rates, **other.rates},
+            {**self.outputs, **other.outputs},
+        )
 
 
 class Circuit(abc.ABC):
-    """Pneumatic circuit of one or more muscles: inputs, states and the flows into the muscles (interface)."""
+    """Pneumatic circuit of one or more muscles: inputs, states and the flows into the muscles
+    (interface).
+    """
 
     references: ClassVar[tuple[Reference, ...]] = ()
     supply: AirSource
@@ -63,11 +71,17 @@ class Circuit(abc.ABC):
         return {}
 
     @abc.abstractmethod
-    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
-        """Flows for the air state at the supply and the air states of the muscles; `rates` without the supply."""
+    def supplied_flow(
+        self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
+        """Flows for the air state at the supply and the air states of the muscles; `rates` without
+        the supply.
+        """
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        """Warnings by prefix of the part where a run left the validity range; `columns` are arrays (N,) by name."""
+        """Warnings by prefix of the part where a run left the validity range; `columns` are arrays
+        (N,) by name.
+        """
         return {}
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
@@ -76,18 +90,29 @@ class Circuit(abc.ABC):
 
     def steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
         """Steady state of circuit and supply for zero inputs and the air states of the muscles."""
-        return {**self.own_steady_state(muscles, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
+        return {
+            **self.own_steady_state(muscles, ambient),
+            **with_prefix(SUPPLY, self.supply.steady_state(ambient)),
+        }
 
-    def compute_flows(self, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def compute_flows(
+        self, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         """Flows and rates of circuit and supply; `drawn` is the flow from outside the plant."""
         supply = select_prefix(SUPPLY, state)
-        flows = self.supplied_flow(self.supply.air(supply, ambient), muscles, state, inputs, ambient)
+        flows = self.supplied_flow(
+            self.supply.air(supply, ambient), muscles, state, inputs, ambient
+        )
         rates, inflow = self.supply.balance(supply, flows.drawn, ambient)
-        return dataclasses.replace(flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow)
+        return dataclasses.replace(
+            flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow
+        )
 
 
 class CircuitWrapper(Circuit, abc.ABC):
-    """Wrapper between a circuit and its muscles; supply, ports and inputs are those of the inner circuit."""
+    """Wrapper between a circuit and its muscles; supply, ports and inputs are those of the inner
+    circuit.
+    """
 
     circuit: Circuit
 
@@ -100,7 +125,9 @@ class CircuitWrapper(Circuit, abc.ABC):
 
 
 def port_prefix(number: int) -> str:
-    """Prefix of the names that belong to a port, counted from 1, of a circuit with several ports."""
+    """Prefix of the names that belong to a port, counted from 1, of a circuit with several
+    ports.
+    """
     return f"port{number}."
 
 
@@ -111,13 +138,17 @@ def ambient_air(ambient: Ambient) -> Air:
 
 @model
 class ValvePair(Circuit):
-    """Circuit with a fill valve from the supply and a discharge valve to the surroundings (base class)."""
+    """Circuit with a fill valve from the supply and a discharge valve to the surroundings (base
+    class).
+    """
 
     supply: AirSource
     fill: Orifice
     discharge: Orifice
 
-    def valve_flows(self, inlet: Air, air: Air, opened: Value, vented: Value, ambient: Ambient) -> CircuitFlows:
+    def valve_flows(
+        self, inlet: Air, air: Air, opened: Value, vented: Value, ambient: Ambient
+    ) -> CircuitFlows:
         """Flows at these openings of the two valves."""
         inflow = orifice_flow(self.fill, inlet, air, opened)
         outflow = orifice_flow(self.discharge, air, ambient_air(ambient), vented)
@@ -130,19 +161,27 @@ class FillDischarge(ValvePair):
 
     inputs = (Input("fill"), Input("discharge"))
 
-    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def supplied_flow(
+        self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         return self.valve_flows(inlet, muscles[0], inputs["fill"], inputs["discharge"], ambient)
 
 
 @model
 class ThreePositionValve(ValvePair):
-    """3/3 valve with closed centre and one input `valve`: 1 fill, 0 closed, -1 discharge; proportional between."""
+    """3/3 valve with closed centre and one input `valve`: 1 fill, 0 closed, -1 discharge;
+    proportional between.
+    """
 
     inputs = (Input("valve", "1", -1.0, 1.0, "1 fill, 0 closed, -1 discharge"),)
 
-    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def supplied_flow(
+        self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         position = inputs["valve"]
-        return self.valve_flows(inlet, muscles[0], ops.maximum(position, 0.0), ops.maximum(-position, 0.0), ambient)
+        return self.valve_flows(
+            inlet, muscles[0], ops.maximum(position, 0.0), ops.maximum(-position, 0.0), ambient
+        )
 
 
 @model
@@ -153,7 +192,9 @@ class ClosedChamber(Circuit):
 
     inputs = ()
 
-    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def supplied_flow(
+        self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         return CircuitFlows((NO_FLOW,))
 
 
@@ -164,7 +205,9 @@ class WithLeak(CircuitWrapper):
     circuit: Circuit
     leak: Orifice
 
-    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def supplied_flow(
+        self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         inner = self.circuit.supplied_flow(inlet, muscles, state, inputs, ambient)
         leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in muscles]
         flows = tuple(flow - leak for flow, leak in zip(inner.flows, leakage, strict=True))
@@ -173,28 +216,35 @@ class WithLeak(CircuitWrapper):
 
 @model
 class Manifold(Circuit):
-    """Manifold: several named circuits on one supply; a large flow in one reduces the supply pressure of all."""
+    """Manifold: several named circuits on one supply; a large flow in one reduces the supply
+    pressure of all.
+    """
 
     supply: AirSource
     branches: tuple[Circuit, ...]
     names: tuple[str, ...]
 
     def check(self) -> None:
-        if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
+        if (
+            len(self.names) != len(self.branches)
+            or len(set(self.names)) != len(self.names)
+            or not self.names
+        ):
             raise ParameterError(
-                f"Manifold: names is {self.names}; give a distinct name for each of the {len(self.branches)} branches."
+                f"Manifold: names is {self.names}; give a distinct name for each of the"
+                f" {len(self.branches)} branches."
             )
         for name in self.names:
             if not name or "." in name or f"{name}." == SUPPLY:
                 raise ParameterError(
-                    f"Manifold: a branch cannot be named {name!r}; give a name without a dot and other than 'supply', "
-                    "which is reserved for the supply of the manifold."
+                    f"Manifold: a branch cannot be named {name!r}; give a name without a dot and"
+                    " other than 'supply', which is reserved for the supply of the manifold."
                 )
         for name, branch in zip(self.names, self.branches, strict=True):
             if not isinstance(branch.supply, SharedSupply):
                 raise ParameterError(
-                    f"Manifold: the supply of branch '{name}' is {type(branch.supply).__name__}; it must be "
-                    "SharedSupply(), because the manifold feeds all branches."
+                    f"Manifold: the supply of branch '{name}' is {type(branch.supply).__name__}; it"
+                    " must be SharedSupply(), because the manifold feeds all branches."
                 )
 
     def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
@@ -213,10 +263,16 @@ class Manifold(Circuit):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return tuple(i for name, branch in self._named_branches() for i in add_prefix(name, branch.inputs))
+        return tuple(
+            i for name, branch in self._named_branches() for i in add_prefix(name, branch.inputs)
+        )
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return tuple(s for name, branch in self._named_branches() for s in add_prefix(name, branch.own_states(ambient)))
+        return tuple(
+            s
+            for name, branch in self._named_branches()
+            for s in add_prefix(name, branch.own_states(ambient))
+        )
 
     def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
         state: dict[str, Value] = {}
@@ -227,14 +283,20 @@ class Manifold(Circuit):
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         warnings: dict[str, str] = {}
         for name, branch in self._named_branches():
-            warnings |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
+            warnings |= with_prefix(
+                name, branch.validity_warnings(select_prefix(name, columns), ambient)
+            )
         return warnings
 
-    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def supplied_flow(
+        self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         total = CircuitFlows(())
         for name, branch, branch_air in self._branch_air(muscles):
-            own, commands = select_prefix(name, state), select_prefix(name, inputs)
+            own = select_prefix(name, state)
+            commands = select_prefix(name, inputs)
             part = branch.supplied_flow(inlet, branch_air, own, commands, ambient)
-            rates, outputs = with_prefix(name, part.rates), with_prefix(name, part.outputs)
+            rates = with_prefix(name, part.rates)
+            outputs = with_prefix(name, part.outputs)
             total += dataclasses.replace(part, rates=rates, outputs=outputs)
         return total

@@ -1,14 +1,24 @@
 """Gas models of dry ideal air: pressure and temperature of a chamber; gauge and absolute pressure.
 
-The state of a chamber is its air mass, from which the pressure follows, so that mass is conserved independently of the
-integration tolerance.
+The state of a chamber is its air mass, from which the pressure follows, so that mass is conserved
+independently of the integration tolerance.
 """
 
 import abc
 import dataclasses
 from typing import ClassVar, NamedTuple
 
-from ...core import Reference, StateVariable, Value, Values, autodiff, model, ops, parameter, published
+from ...core import (
+    Reference,
+    StateVariable,
+    Value,
+    Values,
+    autodiff,
+    model,
+    ops,
+    parameter,
+    published,
+)
 from ...core.units import ABSOLUTE, AMBIENT_PRESSURE
 
 GAS_CONSTANT = 287.05
@@ -40,7 +50,12 @@ class Ambient:
         default=AMBIENT_PRESSURE,
     )
     temperature: float = parameter(
-        "K", "T_amb", "temperature of the surroundings", bounds=(200.0, 400.0), fitted=False, default=293.15
+        "K",
+        "T_amb",
+        "temperature of the surroundings",
+        bounds=(200.0, 400.0),
+        fitted=False,
+        default=293.15,
     )
 
 
@@ -66,7 +81,9 @@ Airs = tuple[Air, ...]
 
 
 def upstream_temperature(first: Air, second: Air, forward: Value) -> Value:
-    """Temperature [K] of air that flows from `first` to `second` where `forward`, otherwise in the other direction."""
+    """Temperature [K] of air that flows from `first` to `second` where `forward`, otherwise in the
+    other direction.
+    """
     if second.temperature is first.temperature:
         return first.temperature  # avoids a selection between two equal temperatures
     return ops.where(forward, first.temperature, second.temperature)
@@ -99,13 +116,17 @@ NO_FLOW = Flow(0.0, 0.0)
 
 
 class Gas(abc.ABC):
-    """Gas model of the air in a chamber (interface). A state is a mapping from the names in `states` to values."""
+    """Gas model of the air in a chamber (interface). A state is a mapping from the names in
+    `states` to values.
+    """
 
     references: ClassVar[tuple[Reference, ...]] = ()
 
     @abc.abstractmethod
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
-        """State variables of a chamber, `air_mass` first; the volume [m3] sets their nominal values."""
+        """State variables of a chamber, `air_mass` first; the volume [m3] sets their nominal
+        values.
+        """
 
     @abc.abstractmethod
     def air(self, state: Values, volume: Value, ambient: Ambient) -> Air:
@@ -113,15 +134,23 @@ class Gas(abc.ABC):
 
     @abc.abstractmethod
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
-        """State of a chamber with a volume [m3] at rest at an absolute pressure [Pa] and ambient temperature."""
+        """State of a chamber with a volume [m3] at rest at an absolute pressure [Pa] and ambient
+        temperature.
+        """
 
     @abc.abstractmethod
-    def rates(self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient) -> dict[str, Value]:
-        """Time derivatives of the states for an inflow and a rate of change of the volume [m3/s]."""
+    def rates(
+        self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
+    ) -> dict[str, Value]:
+        """Time derivatives of the states for an inflow and a rate of change of the volume
+        [m3/s].
+        """
 
     @abc.abstractmethod
     def available_energy(self, state: Values, volume: Value, ambient: Ambient) -> Value:
-        """Available energy [J]; its derivative with respect to volume along the process is minus the pressure."""
+        """Available energy [J]; its derivative with respect to volume along the process is minus
+        the pressure.
+        """
 
     @abc.abstractmethod
     def energy_flow(self, state: Values, flow: Flow, volume: Value, ambient: Ambient) -> Value:
@@ -137,7 +166,9 @@ class Gas(abc.ABC):
 
 
 class BarotropicGas(Gas):
-    """Barotropic gas: the pressure is a function of air mass and volume along one process (interface)."""
+    """Barotropic gas: the pressure is a function of air mass and volume along one process
+    (interface).
+    """
 
     @abc.abstractmethod
     def pressure(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
@@ -149,10 +180,16 @@ class BarotropicGas(Gas):
 
     @abc.abstractmethod
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        """Available energy [J]; its derivative with respect to volume is minus the absolute pressure."""
+        """Available energy [J]; its derivative with respect to volume is minus the absolute
+        pressure.
+        """
 
-    def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        """Temperature [K] of an air mass [kg] at an absolute pressure [Pa] in a volume [m3]; ambient by default."""
+    def temperature(
+        self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient
+    ) -> Value:
+        """Temperature [K] of an air mass [kg] at an absolute pressure [Pa] in a volume [m3];
+        ambient by default.
+        """
         return ambient.temperature
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
@@ -166,14 +203,18 @@ class BarotropicGas(Gas):
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
         return {"air_mass": self.air_mass(pressure, volume, ambient)}
 
-    def rates(self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient) -> dict[str, Value]:
+    def rates(
+        self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
+    ) -> dict[str, Value]:
         return {"air_mass": flow.mass}
 
     def available_energy(self, state: Values, volume: Value, ambient: Ambient) -> Value:
         return self.energy(state["air_mass"], volume, ambient)
 
     def energy_flow(self, state: Values, flow: Flow, volume: Value, ambient: Ambient) -> Value:
-        per_mass = autodiff.jvp(lambda x: [self.energy(x[0], volume, ambient)], [state["air_mass"]], [1.0])
+        per_mass = autodiff.jvp(
+            lambda x: [self.energy(x[0], volume, ambient)], [state["air_mass"]], [1.0]
+        )
         return per_mass[0] * flow.mass
 
 
@@ -199,10 +240,11 @@ class Isothermal(BarotropicGas):
 class Polytropic(BarotropicGas):
     """Polytropic gas: p / rho^n is constant and equal to that of the ambient air.
 
-        p = p_amb (m R T_amb / (p_amb V))^n,   so that   p' = n (R T m' - p V') / V   with T = p V / (m R)
+        p = p_amb (m R T_amb / (p_amb V))^n,   so that   p' = n (R T m' - p V') / V   with T = p V /
+        (m R)
 
-    n -> 1 is isothermal, n = 1.4 adiabatic. The process passes through ambient pressure and temperature; air that has
-    cooled at a higher pressure is not described.
+    n -> 1 is isothermal, n = 1.4 adiabatic. The process passes through ambient pressure and
+    temperature; air that has cooled at a higher pressure is not described.
     """
 
     exponent: float = parameter("1", "n", "polytropic exponent", bounds=(1.001, 1.667), default=1.2)
@@ -215,7 +257,9 @@ class Polytropic(BarotropicGas):
         density = ambient.pressure / (GAS_CONSTANT * ambient.temperature)
         return density * volume * (pressure / ambient.pressure) ** (1.0 / self.exponent)
 
-    def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
+    def temperature(
+        self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient
+    ) -> Value:
         return pressure * volume / (air_mass * GAS_CONSTANT)
 
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
@@ -226,18 +270,22 @@ class Polytropic(BarotropicGas):
 
 
 class FirstLawGas(Gas):
-    """Energy balance (first law) of dry ideal air in a chamber whose wall is at ambient temperature (interface).
+    """Energy balance (first law) of dry ideal air in a chamber whose wall is at ambient temperature
+    (interface).
 
         m' = sum m'_i,   U' = sum c_p T_i m'_i - p V' + Q',   T = U/(m c_v),   p = (gamma - 1) U/V
 
-    m air mass, U internal energy, T_i upstream temperature of each flow, Q' heat flow from the wall; gamma = 1.4.
+    m air mass, U internal energy, T_i upstream temperature of each flow, Q' heat flow from the
+    wall; gamma = 1.4.
     """
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
         rest = self.state_at(ambient.pressure, volume, ambient)
         return (
             StateVariable("air_mass", "kg", rest["air_mass"], "air mass"),
-            StateVariable("internal_energy", "J", rest["internal_energy"], "internal energy of the air"),
+            StateVariable(
+                "internal_energy", "J", rest["internal_energy"], "internal energy of the air"
+            ),
         )
 
     def air(self, state: Values, volume: Value, ambient: Ambient) -> Air:
@@ -251,7 +299,9 @@ class FirstLawGas(Gas):
             "internal_energy": pressure * volume / (HEAT_CAPACITY_RATIO - 1.0),
         }
 
-    def rates(self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient) -> dict[str, Value]:
+    def rates(
+        self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
+    ) -> dict[str, Value]:
         energy = flow.enthalpy - air.pressure * volume_rate + self.heat_flow(state, air, ambient)
         return {"air_mass": flow.mass, "internal_energy": energy}
 
@@ -262,18 +312,23 @@ class FirstLawGas(Gas):
         return flow.enthalpy
 
     def sound_speed(self, air: Air) -> Value:
-        """Adiabatic speed of sound [m/s]; a heat transfer that is fast against the period reduces it to isothermal."""
+        """Adiabatic speed of sound [m/s]; a heat transfer that is fast against the period reduces
+        it to isothermal.
+        """
         return ops.sqrt(HEAT_CAPACITY_RATIO * GAS_CONSTANT * air.temperature)
 
 
 @model
 class EnergyBalance(FirstLawGas):
-    """Energy balance with Q' = hA (T_amb - T), the heat transfer coefficient times the area of the wall of a chamber.
+    """Energy balance with Q' = hA (T_amb - T), the heat transfer coefficient times the area of the
+    wall of a chamber.
 
     hA = 0 is adiabatic, a large hA isothermal. The equations are those of FirstLawGas.
     """
 
-    heat_transfer: float = parameter("W/K", "hA", "heat transfer coefficient times wall area", bounds=(0.0, 1e5))
+    heat_transfer: float = parameter(
+        "W/K", "hA", "heat transfer coefficient times wall area", bounds=(0.0, 1e5)
+    )
 
     def heat_flow(self, state: Values, air: Air, ambient: Ambient) -> Value:
         return self.heat_transfer * (ambient.temperature - air.temperature)

@@ -13,12 +13,17 @@ from . import expression
 from .expression import Expressions, Node, assemble, depends_on, expand, fold, in_order, summands
 from .intervals import Bounds, traced_expression, within
 
-MAX_OPERATIONS, MAX_PARAMETERS = 600, 120
+MAX_OPERATIONS = 600
+MAX_PARAMETERS = 120
 """Maximum number of operations and of parameters of an equation that is shown (chosen)."""
 MIN_SHARED_OPERATIONS = 3
-"""Minimum operations of a part that occurs twice and gets its own symbol; one less if it occurs more often (chosen)."""
+"""Minimum operations of a part that occurs twice and gets its own symbol; one less if it occurs
+more often (chosen).
+"""
 MAX_INNER_TERMS = 6
-"""Maximum number of terms of a sum inside a function or product; a longer one gets a symbol of its own (chosen)."""
+"""Maximum number of terms of a sum inside a function or product; a longer one gets a symbol of its
+own (chosen).
+"""
 BAR = 1e5
 """Pressure unit of the physical form [Pa]."""
 
@@ -27,7 +32,9 @@ _INDEX = re.compile(r"\[\d+\]$")
 
 @dataclasses.dataclass(frozen=True)
 class Symbol:
-    """A symbol of an equation; the value [SI] is NaN for an argument, for the result and for a shared part."""
+    """A symbol of an equation; the value [SI] is NaN for an argument, for the result and for a
+    shared part.
+    """
 
     name: str
     unit: str
@@ -44,13 +51,16 @@ ARGUMENTS = {
 PRESSURE_IN_BAR = Symbol("P", "bar", "gauge pressure")
 _PART_NAMES = {("p",): "qhn", ("eps",): "xyz", ("F",): "ywv", (): "cgsm"}
 """Symbols of shared parts by the arguments that they depend on: the first that no parameter has."""
-_MIXED_PART_NAMES, _SUM_NAMES = "zwv", "uvs"
+_MIXED_PART_NAMES = "zwv"
+_SUM_NAMES = "uvs"
 """Symbols of other shared parts, and of long sums."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class LawEquation(ShortRepr):
-    """A law as an equation within a validity range; symbols stand under their names in the expressions."""
+    """A law as an equation within a validity range; symbols stand under their names in the
+    expressions.
+    """
 
     title: str
     result: Symbol
@@ -69,7 +79,9 @@ class LawEquation(ShortRepr):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Traced:
-    """A law within a validity range: its arguments, its parameters with their leaves, and the expression."""
+    """A law within a validity range: its arguments, its parameters with their leaves, and the
+    expression.
+    """
 
     new: Expressions
     arguments: tuple[Node, ...]
@@ -80,11 +92,13 @@ class _Traced:
 def law_equation(
     law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
 ) -> tuple[LawEquation, ...]:
-    """The equations of a law for one quantity in terms of two others, for arguments within their ranges [SI].
+    """The equations of a law for one quantity in terms of two others, for arguments within their
+    ranges [SI].
 
-    The first has the parameters as symbols. If the law is a polynomial of scaled arguments, the second is the same
-    polynomial in the physical quantities, the pressure in bar. No equation if the law has no closed form, or one of
-    more than `MAX_OPERATIONS` operations. Limits and extrapolations beyond the ranges are left out.
+    The first has the parameters as symbols. If the law is a polynomial of scaled arguments, the
+    second is the same polynomial in the physical quantities, the pressure in bar. No equation if
+    the law has no closed form, or one of more than `MAX_OPERATIONS` operations. Limits and
+    extrapolations beyond the ranges are left out.
     """
     traced = _trace(law, quantity, arguments, ranges)
     if traced is None:
@@ -97,11 +111,15 @@ def law_equation(
     if len(depends_on(value, list(labels))) > MAX_PARAMETERS:
         return ()
     scaled = _named(value, traced, labels, ARGUMENTS[quantity], names)
-    physical = _physical(traced, ARGUMENTS[quantity], names) if coefficients and scaled.parts else None
+    physical = (
+        _physical(traced, ARGUMENTS[quantity], names) if coefficients and scaled.parts else None
+    )
     return (scaled,) if physical is None else (scaled, physical)
 
 
-def _trace(law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]) -> _Traced | None:
+def _trace(
+    law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
+) -> _Traced | None:
     new = Expressions()
     points = tuple(new.symbol(ARGUMENTS[name].name) for name in arguments)
     own = {new.symbol(f"parameter {leaf.path}"): leaf for leaf in leaves(law)}
@@ -120,26 +138,47 @@ def _trace(law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[st
 
 
 def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]:
-    """The expression with every polynomial written as a sum of monomials, and the powers by coefficient."""
+    """The expression with every polynomial written as a sum of monomials, and the powers by
+    coefficient.
+    """
     powers: dict[Node, tuple[int, ...]] = {}
     shared = _shared(traced.value)
-    parts = [n for n in in_order(traced.value) if n in shared and len(depends_on(n, traced.arguments)) == 1]
-    parts.sort(key=lambda n: traced.arguments.index(depends_on(n, traced.arguments)[0]), reverse=True)
+    parts = [
+        n
+        for n in in_order(traced.value)
+        if n in shared and len(depends_on(n, traced.arguments)) == 1
+    ]
+    parts.sort(
+        key=lambda n: traced.arguments.index(depends_on(n, traced.arguments)[0]), reverse=True
+    )
     atoms = [*parts, *reversed(traced.arguments)]
 
     def rewritten(node: Node) -> Node:
         if node in atoms or not node.arguments:
             return node
-        if node.kind in (expression.ADD, expression.NEGATIVE, expression.PRODUCT, expression.QUOTIENT):
+        if node.kind in (
+            expression.ADD,
+            expression.NEGATIVE,
+            expression.PRODUCT,
+            expression.QUOTIENT,
+        ):
             polynomial = expand(node, {*atoms, *traced.parameters})
-            terms = None if polynomial is None else expression.coefficients_by_monomial(polynomial, traced.parameters)
+            terms = (
+                None
+                if polynomial is None
+                else expression.coefficients_by_monomial(polynomial, traced.parameters)
+            )
             if terms is not None:
                 used = [atom for atom in atoms if any(atom in dict(monomial) for monomial in terms)]
-                powers.update({c: tuple(dict(m).get(atom, 0) for atom in used) for m, c in terms.items()})
+                powers.update(
+                    {c: tuple(dict(m).get(atom, 0) for atom in used) for m, c in terms.items()}
+                )
                 return assemble(terms, used, traced.new)
         return traced.new.apply(node.kind, *(rewritten(each) for each in node.arguments))
 
-    return (rewritten(traced.value) if _operations(traced.value) <= MAX_OPERATIONS else traced.value), powers
+    return (
+        rewritten(traced.value) if _operations(traced.value) <= MAX_OPERATIONS else traced.value
+    ), powers
 
 
 def _operations(root: Node) -> int:
@@ -161,13 +200,23 @@ def _shared(root: Node) -> set[Node]:
 
 
 def _long_sums(root: Node) -> set[Node]:
-    """The sums inside an expression that have too many terms to stand inside a function or product."""
-    inner = (each for node in in_order(root) for each in node.arguments[node.kind == expression.ADD :])
-    return {each for each in inner if each.kind == expression.ADD and len(summands(each)) > MAX_INNER_TERMS}
+    """The sums inside an expression that have too many terms to stand inside a function or
+    product.
+    """
+    inner = (
+        each for node in in_order(root) for each in node.arguments[node.kind == expression.ADD :]
+    )
+    return {
+        each
+        for each in inner
+        if each.kind == expression.ADD and len(summands(each)) > MAX_INNER_TERMS
+    }
 
 
 def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
-    """A name for each parameter: its symbol with the powers or the number of a coefficient, unique in the law."""
+    """A name for each parameter: its symbol with the powers or the number of a coefficient, unique
+    in the law.
+    """
     lists: dict[str, list[Node]] = {}
     for node, leaf in traced.parameters.items():
         lists.setdefault(_INDEX.sub("", leaf.path), []).append(node)
@@ -193,40 +242,66 @@ def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Nod
 
 
 def _named(
-    value: Node, traced: _Traced, labels: Mapping[Node, str], result: Symbol, arguments: Sequence[Symbol]
+    value: Node,
+    traced: _Traced,
+    labels: Mapping[Node, str],
+    result: Symbol,
+    arguments: Sequence[Symbol],
 ) -> LawEquation:
     """The equation with its parameters and shared parts under their names."""
     new = traced.new
 
     def renamed(node: Node, inner: list[Node]) -> Node:
-        return new.apply(node.kind, *inner) if inner else new.symbol(labels[node]) if node in labels else node
+        return (
+            new.apply(node.kind, *inner)
+            if inner
+            else new.symbol(labels[node])
+            if node in labels
+            else node
+        )
 
     root = fold(value, renamed)
     shared = _shared(root) | _long_sums(root)
     present = set(in_order(root))
     parameters = tuple(
         Symbol(labels[node], leaf.declared.unit, leaf.declared.meaning, float(leaf.value))
-        for node, leaf in sorted(traced.parameters.items(), key=lambda item: not item[1].declared.fitted)
+        for node, leaf in sorted(
+            traced.parameters.items(), key=lambda item: not item[1].declared.fitted
+        )
         if new.symbol(labels[node]) in present
     )
-    names = _part_names([n for n in in_order(root) if n in shared], traced.arguments, {p.name for p in parameters})
-    return LawEquation("Parameters as symbols, SI units", result, tuple(arguments), parameters, root, names)
+    names = _part_names(
+        [n for n in in_order(root) if n in shared], traced.arguments, {p.name for p in parameters}
+    )
+    return LawEquation(
+        "Parameters as symbols, SI units", result, tuple(arguments), parameters, root, names
+    )
 
 
-def _part_names(parts: Sequence[Node], arguments: Sequence[Node], taken: Collection[str]) -> dict[Node, str]:
+def _part_names(
+    parts: Sequence[Node], arguments: Sequence[Node], taken: Collection[str]
+) -> dict[Node, str]:
     names: dict[Node, str] = {}
     used = {name.partition("_")[0] for name in taken}
     for node in parts:
         own = tuple(symbol.name for symbol in depends_on(node, arguments))
-        letters = _SUM_NAMES if len(summands(node)) > MAX_INNER_TERMS else _PART_NAMES.get(own, _MIXED_PART_NAMES)
+        letters = (
+            _SUM_NAMES
+            if len(summands(node)) > MAX_INNER_TERMS
+            else _PART_NAMES.get(own, _MIXED_PART_NAMES)
+        )
         base = next((letter for letter in letters if letter not in used), letters[0])
         tried = itertools.chain([base], (f"{base}_{number}" for number in itertools.count(2)))
-        names[node] = next(name for name in tried if name not in taken and name not in names.values())
+        names[node] = next(
+            name for name in tried if name not in taken and name not in names.values()
+        )
     return names
 
 
 def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> LawEquation | None:
-    """The polynomials with numbers, in the physical arguments, pressures in bar; None if there is none."""
+    """The polynomials with numbers, in the physical arguments, pressures in bar; None if there is
+    none.
+    """
     new = traced.new
     bar = new.symbol(PRESSURE_IN_BAR.name)
 
@@ -235,7 +310,9 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
             return new.number(float(traced.parameters[node].value))
         if node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
             return new.product(new.number(BAR), bar)
-        return new.node(node.kind, *inner) if inner else node  # products and quotients of numbers are not evaluated
+        return (
+            new.node(node.kind, *inner) if inner else node
+        )  # products and quotients of numbers are not evaluated
 
     points = [bar if node.name == "p" else node for node in traced.arguments][::-1]
     count = 0
@@ -246,11 +323,17 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
         if polynomial is not None:
             count += 1
             return assemble({m: new.number(float(c)) for m, c in polynomial.items()}, points, new)
-        return new.apply(node.kind, *(rewritten(each) for each in node.arguments)) if node.arguments else node
+        return (
+            new.apply(node.kind, *(rewritten(each) for each in node.arguments))
+            if node.arguments
+            else node
+        )
 
     value = rewritten(fold(traced.value, in_numbers))
     if not count:
         return None
     symbols = tuple(PRESSURE_IN_BAR if each.unit == "Pa" else each for each in arguments)
     names = _part_names([n for n in in_order(value) if n in _long_sums(value)], points, ())
-    return LawEquation("Physical form: numbers, with the pressure in bar", result, symbols, (), value, names)
+    return LawEquation(
+        "Physical form: numbers, with the pressure in bar", result, symbols, (), value, names
+    )

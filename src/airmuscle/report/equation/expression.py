@@ -1,4 +1,6 @@
-"""Expressions: nodes of a formula, shared where they are equal, with the elementary simplifications."""
+"""Expressions: nodes of a formula, shared where they are equal, with the elementary
+simplifications.
+"""
 
 import itertools
 import math
@@ -10,19 +12,46 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
-NUMBER, SYMBOL, ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER = "number", "symbol", "add", "neg", "mul", "div", "pow"
-MAXIMUM, MINIMUM, WHERE = "max", "min", "where"
+NUMBER = "number"
+SYMBOL = "symbol"
+ADD = "add"
+NEGATIVE = "neg"
+PRODUCT = "mul"
+QUOTIENT = "div"
+POWER = "pow"
+MAXIMUM = "max"
+MINIMUM = "min"
+WHERE = "where"
 COMPARISONS = ("lt", "le", "eq", "ne")
-FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "abs")
+FUNCTIONS = (
+    "sqrt",
+    "exp",
+    "log",
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "asinh",
+    "abs",
+)
 
 
 class Node:
-    """An operation, a number (its value) or a symbol (its name). Nodes of one `Expressions` are equal if identical."""
+    """An operation, a number (its value) or a symbol (its name). Nodes of one `Expressions` are
+    equal if identical.
+    """
 
     __slots__ = ("arguments", "kind", "value")
 
     def __init__(self, kind: str, arguments: "tuple[Node, ...]", value: Any) -> None:
-        self.kind, self.arguments, self.value = kind, arguments, value
+        self.kind = kind
+        self.arguments = arguments
+        self.value = value
 
     @property
     def name(self) -> str:
@@ -50,7 +79,9 @@ def in_order(root: Node) -> Iterator[Node]:
 
 
 def fold(root: Node, combine: Callable[[Node, list[Result]], Result]) -> Result:
-    """The result of an expression: `combine` gives that of each node from those of its arguments, and once only."""
+    """The result of an expression: `combine` gives that of each node from those of its arguments,
+    and once only.
+    """
     results: dict[Node, Result] = {}
     for node in in_order(root):
         results[node] = combine(node, [results[each] for each in node.arguments])
@@ -63,14 +94,24 @@ class Expressions:
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
         self._simplified: dict[str, Callable[..., Node]] = {
-            "add": self.add, "neg": self.negative, "mul": self.product, "div": self.quotient, "pow": self.power,
-            "not": self.negation, "where": self.where, "assign": lambda a: a, "sq": lambda a: self.product(a, a),
-            "sub": lambda a, b: self.add(a, self.negative(b)), "twice": lambda a: self.product(self.number(2.0), a),
+            "add": self.add,
+            "neg": self.negative,
+            "mul": self.product,
+            "div": self.quotient,
+            "pow": self.power,
+            "not": self.negation,
+            "where": self.where,
+            "assign": lambda a: a,
+            "sq": lambda a: self.product(a, a),
+            "sub": lambda a, b: self.add(a, self.negative(b)),
+            "twice": lambda a: self.product(self.number(2.0), a),
             "inv": lambda a: self.quotient(self.number(1.0), a),
-        }  # fmt: skip
+        }
 
     def node(self, kind: str, *arguments: Node, value: float | str | None = None) -> Node:
-        """An operation as it is; with numbers that are not evaluated, a polynomial is expanded exactly."""
+        """An operation as it is; with numbers that are not evaluated, a polynomial is expanded
+        exactly.
+        """
         key = (kind, value, *arguments)
         return self._nodes.setdefault(key, Node(kind, arguments, value))
 
@@ -109,7 +150,8 @@ class Expressions:
                 return other if is_number(one, 1.0) else one
             if one.kind == NEGATIVE or (is_number(one) and one.value < 0):
                 return self.negative(self.product(self.negative(one), other))
-        (base, m), (other_base, n) = _as_power(a), _as_power(b)
+        base, m = _as_power(a)
+        other_base, n = _as_power(b)
         if base is other_base:
             return self.power(base, self.number(m + n))
         return self.node(PRODUCT, a, b)
@@ -130,7 +172,11 @@ class Expressions:
             return self.number(1.0)
         if is_number(exponent, 1.0):
             return a
-        if is_number(a) and is_number(exponent) and (a.value > 0 or exponent.value == int(exponent.value) > 0):
+        if (
+            is_number(a)
+            and is_number(exponent)
+            and (a.value > 0 or exponent.value == int(exponent.value) > 0)
+        ):
             return self.number(a.value**exponent.value)
         return self.node(POWER, a, exponent)
 
@@ -141,7 +187,9 @@ class Expressions:
         return condition.arguments[0] if condition.kind == "not" else self.node("not", condition)
 
     def where(self, condition: Node, a: Node, b: Node) -> Node:
-        """a where the condition holds, else b; a maximum, minimum or absolute value if it is one."""
+        """a where the condition holds, else b; a maximum, minimum or absolute value if it is
+        one.
+        """
         if a is b:
             return a
         if is_number(condition):
@@ -170,26 +218,39 @@ class Expressions:
 
 
 def _as_power(node: Node) -> tuple[Node, float]:
-    if node.kind == POWER and is_number(node.arguments[1]) and math.isfinite(node.arguments[1].value):
+    if (
+        node.kind == POWER
+        and is_number(node.arguments[1])
+        and math.isfinite(node.arguments[1].value)
+    ):
         return node.arguments[0], node.arguments[1].value
     return node, 1.0
 
 
-MAX_TERMS, MIN_TERMS = 150, 4
-"""Maximum number of monomials of an expanded polynomial, minimum one with its coefficients as symbols (chosen)."""
+MAX_TERMS = 150
+MIN_TERMS = 4
+"""Maximum number of monomials of an expanded polynomial, minimum one with its coefficients as
+symbols (chosen).
+"""
 Monomial = tuple[tuple[Node, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
 
 def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
-    """An expression as a polynomial in these atoms with exact coefficients; None if it is none, or is too long."""
+    """An expression as a polynomial in these atoms with exact coefficients; None if it is none, or
+    is too long.
+    """
 
     def expanded(node: Node, inner: list[Polynomial | None]) -> Polynomial | None:
         if node in atoms:
             return {((node, 1),): Fraction(1)}
         if is_number(node):
             return {(): Fraction(node.value)} if node.value else {}
-        if node.kind not in (ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER) or inner[0] is None or inner[-1] is None:
+        if (
+            node.kind not in (ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER)
+            or inner[0] is None
+            or inner[-1] is None
+        ):
             return None
         found = _combined(node.kind, inner[0], inner[-1])
         return found if found is None or len(found) <= MAX_TERMS else None
@@ -198,10 +259,15 @@ def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
 
 
 def _combined(kind: str, first: Polynomial, last: Polynomial) -> Polynomial | None:
-    """The result of an operation without monomials that cancel; None if it is no polynomial, or is too long."""
+    """The result of an operation without monomials that cancel; None if it is no polynomial, or is
+    too long.
+    """
     number = last[()] if set(last) == {()} else None
     if kind == ADD:
-        sums = {monomial: first.get(monomial, 0) + last.get(monomial, 0) for monomial in {**first, **last}}
+        sums = {
+            monomial: first.get(monomial, 0) + last.get(monomial, 0)
+            for monomial in {**first, **last}
+        }
         return {monomial: Fraction(c) for monomial, c in sums.items() if c}
     if kind == NEGATIVE:
         return {monomial: -c for monomial, c in first.items()}
@@ -209,7 +275,9 @@ def _combined(kind: str, first: Polynomial, last: Polynomial) -> Polynomial | No
         total: defaultdict[Monomial, Fraction] = defaultdict(Fraction)
         for (m, c), (n, d) in itertools.product(first.items(), last.items()):
             powers = (Counter(dict(m)) + Counter(dict(n))).items()
-            total[tuple(sorted(powers, key=lambda item: (str(item[0].value or ""), id(item[0]))))] += c * d
+            total[
+                tuple(sorted(powers, key=lambda item: (str(item[0].value or ""), id(item[0]))))
+            ] += c * d
         return {monomial: c for monomial, c in total.items() if c}
     if number is not None and kind == QUOTIENT:
         return {monomial: c / number for monomial, c in first.items()}
@@ -217,12 +285,20 @@ def _combined(kind: str, first: Polynomial, last: Polynomial) -> Polynomial | No
         return None
     result: Polynomial | None = {(): Fraction(1)}
     for _ in range(int(number)):
-        result = _combined(PRODUCT, result, first) if result is not None and len(result) <= MAX_TERMS else None
+        result = (
+            _combined(PRODUCT, result, first)
+            if result is not None and len(result) <= MAX_TERMS
+            else None
+        )
     return result
 
 
-def coefficients_by_monomial(polynomial: Polynomial, parameters: Collection[Node]) -> dict[Monomial, Node] | None:
-    """The one parameter before each monomial in the other atoms; None unless there is exactly one, with factor 1."""
+def coefficients_by_monomial(
+    polynomial: Polynomial, parameters: Collection[Node]
+) -> dict[Monomial, Node] | None:
+    """The one parameter before each monomial in the other atoms; None unless there is exactly one,
+    with factor 1.
+    """
     result: dict[Monomial, Node] = {}
     for monomial, factor in polynomial.items():
         own = [(node, power) for node, power in monomial if node in parameters]
@@ -236,7 +312,9 @@ def coefficients_by_monomial(polynomial: Polynomial, parameters: Collection[Node
 
 
 def assemble(terms: Mapping[Monomial, Node], atoms: list[Node], new: Expressions) -> Node:
-    """The sum of coefficients times monomials, by increasing power of the last atom, then of the ones before it."""
+    """The sum of coefficients times monomials, by increasing power of the last atom, then of the
+    ones before it.
+    """
     order = sorted(terms, key=lambda m: tuple(dict(m).get(atom, 0) for atom in reversed(atoms)))
     total = new.number(0.0)
     for monomial in order:

@@ -1,4 +1,6 @@
-"""Traced law as an expression of its arguments and parameters, within its validity range without unreached limits."""
+"""Traced law as an expression of its arguments and parameters, within its validity range without
+unreached limits.
+"""
 
 import itertools
 import math
@@ -8,32 +10,72 @@ from typing import Any
 
 from ...core import autodiff, instructions_of
 from . import expression
-from .expression import COMPARISONS, MAXIMUM, MINIMUM, POWER, Expressions, Node, fold, in_order, is_number
+from .expression import (
+    COMPARISONS,
+    MAXIMUM,
+    MINIMUM,
+    POWER,
+    Expressions,
+    Node,
+    fold,
+    in_order,
+    is_number,
+)
 
 Bounds = tuple[float, float]
 UNKNOWN: Bounds = (-math.inf, math.inf)
 ROUNDING = 1e-9
 """Difference of two bounds, relative to them, that is a rounding error (chosen)."""
 _KINDS = {
-    "ASSIGN": "assign", "ADD": "add", "SUB": "sub", "MUL": "mul", "DIV": "div", "NEG": "neg", "SQ": "sq",
-    "TWICE": "twice", "INV": "inv", "FABS": "abs", "POW": "pow", "CONSTPOW": "pow", "FMIN": "min", "FMAX": "max",
-    "LT": "lt", "LE": "le", "EQ": "eq", "NE": "ne", "NOT": "not", "AND": "and", "OR": "or", "IF_ELSE_ZERO": "if",
+    "ASSIGN": "assign",
+    "ADD": "add",
+    "SUB": "sub",
+    "MUL": "mul",
+    "DIV": "div",
+    "NEG": "neg",
+    "SQ": "sq",
+    "TWICE": "twice",
+    "INV": "inv",
+    "FABS": "abs",
+    "POW": "pow",
+    "CONSTPOW": "pow",
+    "FMIN": "min",
+    "FMAX": "max",
+    "LT": "lt",
+    "LE": "le",
+    "EQ": "eq",
+    "NE": "ne",
+    "NOT": "not",
+    "AND": "and",
+    "OR": "or",
+    "IF_ELSE_ZERO": "if",
     **{name.upper(): name for name in expression.FUNCTIONS if name != "abs"},
-}  # fmt: skip
+}
 """Kinds of nodes by CasADi's name of the operation."""
 _MONOTONE: Mapping[str, Callable[..., float]] = {
-    "add": operator.add, "neg": operator.neg, "mul": operator.mul, "div": operator.truediv, "pow": operator.pow,
-    "max": max, "min": min, "abs": abs,
-    **{name: getattr(math, name)
-       for name in ("sqrt", "log", "exp", "sin", "cos", "tan", "sinh", "tanh", "asinh", "atan")},
-}  # fmt: skip
-"""Operations with their extrema at the ends of the ranges of their arguments, apart from poles and from zero."""
+    "add": operator.add,
+    "neg": operator.neg,
+    "mul": operator.mul,
+    "div": operator.truediv,
+    "pow": operator.pow,
+    "max": max,
+    "min": min,
+    "abs": abs,
+    **{
+        name: getattr(math, name)
+        for name in ("sqrt", "log", "exp", "sin", "cos", "tan", "sinh", "tanh", "asinh", "atan")
+    },
+}
+"""Operations with their extrema at the ends of the ranges of their arguments, apart from poles and
+from zero.
+"""
 
 
 def traced_expression(
     law: Any, method: str, new: Expressions, arguments: Sequence[Node], parameters: Sequence[Node]
 ) -> Node | None:
-    """A method of a law at these arguments, with these nodes in place of its parameters, in the order of the leaves.
+    """A method of a law at these arguments, with these nodes in place of its parameters, in the
+    order of the leaves.
 
     None if the law cannot be traced, or contains an operation without a notation.
     """
@@ -47,14 +89,17 @@ def traced_expression(
     autodiff.check_finite(value, f"{type(law).__name__}.{method}")
     function = casadi.Function("law", [*symbols, vector], casadi.cse([value]))
     kinds = {getattr(casadi, f"OP_{name}"): kind for name, kind in _KINDS.items()}
-    current, result = dict[int, Node](), new.number(0.0)
+    current = dict[int, Node]()
+    result = new.number(0.0)
     for k, (code, target, source) in enumerate(instructions_of(function)):
         if code == casadi.OP_OUTPUT:
             result = current[source[0]]
         elif code == casadi.OP_CONST:
             current[target[0]] = new.number(function.instruction_constant(k))
         elif code == casadi.OP_INPUT:
-            current[target[0]] = arguments[source[0]] if source[0] < len(arguments) else parameters[source[1]]
+            current[target[0]] = (
+                arguments[source[0]] if source[0] < len(arguments) else parameters[source[1]]
+            )
         elif code in kinds:
             current[target[0]] = new.apply(kinds[code], *(current[i] for i in source))
         else:
@@ -86,9 +131,11 @@ def _reduced(node: Node, new: Expressions, bounds: Mapping[Node, Bounds]) -> Nod
         a, b = (bounds[each] for each in node.arguments)
         apart = a[1] < b[0] or a[0] > b[1]
         always, never = {
-            "lt": (a[1] < b[0], a[0] >= b[1]), "le": (a[1] <= b[0], a[0] > b[1]),
-            "eq": (False, apart), "ne": (apart, False),
-        }[node.kind]  # fmt: skip
+            "lt": (a[1] < b[0], a[0] >= b[1]),
+            "le": (a[1] <= b[0], a[0] > b[1]),
+            "eq": (False, apart),
+            "ne": (apart, False),
+        }[node.kind]
         return new.number(float(always)) if always or never else node
     return node
 
@@ -107,16 +154,19 @@ def _bounds_of(node: Node, bounds: Mapping[Node, Bounds], ranges: Mapping[Node, 
     if not node.arguments:
         return ranges.get(node, UNKNOWN)
     sides = [bounds[each] for each in node.arguments]
-    (low, high), last = sides[0], sides[-1]
+    low, high = sides[0]
+    last = sides[-1]
     if node.kind == expression.WHERE:
         return min(sides[1][0], last[0]), max(sides[1][1], last[1])
     if node.kind in ("sin", "cos") and low < high:
         return -1.0, 1.0
     defined = {
-        "div": last[0] > 0 or last[1] < 0, "sqrt": low > 0, "log": low > 0,
+        "div": last[0] > 0 or last[1] < 0,
+        "sqrt": low > 0,
+        "log": low > 0,
         "tan": -0.5 * math.pi < low and high < 0.5 * math.pi,
         "pow": is_number(node.arguments[-1]) and last[0] > 0 and (low >= 0 or last[0] % 1 == 0),
-    }  # fmt: skip
+    }
     if not defined.get(node.kind, node.kind in _MONOTONE):
         return UNKNOWN
     try:

@@ -1,4 +1,6 @@
-"""Source text of an equation for other programs, LaTeX, MATLAB, Excel and C, and the notations of its expressions."""
+"""Source text of an equation for other programs, LaTeX, MATLAB, Excel and C, and the notations of
+its expressions.
+"""
 
 import math
 from collections.abc import Collection, Mapping
@@ -8,18 +10,25 @@ from ..formatting import symbol_formula
 from .derivation import LawEquation, Symbol
 from .expression import POWER, Node, fold, in_order, is_number, summands
 
-SUM, TERM, BASE, ATOM = 1, 2, 3, 4
+SUM = 1
+TERM = 2
+BASE = 3
+ATOM = 4
 """Binding strengths of a sum, a product, a power and what needs no parentheses."""
 _RELATIONS = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
 
 
 class Notation:
-    """Writer of expressions. `names` are the texts of symbols and of parts that are defined elsewhere."""
+    """Writer of expressions. `names` are the texts of symbols and of parts that are defined
+    elsewhere.
+    """
 
     relations: ClassVar[Mapping[str, str]] = _RELATIONS
     logical: ClassVar[Mapping[str, str]] = {"and": "&&", "or": "||", "not": "!"}
     functions: ClassVar[Mapping[str, str]] = {}
-    """Names of functions that differ from the kinds of their nodes; with `pow`, a power is a call of a function."""
+    """Names of functions that differ from the kinds of their nodes; with `pow`, a power is a call
+    of a function.
+    """
     parentheses: ClassVar[str] = "({})"
     choice: ClassVar[str]
     """Form of a choice, from the condition, the value where it holds, and the other value."""
@@ -45,12 +54,19 @@ class Notation:
                 return self._names.get(node, node.name), ATOM
             case "add":
                 left, right = texts
-                return f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}", SUM
+                return (
+                    f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}"
+                ), SUM
             case "neg":
                 return f"-{self._bound(inner[0], TERM)}", SUM
             case "mul":
                 strength = TERM if node.arguments[1].kind == "mul" else BASE
-                return self._product(node, self._bound(inner[0], TERM), self._bound(inner[1], strength)), TERM
+                return (
+                    self._product(
+                        node, self._bound(inner[0], TERM), self._bound(inner[1], strength)
+                    ),
+                    TERM,
+                )
             case "div":
                 return self._quotient(node, inner)
             case "pow" if POWER not in self.functions:
@@ -61,7 +77,9 @@ class Notation:
             return f"({texts[0]} {self.relations[node.kind]} {texts[1]})", ATOM
         if node.kind in self.logical:
             sign = self.logical[node.kind]
-            return f"({sign}{texts[0]})" if node.kind == "not" else f"({texts[0]} {sign} {texts[1]})", ATOM
+            return (
+                f"({sign}{texts[0]})" if node.kind == "not" else f"({texts[0]} {sign} {texts[1]})"
+            ), ATOM
         return self._call(self.functions.get(node.kind, node.kind), texts), ATOM
 
     def _bound(self, inner: tuple[str, int], strength: int) -> str:
@@ -71,13 +89,20 @@ class Notation:
         return f"{left}{self._dot(*node.arguments)}*{right}"
 
     def _quotient(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return f"{self._bound(inner[0], TERM)}{self._dot(node.arguments[1])}/{self._bound(inner[1], BASE)}", TERM
+        return (
+            (
+                f"{self._bound(inner[0], TERM)}{self._dot(node.arguments[1])}/{self._bound(inner[1], BASE)}"  # noqa: E501
+            ),
+            TERM,
+        )
 
     def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
         return f"{self._bound(inner[0], ATOM)}{self._dot(node)}^{self._bound(inner[1], ATOM)}", BASE
 
     def _dot(self, *operands: Node) -> str:
-        """The sign of an operation on each element of arrays; empty where one of the operands is a scalar."""
+        """The sign of an operation on each element of arrays; empty where one of the operands is a
+        scalar.
+        """
         return ""
 
     def _call(self, function: str, texts: list[str]) -> str:
@@ -91,7 +116,12 @@ class Notation:
 class C(Notation):
     """The C language, with math.h."""
 
-    functions: ClassVar[Mapping[str, str]] = {"max": "fmax", "min": "fmin", "abs": "fabs", POWER: "pow"}
+    functions: ClassVar[Mapping[str, str]] = {
+        "max": "fmax",
+        "min": "fmin",
+        "abs": "fabs",
+        POWER: "pow",
+    }
     choice = "({} ? {} : {})"
 
 
@@ -110,7 +140,9 @@ class Matlab(Notation):
 
 
 class Excel(Notation):
-    """Excel and LibreOffice Calc: English names, decimal points, commas between arguments, 15 digits of a number."""
+    """Excel and LibreOffice Calc: English names, decimal points, commas between arguments, 15
+    digits of a number.
+    """
 
     relations: ClassVar[Mapping[str, str]] = {**_RELATIONS, "eq": "=", "ne": "<>"}
     logical: ClassVar[Mapping[str, str]] = {}
@@ -133,9 +165,16 @@ class Latex(Notation):
     relations: ClassVar[Mapping[str, str]] = {"lt": "<", "le": r"\le", "eq": "=", "ne": r"\ne"}
     logical: ClassVar[Mapping[str, str]] = {"and": r"\land", "or": r"\lor", "not": r"\lnot "}
     functions: ClassVar[Mapping[str, str]] = {
-        "log": r"\ln", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan", "asinh": r"\operatorname{arsinh}",
-        **{name: rf"\{name}" for name in ("exp", "sin", "cos", "tan", "sinh", "cosh", "tanh", "max", "min")},
-    }  # fmt: skip
+        "log": r"\ln",
+        "asin": r"\arcsin",
+        "acos": r"\arccos",
+        "atan": r"\arctan",
+        "asinh": r"\operatorname{arsinh}",
+        **{
+            name: rf"\{name}"
+            for name in ("exp", "sin", "cos", "tan", "sinh", "cosh", "tanh", "max", "min")
+        },
+    }
     parentheses = r"\left({}\right)"
     choice = r"\begin{{cases}} {1} & {0} \\ {2} & \text{{otherwise}} \end{{cases}}"
 
@@ -157,7 +196,9 @@ class Latex(Notation):
     def _write(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
         if node.kind == "symbol" and node not in self._names:
             return latex_symbol(node.name), ATOM
-        if node.kind == "number" and ("cdot" in self.number(node.value) or r"\," in self.number(node.value)):
+        if node.kind == "number" and (
+            "cdot" in self.number(node.value) or r"\," in self.number(node.value)
+        ):
             return self.number(node.value), TERM if node.value > 0 else SUM
         if node.kind == "sqrt":
             return rf"\sqrt{{{inner[0][0]}}}", ATOM
@@ -166,7 +207,11 @@ class Latex(Notation):
         return super()._write(node, inner)
 
     def _product(self, node: Node, left: str, right: str) -> str:
-        return rf"{left} \cdot {right}" if right[:1].isdigit() or "cdot" in right else rf"{left}\,{right}"
+        return (
+            rf"{left} \cdot {right}"
+            if right[:1].isdigit() or "cdot" in right
+            else rf"{left}\,{right}"
+        )
 
     def _quotient(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
         return rf"\frac{{{inner[0][0]}}}{{{inner[1][0]}}}", BASE
@@ -199,7 +244,9 @@ def source_codes(equation: LawEquation, validity: str) -> dict[str, str]:
 
 
 def displayed_lines(equation: LawEquation) -> list[str]:
-    """The definitions of the parts and the equation, in LaTeX with four significant digits; long sums in lines."""
+    """The definitions of the parts and the equation, in LaTeX with four significant digits; long
+    sums in lines.
+    """
     rows = _latex_rows(equation, Latex(equation.part_nodes, digits=4))
     return [rf"\begin{{align*}} {row} \end{{align*}}" for row in rows]
 
@@ -217,34 +264,59 @@ def latex_source(equation: LawEquation, validity: str) -> str:
 
 def matlab_source(equation: LawEquation, validity: str) -> str:
     """The equation as a MATLAB function of arrays."""
-    names, result = [each.name for each in equation.arguments], equation.result
-    notation = Matlab(equation.part_nodes, {node for node in _symbols(equation) if node.name in names})
-    return "\n".join([
-        f"function {result.name} = muscle_{result.meaning.split()[-1]}({', '.join(names)})",
-        f"% {_signature(equation)}. {validity}",
-        *(f"{each.name} = {notation.number(each.value)};  % [{each.unit}] {each.meaning}"
-          for each in equation.parameters),
-        *(f"{part.name} = {notation.text(node, definition=True)};" for part, node in equation.parts),
-        f"{result.name} = {notation.text(equation.value)};", "end",
-    ])  # fmt: skip
+    names = [each.name for each in equation.arguments]
+    result = equation.result
+    notation = Matlab(
+        equation.part_nodes, {node for node in _symbols(equation) if node.name in names}
+    )
+    return "\n".join(
+        [
+            f"function {result.name} = muscle_{result.meaning.split()[-1]}({', '.join(names)})",
+            f"% {_signature(equation)}. {validity}",
+            *(
+                f"{each.name} = {notation.number(each.value)};  % [{each.unit}] {each.meaning}"
+                for each in equation.parameters
+            ),
+            *(
+                f"{part.name} = {notation.text(node, definition=True)};"
+                for part, node in equation.parts
+            ),
+            f"{result.name} = {notation.text(equation.value)};",
+            "end",
+        ]
+    )
 
 
 def c_source(equation: LawEquation, validity: str) -> str:
     """The equation as a C function."""
     notation = C(equation.part_nodes)
     arguments = ", ".join(f"double {each.name}" for each in equation.arguments)
-    return "\n".join([
-        "#include <math.h>", "", f"/* {_signature(equation)}. {validity} */",
-        f"double muscle_{equation.result.meaning.split()[-1]}({arguments})", "{",
-        *(f"    const double {each.name} = {notation.number(each.value)}; /* [{each.unit}] {each.meaning} */"
-          for each in equation.parameters),
-        *(f"    const double {part.name} = {notation.text(node, definition=True)};" for part, node in equation.parts),
-        f"    return {notation.text(equation.value)};", "}",
-    ])  # fmt: skip
+    return "\n".join(
+        [
+            "#include <math.h>",
+            "",
+            f"/* {_signature(equation)}. {validity} */",
+            f"double muscle_{equation.result.meaning.split()[-1]}({arguments})",
+            "{",
+            *(
+                f"    const double {each.name} = {notation.number(each.value)}; /* [{each.unit}]"
+                f" {each.meaning} */"
+                for each in equation.parameters
+            ),
+            *(
+                f"    const double {part.name} = {notation.text(node, definition=True)};"
+                for part, node in equation.parts
+            ),
+            f"    return {notation.text(equation.value)};",
+            "}",
+        ]
+    )
 
 
 def excel_source(equation: LawEquation) -> str:
-    """The equation as two rows of a worksheet for cell A1, with tabulators: headers, then example and formulas."""
+    """The equation as two rows of a worksheet for cell A1, with tabulators: headers, then example
+    and formulas.
+    """
     cells = {each.name: f"{chr(ord('A') + i)}2" for i, each in enumerate(equation.arguments)}
     for part, _ in equation.parts:
         cells[part.name] = f"{chr(ord('A') + len(cells))}2"
@@ -255,10 +327,17 @@ def excel_source(equation: LawEquation) -> str:
         text = cells.get(node.name) or values[node.name]
         names[node] = f"({text})" if text.startswith("-") else text
     notation = Excel(names)
-    headers = [_headed(each) for each in (*equation.arguments, *(part for part, _ in equation.parts), equation.result)]
+    headers = [
+        _headed(each)
+        for each in (*equation.arguments, *(part for part, _ in equation.parts), equation.result)
+    ]
     formulas = [f"={notation.text(node, definition=True)}" for _, node in equation.parts]
     examples = [texts(EXAMPLE[each.name]) for each in equation.arguments]
-    return "\t".join(headers) + "\n" + "\t".join([*examples, *formulas, f"={notation.text(equation.value)}"])
+    return (
+        "\t".join(headers)
+        + "\n"
+        + "\t".join([*examples, *formulas, f"={notation.text(equation.value)}"])
+    )
 
 
 def _latex_rows(equation: LawEquation, notation: Latex) -> list[str]:
@@ -270,8 +349,14 @@ def _latex_rows(equation: LawEquation, notation: Latex) -> list[str]:
         lines = [notation.text(node, definition=is_part)]
         if len(terms) > TERMS_PER_LINE:
             first, *others = map(notation.text, terms)
-            signed = [first, *(f"- {text[1:]}" if text.startswith("-") else f"+ {text}" for text in others)]
-            lines = [" ".join(signed[i : i + TERMS_PER_LINE]) for i in range(0, len(signed), TERMS_PER_LINE)]
+            signed = [
+                first,
+                *(f"- {text[1:]}" if text.startswith("-") else f"+ {text}" for text in others),
+            ]
+            lines = [
+                " ".join(signed[i : i + TERMS_PER_LINE])
+                for i in range(0, len(signed), TERMS_PER_LINE)
+            ]
         rows.append(f"{latex_symbol(symbol.name)} &= " + " \\\\\n&\\quad {} ".join(lines))
     return rows
 
@@ -282,7 +367,9 @@ def _symbols(equation: LawEquation) -> set[Node]:
 
 
 def _signature(equation: LawEquation) -> str:
-    result, *sources = (f"{each.meaning} {_headed(each)}" for each in (equation.result, *equation.arguments))
+    result, *sources = (
+        f"{each.meaning} {_headed(each)}" for each in (equation.result, *equation.arguments)
+    )
     text = f"{result} from {' and '.join(sources)}"
     return text[0].upper() + text[1:]
 
@@ -294,7 +381,10 @@ def _headed(symbol: Symbol) -> str:
 REMARKS = {
     "LaTeX": "requires amsmath",
     "MATLAB": "function of arrays, for MATLAB and Octave",
-    "Excel": "two rows to be pasted into cell A1; English function names, decimal point, 15 significant digits",
+    "Excel": (
+        "two rows to be pasted into cell A1; English function names, decimal point, 15 significant"
+        " digits"
+    ),
     "C": "function of doubles",
 }
 """Remarks on each language."""

@@ -1,4 +1,6 @@
-"""Identification of one muscle from all records of a rig, stage by stage, and the next experiments."""
+"""Identification of one muscle from all records of a rig, stage by stage, and the next
+experiments.
+"""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -27,31 +29,39 @@ _WEIGHTS = (0.05, 0.05, 0.35, 0.3, 0.15, 0.08, 0.02)
 
 
 def identify_campaign(
-    recordings: Sequence[Recording], *, geometry: Geometry | None = None,
-    progress: Callable[[str, float], None] | None = None, finished: Callable[[str, object], None] | None = None,
-    known: Mapping[str, Any] | None = None, workers: Workers = 1,
-) -> Campaign:  # fmt: skip
+    recordings: Sequence[Recording],
+    *,
+    geometry: Geometry | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    finished: Callable[[str, object], None] | None = None,
+    known: Mapping[str, Any] | None = None,
+    workers: Workers = 1,
+) -> Campaign:
     """Identify one muscle from all recordings of a rig.
 
-    The records are sorted by kind. Creep is fitted to holds; friction to loops freed of creep; the static
-    characteristic to the slow rows freed of both; valve and volume to fills and discharges; the damping to releases. A
-    stage that the records do not allow is left out with its reason.
+    The records are sorted by kind. Creep is fitted to holds; friction to loops freed of creep; the
+    static characteristic to the slow rows freed of both; valve and volume to fills and discharges;
+    the damping to releases. A stage that the records do not allow is left out with its reason.
 
-    geometry  the geometry of the muscle; by default the volume follows from the static law and fills at several lengths
-    progress  called with the name of the stage and the completed fraction of the campaign
-    finished  called with the name and the result of each stage as it ends
-    known     results of finished stages by name, from an interrupted call with the same recordings and geometry
-    workers   number of processes, as in `compare`: of the fits of loops and of the candidates of the static law
+    geometry  the geometry of the muscle; by default the volume follows from the static law and
+    fills at several lengths progress  called with the name of the stage and the completed fraction
+    of the campaign finished  called with the name and the result of each stage as it ends known
+    results of finished stages by name, from an interrupted call with the same recordings and
+    geometry workers   number of processes, as in `compare`: of the fits of loops and of the
+    candidates of the static law
 
     Raises IdentificationError where no record can be used.
     """
     steps = _Steps(progress, finished, known or {})
     records = classify_records(named(recordings))
     if all(record.kind is RecordKind.UNUSED for record in records):
-        reasons = "; ".join(f"{record.origin}: {record.reason}" for record in records) or "there is no recording"
+        reasons = (
+            "; ".join(f"{record.origin}: {record.reason}" for record in records)
+            or "there is no recording"
+        )
         raise IdentificationError(
-            f"no record of the campaign can be used ({reasons}). Give records with pressure, length and force, and the "
-            "resting length."
+            f"no record of the campaign can be used ({reasons}). Give records with pressure, length"
+            " and force, and the resting length."
         )
     check_one_rig(records)
     steps.end("records", records)
@@ -59,17 +69,26 @@ def identify_campaign(
     creep = steps.fit("creep", lambda _: fit_creep_stage(of_kind[RecordKind.CREEP]))
     elements = creep.elements if isinstance(creep, CreepStage) else CreepElements()
     with process_pool(workers, one_thread_each=True, terminate=True) as executor:
-        hysteresis = steps.fit("hysteresis", lambda show: fit_friction_stage(records, elements, show, executor))
+        hysteresis = steps.fit(
+            "hysteresis", lambda show: fit_friction_stage(records, elements, show, executor)
+        )
         friction = hysteresis.friction if isinstance(hysteresis, FrictionStage) else NoFriction()
         static = steps.fit(
-            "static characteristic", lambda show: fit_static_stage(records, friction, elements, show, executor)
+            "static characteristic",
+            lambda show: fit_static_stage(records, friction, elements, show, executor),
         )
     filled, main = of_kind[RecordKind.FILL], main_length(of_kind[RecordKind.FILL])
     if len({r.resting_length for r in filled} - {None}) > 1:  # one muscle, that of the most records
         filled = [r for r in filled if r.resting_length == main]
-    change = static.volume_change(main) if isinstance(static, StaticStage) and main is not None else None
-    fills = steps.fit("fills and volume", lambda show: fit_fill_stage(filled, geometry, change, show))
-    partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry)
+    change = (
+        static.volume_change(main) if isinstance(static, StaticStage) and main is not None else None
+    )
+    fills = steps.fit(
+        "fills and volume", lambda show: fit_fill_stage(filled, geometry, change, show)
+    )
+    partial = Campaign(
+        records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry
+    )
     releases = of_kind[RecordKind.RELEASE]
     muscle = partial.muscle(releases[0].resting_length) if releases else None
     release = steps.fit("release", lambda _: fit_release_stage(releases, muscle))
@@ -89,11 +108,17 @@ class _Steps:
         """Report the completed fraction of a stage."""
         number = STAGES.index(stage)
         if self.progress is not None:
-            self.progress(stage, (sum(_WEIGHTS[:number]) + _WEIGHTS[number] * fraction) / sum(_WEIGHTS))
+            self.progress(
+                stage, (sum(_WEIGHTS[:number]) + _WEIGHTS[number] * fraction) / sum(_WEIGHTS)
+            )
 
     def fit(self, stage: str, task: Callable[[Callable[[float], None]], T]) -> T:
-        """The result of a stage: the known one, or that of the task, which is called with the progress."""
-        return self.end(stage, self.known[stage] if stage in self.known else task(partial(self.show, stage)))
+        """The result of a stage: the known one, or that of the task, which is called with the
+        progress.
+        """
+        return self.end(
+            stage, self.known[stage] if stage in self.known else task(partial(self.show, stage))
+        )
 
     def end(self, stage: str, result: T) -> T:
         """Report the end of a stage with its result."""
@@ -103,16 +128,23 @@ class _Steps:
         return result
 
 
-PLANNED_RUNS, PLANNED_POINTS = 4, 15
+PLANNED_RUNS = 4
+PLANNED_POINTS = 15
 """Number of planned static runs, and of their points (chosen)."""
 POORLY_DETERMINED = 0.05
-"""Relative standard error of a parameter of valve or wall from which a further record is planned (chosen)."""
+"""Relative standard error of a parameter of valve or wall from which a further record is planned
+(chosen).
+"""
 MIN_LENGTHS = 3
 """Number of resting lengths from which the error for other lengths can be judged."""
 
 
-def plan_next(stages: Sequence[object], records: Sequence[CampaignRecord]) -> tuple[NextExperiment, ...]:
-    """The next experiments: missing ones, then those that determine weak parameters, then static runs."""
+def plan_next(
+    stages: Sequence[object], records: Sequence[CampaignRecord]
+) -> tuple[NextExperiment, ...]:
+    """The next experiments: missing ones, then those that determine weak parameters, then static
+    runs.
+    """
     planned = [
         NextExperiment(_sentence(stage.remedy), f"{stage.name}: {stage.reason.rstrip('.')}")
         for stage in stages
@@ -125,11 +157,22 @@ def plan_next(stages: Sequence[object], records: Sequence[CampaignRecord]) -> tu
             longest = max(stage.elements.relaxation_times, default=0.0)
             if longest > stage.longest / 2:
                 text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
-                planned.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
-    lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
-    measured = f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
-    text = "Measure muscles of the same type with three resting lengths, each at three pressures or more."
-    further = NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")
+                planned.append(
+                    NextExperiment(text, "creep: the longest relaxation time is extrapolated")
+                )
+    lengths = {
+        r.resting_length for r in records if r.kind.is_static and r.resting_length is not None
+    }
+    measured = (
+        f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
+    )
+    text = (
+        "Measure muscles of the same type with three resting lengths, each at three pressures or"
+        " more."
+    )
+    further = NextExperiment(
+        text, f"lengths: {measured}, so the error for other lengths is not known"
+    )
     for stage in stages:
         if isinstance(stage, StaticStage):
             planned += [*([further] if len(lengths) < MIN_LENGTHS else []), *_static_runs(stage)]
@@ -141,7 +184,9 @@ def _sentence(text: str) -> str:
 
 
 def _separating_records(stage: FillStage) -> list[NextExperiment]:
-    """The experiments that determine what the fills do not, and the record that would separate valve and wall."""
+    """The experiments that determine what the fills do not, and the record that would separate
+    valve and wall.
+    """
     planned = []
     for each in stage.fit.identifiability.undetermined:
         names = ", ".join(name for name, _ in each.shares)
@@ -150,11 +195,15 @@ def _separating_records(stage: FillStage) -> list[NextExperiment]:
         ranking = rank_records(stage.fit)
     except AirmuscleError:
         return planned  # fewer than two common parameters within their bounds
-    best, (first, second) = ranking.ranking[0], ranking.pair
+    best = ranking.ranking[0]
+    first, second = ranking.pair
     if ranking.now.worst < POORLY_DETERMINED or best.gain < MIN_GAIN:
         return planned
     now, after = (100.0 * each.worst for each in (ranking.now, best.precision))
-    purpose = f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then {after:.2g} %"
+    purpose = (
+        f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then"
+        f" {after:.2g} %"
+    )
     return [*planned, NextExperiment(_sentence(f"measure {best.description}"), purpose)]
 
 
@@ -165,14 +214,28 @@ def _levels(run: PlannedRun) -> str:
 
 
 def _static_runs(stage: StaticStage) -> list[NextExperiment]:
-    fit, ranges = stage.fit, stage.fit.data_ranges
-    (low, high), (least, greatest) = ranges["pressure"], ranges["contraction"]
-    fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
+    fit = stage.fit
+    ranges = stage.fit.data_ranges
+    low, high = ranges["pressure"]
+    least, greatest = ranges["contraction"]
+    fixed = tuple(
+        leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free)
+    )
     sigma = max(fit.sigma, 1e-9)
     try:
-        limits = BenchLimits(ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1])
-        plan = optimal_design(fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=sigma, fixed=fixed)
+        limits = BenchLimits(
+            ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1]
+        )
+        plan = optimal_design(
+            fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=sigma, fixed=fixed
+        )
     except AirmuscleError:
-        return []  # a range of one value, or no derivative of the law at a corner; the other experiments remain
+        # a range of one value, or no derivative of the law at a corner; the other experiments
+        # remain
+        return []
     text = f"Measure {len(plan.runs)} further static runs: {'; '.join(map(_levels, plan.runs))}."
-    return [NextExperiment(text, "static characteristic: the D-optimal runs within the range of the records", plan)]
+    return [
+        NextExperiment(
+            text, "static characteristic: the D-optimal runs within the range of the records", plan
+        )
+    ]

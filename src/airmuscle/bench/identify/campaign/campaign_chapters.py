@@ -1,4 +1,6 @@
-"""Report chapters of a campaign beside its overview: next experiments, muscle, and a part for each stage."""
+"""Report chapters of a campaign beside its overview: next experiments, muscle, and a part for each
+stage.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -6,53 +8,100 @@ from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, Array, legend_below, new_figure
+from ....core import (
+    BLACK,
+    BLUE,
+    DASHES,
+    LINES,
+    RED,
+    AirmuscleError,
+    Array,
+    legend_below,
+    new_figure,
+)
 from ....physics import CreepElements
 from ....report import Chapter, Plot, Table, TableColumn, as_data
 from ...segment import level_intervals
 from ..compare_chapter import compare_chapter
 from ..data_checks import level_text
-from ..dynamic.dynamic_chapter import draw_residuals, dynamic_chapters, residual_panels, running_extreme
+from ..dynamic.dynamic_chapter import (
+    draw_residuals,
+    dynamic_chapters,
+    residual_panels,
+    running_extreme,
+)
 from ..experiment_design import run_table
 from ..hysteresis import loops_not_joined
 from ..hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ..static_fit_chapter import MuscleDescription, fit_chapter
-from . import Campaign, CreepStage, FillStage, FrictionStage, LeftOutStage, RecordKind, ReleaseStage, StaticStage
+from . import (
+    Campaign,
+    CreepStage,
+    FillStage,
+    FrictionStage,
+    LeftOutStage,
+    RecordKind,
+    ReleaseStage,
+    StaticStage,
+)
 from .result import MAX_NEXT
 from .transient import thinned_rows
 
 
 def campaign_chapters(campaign: Campaign, entry: MuscleDescription | None) -> list[Chapter]:
     """Return the chapters that follow the overview, the `chapter()` of the campaign."""
-    plots = (plot(campaign) for plot in (characteristic_plot, prediction_plot, residual_plot, fill_plot))
-    summary = "The predicted force is that of the static law minus friction and creep along the recorded motion."
-    muscle = Chapter("campaign-muscle", "Muscle and prediction error", summary, plots=tuple(filter(None, plots)))
-    stages = sorted((stage for _, stage in campaign.stages), key=lambda stage: not isinstance(stage, StaticStage))
+    plots = (
+        plot(campaign) for plot in (characteristic_plot, prediction_plot, residual_plot, fill_plot)
+    )
+    summary = (
+        "The predicted force is that of the static law minus friction and creep along the recorded"
+        " motion."
+    )
+    muscle = Chapter(
+        "campaign-muscle", "Muscle and prediction error", summary, plots=tuple(filter(None, plots))
+    )
+    stages = sorted(
+        (stage for _, stage in campaign.stages),
+        key=lambda stage: not isinstance(stage, StaticStage),
+    )
     chapters = [muscle, *(chapter for stage in stages for chapter in stage_chapters(stage, entry))]
     parts = [dataclasses.replace(chapter, brief=False) for chapter in chapters]
     return [_next(campaign), *parts]
 
 
 def stage_chapters(stage: object, entry: MuscleDescription | None = None) -> list[Chapter]:
-    """Return the chapters of one stage; that of the static law has the chapter of the muscle if its entry is given."""
+    """Return the chapters of one stage; that of the static law has the chapter of the muscle if its
+    entry is given.
+    """
     if isinstance(stage, StaticStage):
         fitted = stage.fit.chapter() if entry is None else fit_chapter(stage.fit, entry)
         return [compare_chapter(stage.comparison), fitted]
     if isinstance(stage, FrictionStage):
-        loops, joint = stage.loops, stage.joint
-        return [joint_friction_chapter(joint, loops_not_joined(loops))] if joint else hysteresis_chapters(loops)
+        loops = stage.loops
+        joint = stage.joint
+        return (
+            [joint_friction_chapter(joint, loops_not_joined(loops))]
+            if joint
+            else hysteresis_chapters(loops)
+        )
     if isinstance(stage, CreepStage):
         holds = [f"{origin}: {fit.verdict}" for origin, fit in stage.holds]
         chapter = creep_chapter(stage.verdict, holds, stage.elements, stage.standard_errors)
         return [dataclasses.replace(chapter, plots=(creep_plot(stage),))]
     if isinstance(stage, FillStage | ReleaseStage):
-        name, title = ("fill-", "Fills and volume") if isinstance(stage, FillStage) else ("release-", "Release")
+        name, title = (
+            ("fill-", "Fills and volume")
+            if isinstance(stage, FillStage)
+            else ("release-", "Release")
+        )
         return [each.among(name) for each in dynamic_chapters(stage.fit, title)]
     return []
 
 
 def stage_data(name: str, stage: object) -> dict[str, Any]:
-    """Return a stage as plain data: name, verdict, whether it is identified, its chapters or the reason."""
+    """Return a stage as plain data: name, verdict, whether it is identified, its chapters or the
+    reason.
+    """
     data: dict[str, Any] = {"stage": name, "verdict": getattr(stage, "verdict", "")}
     if isinstance(stage, LeftOutStage):
         return data | {"identified": False, "reason": stage.reason, "remedy": stage.remedy}
@@ -68,17 +117,29 @@ def _next(campaign: Campaign) -> Chapter:
         "measure": [each.measure for each in experiments],
         "because of": TableColumn([each.purpose for each in experiments], brief=False),
     }
-    tables = [Table("campaign-next", "Experiments", columns, brief=MAX_NEXT, key="experiments")] if experiments else []
+    tables = (
+        [Table("campaign-next", "Experiments", columns, brief=MAX_NEXT, key="experiments")]
+        if experiments
+        else []
+    )
     title = "D-optimal static runs to measure next"
     plans = [each.plan for each in experiments if each.plan is not None]
-    tables += [dataclasses.replace(run_table(plan.runs, "campaign-plan", title), brief=0) for plan in plans[:1]]
-    summary = "Missing stages first, then parameters that the records do not determine, then further static runs."
+    tables += [
+        dataclasses.replace(run_table(plan.runs, "campaign-plan", title), brief=0)
+        for plan in plans[:1]
+    ]
+    summary = (
+        "Missing stages first, then parameters that the records do not determine, then further"
+        " static runs."
+    )
     return Chapter("campaign-next", "What to measure next", summary, tables=tuple(tables))
 
 
-def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElements, standard_errors: Array) -> Chapter:
-    """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements with the standard
-    errors of their stiffnesses [N/m], then of their relaxation times [s]."""
+def creep_chapter(
+    verdict: str, sentences: Sequence[str], elements: CreepElements, standard_errors: Array
+) -> Chapter:
+    """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements
+    with the standard errors of their stiffnesses [N/m], then of their relaxation times [s]."""
     count = len(elements.stiffnesses)
     columns: dict[str, Any] = {
         "stiffness": TableColumn(elements.stiffnesses, "N/m"),
@@ -90,24 +151,37 @@ def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElement
     return Chapter("creep", "Creep", (verdict, *sentences), tables=(table,) if count else ())
 
 
-MAX_LOOPS, MAX_PANELS = 6, 6
+MAX_LOOPS = 6
+MAX_PANELS = 6
 """Maximum number of loops in a figure, and of panels of fills (chosen)."""
 CURVE_POINTS = 161
 LEVEL_TOLERANCE = 0.03
 """Maximum relative difference of two pressures that have one curve (chosen)."""
 POINT_TOLERANCE = 0.005
-"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum (chosen)."""
+"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum
+(chosen).
+"""
 
 
 def characteristic_plot(campaign: Campaign) -> Plot | None:
-    """Return the isobars of the muscle with the 95 % band and the measured points, freed of friction and creep."""
+    """Return the isobars of the muscle with the 95 % band and the measured points, freed of
+    friction and creep.
+    """
     stage, law = campaign.static, campaign.law()
     if not isinstance(stage, StaticStage) or law is None:
         return None
     length = campaign.resting_length
     figure, axes = new_figure(width=6.6, height=4.0)
-    runs = [run for run in stage.points if length is None or run.constants.get("resting_length") in (length, None)]
-    isobaric = [r for r in campaign.records if r.kind is RecordKind.ISOBARIC and r.resting_length in (length, None)]
+    runs = [
+        run
+        for run in stage.points
+        if length is None or run.constants.get("resting_length") in (length, None)
+    ]
+    isobaric = [
+        r
+        for r in campaign.records
+        if r.kind is RecordKind.ISOBARIC and r.resting_length in (length, None)
+    ]
     levels = sorted(record.level[1] for record in isobaric if record.level)
     band = LEVEL_TOLERANCE * max(levels, default=0.0)
     distinct = [levels[interval.start] for interval in level_intervals(np.array(levels), band)]
@@ -116,15 +190,29 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
     low, high = stage.fit.data_ranges["contraction"]
     eps = np.linspace(low, high, CURVE_POINTS)
     for i, pressure in enumerate(pressures):
-        colour, force = LINES[i % len(LINES)], np.asarray(law.force(np.full(eps.size, pressure), eps), dtype=float)
+        colour = LINES[i % len(LINES)]
+        force = np.asarray(law.force(np.full(eps.size, pressure), eps), dtype=float)
         force = np.where(force > 0.0, force, np.nan)
         label = f"{pressure / 1e3:.3g} kPa"
         axes.plot(100 * eps, force, color=colour, linestyle=DASHES[i % 5], label=label, zorder=3)
         half = stage.band.half_width
-        axes.fill_between(100 * eps, np.maximum(force - half, 0), force + half, color=colour, alpha=0.18, linewidth=0)
+        axes.fill_between(
+            100 * eps,
+            np.maximum(force - half, 0),
+            force + half,
+            color=colour,
+            alpha=0.18,
+            linewidth=0,
+        )
         for run in runs:
             rows = np.abs(run["pressure"] - pressure) <= POINT_TOLERANCE * max(pressures)
-            style = {"color": colour, "linestyle": "none", "marker": ".", "markersize": 2.5, "alpha": 0.7}
+            style = {
+                "color": colour,
+                "linestyle": "none",
+                "marker": ".",
+                "markersize": 2.5,
+                "alpha": 0.7,
+            }
             axes.plot(100 * run["contraction"][rows], run["force"][rows], **style)
     axes.set(xlabel="contraction [%]", ylabel="force [N]", ylim=(0.0, None))
     axes.legend(title="gauge pressure", loc="upper right", fontsize=8, title_fontsize=8)
@@ -139,13 +227,16 @@ def prediction_plot(campaign: Campaign) -> Plot | None:
     usable = [record for record in static if record.kind is RecordKind.ISOBARIC] or static
     if not usable or not isinstance(campaign.static, StaticStage):
         return None
-    ordered = sorted(usable, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0))
+    ordered = sorted(
+        usable, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0)
+    )
     shown = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
     figure, panels = new_figure(rows, columns, width=7.4, height=2.3 * rows + 0.4, squeeze=False)
     for axes, record in zip(panels.ravel(), shown, strict=False):
-        recording, prediction = record.recording, campaign.predict(record.recording)
+        recording = record.recording
+        prediction = campaign.predict(record.recording)
         is_ramp = record.kind is RecordKind.ISOMETRIC
         x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
         dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
@@ -153,22 +244,32 @@ def prediction_plot(campaign: Campaign) -> Plot | None:
         order = np.argsort(x, kind="stable")
         low = running_extreme(prediction.low[order], np.minimum)
         high = running_extreme(prediction.high[order], np.maximum)
-        axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
+        axes.fill_between(
+            x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band"
+        )
         axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
         axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
         length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
-        axes.set_title("" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8)
+        axes.set_title(
+            "" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8
+        )
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[:, 0]:
         axes.set_ylabel("force [N]")
     legend_below(figure, panels[0, 0], columns=3)
     force = "static law minus friction and creep along the recorded motion"
-    return Plot("campaign-loops", f"Slow records with the predicted force: {force}. Shaded: 95 % band.", figure)
+    return Plot(
+        "campaign-loops",
+        f"Slow records with the predicted force: {force}. Shaded: 95 % band.",
+        figure,
+    )
 
 
 def residual_plot(campaign: Campaign) -> Plot | None:
-    """Return the residuals of all slow records over pressure, contraction and time in the record."""
+    """Return the residuals of all slow records over pressure, contraction and time in the
+    record.
+    """
     if not isinstance(campaign.static, StaticStage):
         return None
     figure, panels = new_figure(1, 3, width=7.4, height=2.7, sharey=True)
@@ -184,10 +285,25 @@ def residual_plot(campaign: Campaign) -> Plot | None:
         rows = recording["force"] > 0.0
         error = (prediction.force - recording["force"])[rows]
         share = np.linspace(0.0, 100.0, len(recording))[rows]
-        columns = (1e-3 * recording["pressure"][rows], 100.0 * recording["contraction"][rows], share)
+        columns = (
+            1e-3 * recording["pressure"][rows],
+            100.0 * recording["contraction"][rows],
+            share,
+        )
         for axes, x in zip(panels, columns, strict=True):
-            axes.plot(x, error, linestyle="none", marker=".", markersize=1.0, color=BLUE, alpha=0.35, rasterized=True)
-    for axes, text in zip(panels, ("pressure [kPa]", "contraction [%]", "rows of the record [%]"), strict=True):
+            axes.plot(
+                x,
+                error,
+                linestyle="none",
+                marker=".",
+                markersize=1.0,
+                color=BLUE,
+                alpha=0.35,
+                rasterized=True,
+            )
+    for axes, text in zip(
+        panels, ("pressure [kPa]", "contraction [%]", "rows of the record [%]"), strict=True
+    ):
         for limit, colour, dashes in ((0.0, BLACK, "-"), (-half, RED, "--"), (half, RED, "--")):
             axes.axhline(limit, color=colour, linewidth=0.8, linestyle=dashes)
         axes.set_xlabel(text)
@@ -202,17 +318,25 @@ def fill_plot(campaign: Campaign) -> Plot | None:
     if not isinstance(stage, FillStage):
         return None
     shown = min(len(stage.records), MAX_PANELS)
-    figure, panels = residual_panels(shown, width=min(7.6, 2.6 + 1.9 * shown), height=3.9, sharey="row")
+    figure, panels = residual_panels(
+        shown, width=min(7.6, 2.6 + 1.9 * shown), height=3.9, sharey="row"
+    )
     for i, column in enumerate(panels.T):
-        recording, sensor = stage.experiments[i].recording, stage.fit.problem.record_models[i].names[0]
-        measured, modelled = 1e-3 * recording["pressure"], 1e-3 * stage.fit.modelled(i)[sensor]
+        recording = stage.experiments[i].recording
+        sensor = stage.fit.problem.record_models[i].names[0]
+        measured = 1e-3 * recording["pressure"]
+        modelled = 1e-3 * stage.fit.modelled(i)[sensor]
         draw_residuals(column, recording["time"], measured, modelled, "joint fit")
-        column[0].set_title(f"contraction {level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
+        column[0].set_title(
+            f"contraction {level_text('contraction', float(stage.contractions[i]))}", fontsize=8
+        )
         column[1].set_xlabel("time [s]")
     panels[0, 0].set_ylabel("pressure [kPa]")
     panels[1, 0].set_ylabel("residual [kPa]")
     legend_below(figure, panels[0, 0])
-    return Plot("campaign-fills", "Fills and discharges with the joint fit of valves and volume.", figure)
+    return Plot(
+        "campaign-fills", "Fills and discharges with the joint fit of valves and volume.", figure
+    )
 
 
 def creep_plot(stage: CreepStage) -> Plot:
@@ -220,9 +344,22 @@ def creep_plot(stage: CreepStage) -> Plot:
     figure, axes = new_figure(width=6.3, height=3.0)
     rows = zip(stage.holds, stage.times, stage.measured, stage.modelled, strict=True)
     for i, ((origin, _), time, measured, modelled) in enumerate(rows):
-        colour, start = LINES[i % len(LINES)], modelled[0]
-        axes.plot(time, measured - start, linestyle="none", marker=".", markersize=2, color=colour, alpha=0.5)
+        colour = LINES[i % len(LINES)]
+        start = modelled[0]
+        axes.plot(
+            time,
+            measured - start,
+            linestyle="none",
+            marker=".",
+            markersize=2,
+            color=colour,
+            alpha=0.5,
+        )
         axes.plot(time, modelled - start, color=colour, linestyle=DASHES[i % 5], label=origin)
     axes.set(xlabel="time after the motion [s]", ylabel="change of the force [N]")
     legend_below(figure, axes)
-    return Plot("campaign-creep", "Force after the motion of each hold, with the common Maxwell elements.", figure)
+    return Plot(
+        "campaign-creep",
+        "Force after the motion of each hold, with the common Maxwell elements.",
+        figure,
+    )

@@ -1,4 +1,6 @@
-"""Creep as Maxwell elements: of all holds of a campaign together, and of any holds, also under a constant load."""
+"""Creep as Maxwell elements: of all holds of a campaign together, and of any holds, also under a
+constant load.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -19,14 +21,20 @@ NAME = "creep"
 FIT_ROWS = 400
 """Maximum number of rows of a hold (chosen)."""
 DEADTIME = 0.2
-"""Time after the end of the motion that is not fitted [s] (chosen): the load cell and the frame settle."""
+"""Time after the end of the motion that is not fitted [s] (chosen): the load cell and the frame
+settle.
+"""
 MAX_MOTION = 0.3
-"""Maximum duration of the motion before a hold under a load, by its shortest time constant (chosen)."""
+"""Maximum duration of the motion before a hold under a load, by its shortest time constant
+(chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class CreepStage(ShortRepr):
-    """Maxwell elements fitted to the force of all holds together, with the result for each hold alone."""
+    """Maxwell elements fitted to the force of all holds together, with the result for each hold
+    alone.
+    """
 
     elements: CreepElements
     standard_errors: Array
@@ -48,16 +56,21 @@ class CreepStage(ShortRepr):
         holds = f"{len(self.holds)} holds; rms residual {self.rmse:.3g} N."
         slowest = max(self.elements.relaxation_times)
         further = (
-            f" The holds of {self.longest:.4g} s are too short for the longest relaxation time; hold for "
-            f"{6 * slowest:.2g} s to determine it."
+            f" The holds of {self.longest:.4g} s are too short for the longest relaxation time;"
+            f" hold for {6 * slowest:.2g} s to determine it."
         )
-        return f"{describe_elements(self.elements)}, from {holds}{further if slowest > self.longest / 2 else ''}"
+        return (
+            f"{describe_elements(self.elements)}, from"
+            f" {holds}{further if slowest > self.longest / 2 else ''}"
+        )
 
 
 def describe_elements(elements: CreepElements) -> str:
     """Stiffness and relaxation time of each element, as a phrase."""
     pairs = zip(elements.stiffnesses, elements.relaxation_times, strict=True)
-    return f"Maxwell elements of {' and '.join(f'{k:.4g} N/m with {tau:.4g} s' for k, tau in pairs)}"
+    return (
+        f"Maxwell elements of {' and '.join(f'{k:.4g} N/m with {tau:.4g} s' for k, tau in pairs)}"
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,17 +84,23 @@ class HeldRows:
 
     @classmethod
     def after(cls, whole: Recording, end_of_motion: float) -> "HeldRows":
-        """The rows after a dead time from the end of the motion [s] on. Raises IdentificationError without any."""
+        """The rows after a dead time from the end of the motion [s] on. Raises IdentificationError
+        without any.
+        """
         later = whole["time"] > end_of_motion + DEADTIME
         if not later.any():
             raise IdentificationError(
-                f"{whole.origin}: the hold ends {whole['time'][-1] - end_of_motion:.2g} s after the motion, within the "
-                f"{DEADTIME:g} s in which load cell and frame settle; hold longer."
+                f"{whole.origin}: the hold ends {whole['time'][-1] - end_of_motion:.2g} s after the"
+                f" motion, within the {DEADTIME:g} s in which load cell and frame settle; hold"
+                " longer."
             )
         start = int(np.argmax(later))
-        kept, path = start + thinned_rows(len(whole) - start, FIT_ROWS), displacement(whole)
+        kept = start + thinned_rows(len(whole) - start, FIT_ROWS)
+        path = displacement(whole)
         kept = kept[np.isfinite(whole["force"][kept])]
-        path = np.where(np.arange(path.size) < start, path, np.median(path[start:]))  # no motion by the noise
+        path = np.where(
+            np.arange(path.size) < start, path, np.median(path[start:])
+        )  # no motion by the noise
         return cls(whole.rows(kept), whole["time"], path, kept)
 
     def stretches(self, times: Array) -> Array:
@@ -90,18 +109,20 @@ class HeldRows:
 
 
 def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutStage:
-    """Fit Maxwell elements to the holds at constant length and pressure. The number of elements is the largest that the
-    F test justifies in a hold. Relaxation times and stiffnesses are common to all holds, each hold has its own initial
-    force."""
+    """Fit Maxwell elements to the holds at constant length and pressure. The number of elements is
+    the largest that the F test justifies in a hold. Relaxation times and stiffnesses are common to
+    all holds, each hold has its own initial force."""
     recordings = [record.recording for record in records if "force" in record.recording]
     if not recordings:
         remedy = (
-            "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
-            "two minutes or more, and record the force"
+            "move the muscle by a few per cent of its length within a second at constant pressure,"
+            " hold the length for two minutes or more, and record the force"
         )
         return LeftOutStage(NAME, "no record with a force is a hold after a motion", remedy)
     motions = zip(recordings, map(find_motion, recordings), strict=True)
-    return fit_held_rows([HeldRows.after(recording, motion.end) for recording, motion in motions if motion])
+    return fit_held_rows(
+        [HeldRows.after(recording, motion.end) for recording, motion in motions if motion]
+    )
 
 
 def fit_held_rows(holds: Sequence[HeldRows]) -> CreepStage | LeftOutStage:
@@ -109,8 +130,12 @@ def fit_held_rows(holds: Sequence[HeldRows]) -> CreepStage | LeftOutStage:
     try:
         fits = [fit_creep(hold.recording, "force") for hold in holds]
     except AirmuscleError as error:
-        return LeftOutStage(NAME, str(error.message), "record holds of 12 rows or more with increasing time")
-    elements, errors, measured = CreepElements(), np.zeros(0), [hold.recording["force"] for hold in holds]
+        return LeftOutStage(
+            NAME, str(error.message), "record holds of 12 rows or more with increasing time"
+        )
+    elements = CreepElements()
+    errors = np.zeros(0)
+    measured = [hold.recording["force"] for hold in holds]
     modelled = [np.full(force.size, force.mean()) for force in measured]
     count = max(len(fit.creep.amplitudes) for fit in fits)
     if count:
@@ -119,36 +144,56 @@ def fit_held_rows(holds: Sequence[HeldRows]) -> CreepStage | LeftOutStage:
         if not (coefficients[:count] > 0).all():
             reason = "the force of the holds does not relax towards the value before the motion"
             because = "because a pressure step also changes the force"
-            return LeftOutStage(NAME, reason, f"hold the pressure constant during the motion and after it, {because}")
+            return LeftOutStage(
+                NAME,
+                reason,
+                f"hold the pressure constant during the motion and after it, {because}",
+            )
         elements = CreepElements(tuple(coefficients[:count].tolist()), tuple(times.tolist()))
         modelled = [matrix @ coefficients for matrix in _matrices(holds, times)]
         errors = _standard_errors(holds, times, coefficients, rest)
     elapsed = [hold.recording["time"] - hold.recording["time"][0] for hold in holds]
     residuals = np.concatenate([a - b for a, b in zip(modelled, measured, strict=True)])
     return CreepStage(
-        elements, errors, tuple((hold.recording.origin, fit) for hold, fit in zip(holds, fits, strict=True)),
-        tuple(elapsed), tuple(measured), tuple(modelled), float(np.sqrt(np.mean(residuals**2))),
+        elements,
+        errors,
+        tuple((hold.recording.origin, fit) for hold, fit in zip(holds, fits, strict=True)),
+        tuple(elapsed),
+        tuple(measured),
+        tuple(modelled),
+        float(np.sqrt(np.mean(residuals**2))),
         max(float(t[-1]) for t in elapsed),
-    )  # fmt: skip
+    )
 
 
 def _common_times(holds: Sequence[HeldRows], initial: Sequence[float]) -> Array:
-    """The relaxation times of all holds [s] from initial ones, for which the linear unknowns are solved."""
+    """The relaxation times of all holds [s] from initial ones, for which the linear unknowns are
+    solved.
+    """
     from scipy.optimize import least_squares
 
-    longest, count = max(float(h.recording["time"][-1] - h.recording["time"][0]) for h in holds), len(initial)
+    longest = max(float(h.recording["time"][-1] - h.recording["time"][0]) for h in holds)
+    count = len(initial)
     ordered = np.clip(np.sort(np.array(initial)), 0.1, 2.0 * longest)
-    steps = np.log(np.concatenate([ordered[:1], np.maximum(ordered[1:] / ordered[:-1], 1.05 * MIN_RATIO)]))
-    low, high = np.log([0.1, *[MIN_RATIO] * (count - 1)]), np.log([2.0 * longest] * count)
+    steps = np.log(
+        np.concatenate([ordered[:1], np.maximum(ordered[1:] / ordered[:-1], 1.05 * MIN_RATIO)])
+    )
+    low = np.log([0.1, *[MIN_RATIO] * (count - 1)])
+    high = np.log([2.0 * longest] * count)
     start = np.clip(steps, low + 1e-6, high - 1e-6)
-    result = least_squares(lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high))
+    result = least_squares(
+        lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high)
+    )
     return np.asarray(np.exp(np.cumsum(result.x)))
 
 
 def _matrices(holds: Sequence[HeldRows], times: Array) -> list[Array]:
     """Columns of each hold: minus the stretches, then the initial force of each hold."""
     own = np.eye(len(holds))
-    return [np.hstack([-hold.stretches(times), np.tile(own[i], (hold.held.size, 1))]) for i, hold in enumerate(holds)]
+    return [
+        np.hstack([-hold.stretches(times), np.tile(own[i], (hold.held.size, 1))])
+        for i, hold in enumerate(holds)
+    ]
 
 
 def _linear_part(holds: Sequence[HeldRows], times: Array) -> tuple[Array, Array]:
@@ -158,8 +203,12 @@ def _linear_part(holds: Sequence[HeldRows], times: Array) -> tuple[Array, Array]
     return coefficients, matrix @ coefficients - target
 
 
-def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Array, residuals: Array) -> Array:
-    """Standard errors of the stiffnesses and the relaxation times from the Jacobian at the solution."""
+def _standard_errors(
+    holds: Sequence[HeldRows], times: Array, coefficients: Array, residuals: Array
+) -> Array:
+    """Standard errors of the stiffnesses and the relaxation times from the Jacobian at the
+    solution.
+    """
     base = np.vstack(_matrices(holds, times))
     changed = np.where(np.eye(times.size) > 0, times * (1.0 + 1e-4), times)
     steps = [np.vstack(_matrices(holds, each)) - base for each in changed]
@@ -172,7 +221,9 @@ def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Arra
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class HeldCreep(ShortRepr):
-    """The creep of the longest hold of each recording as sentences, and the elements of the muscle."""
+    """The creep of the longest hold of each recording as sentences, and the elements of the
+    muscle.
+    """
 
     sentences: tuple[str, ...]
     elements: CreepElements
@@ -180,19 +231,25 @@ class HeldCreep(ShortRepr):
     verdict: str
     """The elements and the holds they are from, or the reason for none."""
     standard_errors: Array
-    """Of the stiffnesses [N/m], then of the relaxation times [s], shape (2 E,); NaN for a hold under a load."""
+    """Of the stiffnesses [N/m], then of the relaxation times [s], shape (2 E,); NaN for a hold
+    under a load.
+    """
 
 
 def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = None) -> HeldCreep:
-    """Fit creep to the longest hold of each recording, and the Maxwell elements that the holds have in common.
+    """Fit creep to the longest hold of each recording, and the Maxwell elements that the holds have
+    in common.
 
     law  the static characteristic, whose stiffness a hold under a constant load needs
 
-    Holds at a constant length are fitted together along the recorded motion; without any, the longest hold under a
-    constant load gives the elements. A hold without a motion before it has a course but no stiffness.
+    Holds at a constant length are fitted together along the recorded motion; without any, the
+    longest hold under a constant load gives the elements. A hold without a motion before it has a
+    course but no stiffness.
     """
-    sentences, reasons = [], list[str]()
-    held, loaded = list[HeldRows](), list[tuple[float, str, CreepElements]]()
+    sentences = []
+    reasons = list[str]()
+    held = list[HeldRows]()
+    loaded = list[tuple[float, str, CreepElements]]()
     for recording in recordings:
         hold = max(find_holds(recording), key=lambda each: len(each.interval), default=None)
         sentences.append(_sentence(recording, hold))
@@ -215,7 +272,9 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     if usable:
         _, origin, elements = max(usable, key=lambda each: each[0])
         verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
-        return HeldCreep(tuple(sentences), elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan))
+        return HeldCreep(
+            tuple(sentences), elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan)
+        )
     causes = [*([stage.verdict] if stage is not None else []), *reasons]
     none = "The holds under a constant load justify no creep." if loaded else "There is no hold."
     return HeldCreep(tuple(sentences), CreepElements(), " ".join(causes or [none]), np.zeros(0))
@@ -236,23 +295,29 @@ def _held_rows(recording: Recording, hold: Hold) -> HeldRows:
     before = recording["contraction"][: hold.interval.start + 1]
     if float(np.ptp(before)) <= CONTRACTION_BAND:
         raise IdentificationError(
-            f"{recording.origin}: the length does not change before the hold, so its creep determines no stiffness. "
-            "Move the muscle at constant pressure by a few per cent of its length, then hold it."
+            f"{recording.origin}: the length does not change before the hold, so its creep"
+            " determines no stiffness. Move the muscle at constant pressure by a few per cent of"
+            " its length, then hold it."
         )
     start = float(recording["time"][hold.interval.start])
     return HeldRows.after(recording.rows(slice(0, hold.interval.stop)), start)
 
 
-def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None) -> tuple[float, str, CreepElements]:
+def _elements_under_load(
+    recording: Recording, hold: Hold, law: ForceLaw | None
+) -> tuple[float, str, CreepElements]:
     """Duration [s], origin and elements of a hold under a constant load."""
     if law is None:
         raise IdentificationError(
-            f"{recording.origin}: the creep under a constant load needs the stiffness of the muscle, that is, its "
-            "static characteristic; give the muscle, or hold the length."
+            f"{recording.origin}: the creep under a constant load needs the stiffness of the"
+            " muscle, that is, its static characteristic; give the muscle, or hold the length."
         )
-    length, rows = float(recording.constants["resting_length"]), recording.rows(hold.interval.rows)
+    length = float(recording.constants["resting_length"])
+    rows = recording.rows(hold.interval.rows)
     fit = fit_creep(rows, hold.quantity)
-    change = _single_motion(recording, hold.interval.start, min(fit.creep.time_constants, default=np.inf))
+    change = _single_motion(
+        recording, hold.interval.start, min(fit.creep.time_constants, default=np.inf)
+    )
     pressure, contraction = (float(np.median(rows[name])) for name in ("pressure", "contraction"))
     stiffness = float(law.stiffness(pressure, contraction)) / length
     elements = creep_elements(fit, step=change * length, stiffness=stiffness, resting_length=length)
@@ -260,20 +325,26 @@ def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None)
 
 
 def _single_motion(recording: Recording, start: int, shortest: float) -> float:
-    """Change of the contraction by the one quick motion before a hold. Raises IdentificationError for another one."""
+    """Change of the contraction by the one quick motion before a hold. Raises IdentificationError
+    for another one.
+    """
     contraction = recording["contraction"]
-    first, last = float(contraction[0]), float(np.median(contraction[start : start + 3]))
-    change, origin = last - first, recording.origin
+    first = float(contraction[0])
+    last = float(np.median(contraction[start : start + 3]))
+    change = last - first
+    origin = recording.origin
     remedy = "Record one quick change of the load or the pressure, then hold both."
     if abs(change) <= CONTRACTION_BAND:
         raise IdentificationError(f"{origin}: the length does not change before the hold. {remedy}")
     share = (contraction[: start + 1] - first) / change
     if share.min() < -0.1 or share.max() > 1.1:
-        raise IdentificationError(f"{origin}: the muscle moves in both directions before the hold. {remedy}")
+        raise IdentificationError(
+            f"{origin}: the muscle moves in both directions before the hold. {remedy}"
+        )
     duration = float(recording["time"][start] - recording["time"][int(np.argmax(share > 0.02))])
     if duration > MAX_MOTION * shortest:
         raise IdentificationError(
-            f"{origin}: the motion before the hold takes {duration:.3g} s, which is not short compared with the time "
-            f"constant of {shortest:.3g} s. {remedy}"
+            f"{origin}: the motion before the hold takes {duration:.3g} s, which is not short"
+            f" compared with the time constant of {shortest:.3g} s. {remedy}"
         )
     return change

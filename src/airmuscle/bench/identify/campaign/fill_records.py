@@ -1,5 +1,5 @@
-"""Fills and discharges of a campaign: their plants, a held muscle behind valves with a supply and perhaps a tube, and
-their experiments with valve commands, initial pressure and unknowns."""
+"""Fills and discharges of a campaign: their plants, a held muscle behind valves with a supply and
+perhaps a tube, and their experiments with valve commands, initial pressure and unknowns."""
 
 import dataclasses
 import math
@@ -10,7 +10,16 @@ import numpy as np
 from ....core import tree
 from ....engine.loop.inputs import Schedule
 from ....physics import Isometric, Muscle, Plant, Vessel
-from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tank, Tube, Valve, WithTubes
+from ....physics.pneumatics import (
+    Circuit,
+    EnergyBalance,
+    FillDischarge,
+    Supply,
+    Tank,
+    Tube,
+    Valve,
+    WithTubes,
+)
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from .. import dynamic
 from .record import CampaignRecord
@@ -18,17 +27,24 @@ from .transient import thin
 
 ASSUMED_CONDUCTANCE = 1e-8
 """Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
-HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS = "gas.heat_transfer", (1e-3, 1e3)
+HEAT_TRANSFER = "gas.heat_transfer"
+HEAT_TRANSFER_BOUNDS = (1e-3, 1e3)
 """Path of the heat transfer, and its bounds [W/K] (chosen)."""
-CONDUCTANCE, RATIO = "conductance", "critical_ratio"
-TUBE_VOLUME, TUBE_CONDUCTANCE = "circuit.tube.volume", "circuit.tube.orifice.conductance"
+CONDUCTANCE = "conductance"
+RATIO = "critical_ratio"
+TUBE_VOLUME = "circuit.tube.volume"
+TUBE_CONDUCTANCE = "circuit.tube.orifice.conductance"
 MAX_RATIO_ERROR = 0.1
 """Standard error of a critical ratio from which it counts as not determined (chosen)."""
-TUBE_STARTS, TUBE_AREA = 16, math.pi * 0.002**2
-"""Number of initial guesses of a fit with a tube, which has several optima, and area of a tube of 4 mm of inner
-diameter [m2], which makes a volume comparable (chosen)."""
-FIT_ROWS, MIN_DEVIATION = 250, 100.0
-"""Maximum number of rows of a fill, and least standard deviation of the pressure sensor [Pa] (chosen)."""
+TUBE_STARTS = 16
+TUBE_AREA = math.pi * 0.002**2
+"""Number of initial guesses of a fit with a tube, which has several optima, and area of a tube of 4
+mm of inner diameter [m2], which makes a volume comparable (chosen)."""
+FIT_ROWS = 250
+MIN_DEVIATION = 100.0
+"""Maximum number of rows of a fill, and least standard deviation of the pressure sensor [Pa]
+(chosen).
+"""
 
 
 def held_contraction(record: CampaignRecord) -> float:
@@ -37,14 +53,22 @@ def held_contraction(record: CampaignRecord) -> float:
 
 
 def vessel_plant(record: CampaignRecord) -> Plant:
-    """The plant of a held muscle, with initial values from the steps of the record and the ambient air it states."""
+    """The plant of a held muscle, with initial values from the steps of the record and the ambient
+    air it states.
+    """
     rising = [step for step in record.steps if step.change > 0]
-    top = max(step.final_pressure for step in record.steps) if rising else float(record.recording["pressure"][0])
+    top = (
+        max(step.final_pressure for step in record.steps)
+        if rising
+        else float(record.recording["pressure"][0])
+    )
     duration = float(np.mean([step.duration for step in record.steps]))
     volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
     vessel = Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2)
-    valve, held = Valve(ASSUMED_CONDUCTANCE, 0.35), Isometric(held_contraction(record))
-    circuit, ambient = FillDischarge(Supply(top + 5e3), valve, valve), dynamic.stated_ambient(record.recording)
+    valve = Valve(ASSUMED_CONDUCTANCE, 0.35)
+    held = Isometric(held_contraction(record))
+    circuit = FillDischarge(Supply(top + 5e3), valve, valve)
+    ambient = dynamic.stated_ambient(record.recording)
     return Plant(Muscle.ideal(vessel), circuit, held, EnergyBalance(1.0), ambient)
 
 
@@ -62,7 +86,9 @@ def valves_of(circuit: object) -> FillDischarge:
 
 
 def rescaled(plant: Plant, scale: float) -> Plant:
-    """The plant with its conductances, heat transfer and volumes of supply and tube multiplied by the scale."""
+    """The plant with its conductances, heat transfer and volumes of supply and tube multiplied by
+    the scale.
+    """
     values = {leaf.path: leaf.value for leaf in tree.leaves(plant)}
     for path, value in values.items():
         if path == HEAT_TRANSFER:
@@ -75,15 +101,20 @@ def rescaled(plant: Plant, scale: float) -> Plant:
 def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
     """The plant with this volume [m3], at the held length and in the ambient air of a record."""
     muscle = Muscle.ideal(Vessel(volume, plant.muscles[0].geometry.resting_length))
-    held, ambient = Isometric(held_contraction(record)), dynamic.stated_ambient(record.recording)
+    held = Isometric(held_contraction(record))
+    ambient = dynamic.stated_ambient(record.recording)
     return dataclasses.replace(plant, muscle=muscle, mechanism=held, ambient=ambient)
 
 
 def tube_guess(plant: Plant) -> Tube:
-    """Initial guess of a tube for a plant without one (chosen): a tenth of its volume, twice the conductance."""
+    """Initial guess of a tube for a plant without one (chosen): a tenth of its volume, twice the
+    conductance.
+    """
     valve = valves_of(plant.circuit).fill
     assert isinstance(valve, Valve)
-    return Tube(Valve(2.0 * valve.conductance, 0.3), min(max(0.1 * volume_at_rest(plant), 1e-9), 1e-2))
+    return Tube(
+        Valve(2.0 * valve.conductance, 0.3), min(max(0.1 * volume_at_rest(plant), 1e-9), 1e-2)
+    )
 
 
 def volume_at_rest(plant: Plant) -> float:
@@ -92,16 +123,18 @@ def volume_at_rest(plant: Plant) -> float:
 
 
 def sensor_of(plant: Plant) -> str:
-    """The output at the pressure sensor of a plant, which is behind the valves: in the first segment of a tube."""
+    """The output at the pressure sensor of a plant, which is behind the valves: in the first
+    segment of a tube.
+    """
     circuit = plant.circuit
     return f"{circuit.tube.prefixes[0]}pressure" if isinstance(circuit, WithTubes) else "pressure"
 
 
 @dataclasses.dataclass(frozen=True)
 class ValveUnknowns:
-    """The valves that the steps of the records show, and the reason for a common critical ratio, empty without one.
-    `sinks`: the supply has a volume (`Tank`), so that its pressure sinks. `tube`: one lies between valves and
-    muscle."""
+    """The valves that the steps of the records show, and the reason for a common critical ratio,
+    empty without one. `sinks`: the supply has a volume (`Tank`), so that its pressure sinks.
+    `tube`: one lies between valves and muscle."""
 
     fill: bool
     discharge: bool
@@ -110,10 +143,16 @@ class ValveUnknowns:
     tube: bool = False
 
     @classmethod
-    def of(cls, records: Sequence[CampaignRecord], plant: object, common_ratio: str = "") -> "ValveUnknowns":
-        """The valves through which the air of these records flows, with the supply and the tube of a plant."""
-        changes, circuit = [step.change for record in records for step in record.steps], plant_of(plant).circuit
-        sinks, tube = isinstance(valves_of(circuit).supply, Tank), isinstance(circuit, WithTubes)
+    def of(
+        cls, records: Sequence[CampaignRecord], plant: object, common_ratio: str = ""
+    ) -> "ValveUnknowns":
+        """The valves through which the air of these records flows, with the supply and the tube of
+        a plant.
+        """
+        changes = [step.change for record in records for step in record.steps]
+        circuit = plant_of(plant).circuit
+        sinks = isinstance(valves_of(circuit).supply, Tank)
+        tube = isinstance(circuit, WithTubes)
         return cls(max(changes) > 0, min(changes) < 0, common_ratio, sinks, tube)
 
     @property
@@ -127,7 +166,9 @@ class ValveUnknowns:
         return self.fill and self.discharge
 
     def paths(self, name: str) -> list[str | tuple[str, ...]]:
-        """The paths of a parameter of the valves: one for each valve, or a pair with one common value."""
+        """The paths of a parameter of the valves: one for each valve, or a pair with one common
+        value.
+        """
         paths = [f"{self.circuit}.{valve}.{name}" for valve in ("fill", "discharge")]
         if self.both and not (name == RATIO and self.common_ratio):
             return [*paths]
@@ -136,7 +177,8 @@ class ValveUnknowns:
     @property
     def shared(self) -> list[str | tuple[str, ...]]:
         """The paths of critical ratios, the tube and, with a fill, of the supply."""
-        constant, sinking = ["pressure"], ["supply.pressure", "feed.conductance", "volume"]
+        constant = ["pressure"]
+        sinking = ["supply.pressure", "feed.conductance", "volume"]
         names = [f"{self.circuit}.supply.{name}" for name in (sinking if self.sinks else constant)]
         tube = [TUBE_VOLUME, TUBE_CONDUCTANCE] if self.tube else []
         return [*self.paths(RATIO), *tube, *(names if self.fill else [])]
@@ -145,11 +187,16 @@ class ValveUnknowns:
     def supposed(self) -> list[str]:
         """What is supposed of the valves, as sentences."""
         if self.common_ratio:
-            return [f"{self.common_ratio} Both valves are supposed to have the same critical ratio."]
+            return [
+                f"{self.common_ratio} Both valves are supposed to have the same critical ratio."
+            ]
         if self.both:
             return []
         missing, shown = ("discharge", "fill") if self.fill else ("fill", "discharge")
-        return [f"No record is a {missing}: the {missing} valve is supposed to be equal to the {shown} valve."]
+        return [
+            f"No record is a {missing}: the {missing} valve is supposed to be equal to the {shown}"
+            " valve."
+        ]
 
 
 def poor_ratios(fit: dynamic.DynamicFit) -> str:
@@ -158,46 +205,72 @@ def poor_ratios(fit: dynamic.DynamicFit) -> str:
     for e in fit.estimates:
         is_poor = e.on_bound or not e.stderr <= MAX_RATIO_ERROR
         if is_poor and e.name.endswith(RATIO) and "orifice" not in e.name:
-            reason = f"standard error {e.stderr:.2g}" if np.isfinite(e.stderr) else "it has no effect on them"
+            reason = (
+                f"standard error {e.stderr:.2g}"
+                if np.isfinite(e.stderr)
+                else "it has no effect on them"
+            )
             reason = f"on its bound, {e.value:.3g}" if e.on_bound else reason
             poor.append(f"{e.name.split('.')[-2]} valve ({reason})")
-    return f"The records do not determine the critical ratio of the {' and the '.join(poor)}." if poor else ""
+    return (
+        f"The records do not determine the critical ratio of the {' and the '.join(poor)}."
+        if poor
+        else ""
+    )
 
 
 def pressure_deviation(records: Sequence[CampaignRecord]) -> float:
     """Standard deviation of the pressure sensor [Pa]."""
-    return max(float(np.median([r.inspection.sensors["pressure"].std for r in records])), MIN_DEVIATION)
+    return max(
+        float(np.median([r.inspection.sensors["pressure"].std for r in records])), MIN_DEVIATION
+    )
 
 
 def with_supply_volume(experiment: dynamic.Experiment) -> dynamic.Experiment:
-    """The experiment with a volume before its valve that is fed from the supply; initial guess (chosen)."""
+    """The experiment with a volume before its valve that is fed from the supply; initial guess
+    (chosen).
+    """
     plant = plant_of(experiment.plant)
     circuit = valves_of(plant.circuit)
     assert isinstance(circuit.fill, Valve)
-    tank = Tank(circuit.supply, Valve(3.0 * circuit.fill.conductance, 0.3), 3.0 * volume_at_rest(plant))
+    tank = Tank(
+        circuit.supply, Valve(3.0 * circuit.fill.conductance, 0.3), 3.0 * volume_at_rest(plant)
+    )
     return with_circuit(experiment, dataclasses.replace(circuit, supply=tank))
 
 
 def with_circuit(experiment: dynamic.Experiment, circuit: Circuit) -> dynamic.Experiment:
     """The experiment with another circuit; the recorded pressure is that behind the valves."""
     plant = dataclasses.replace(plant_of(experiment.plant), circuit=circuit)
-    initial = dynamic.InitialConditions.at_rest(plant, experiment.initial_conditions.known["pressure"])
-    recording = experiment.recording.with_columns(**{sensor_of(plant): experiment.recording["pressure"]})
-    return dataclasses.replace(experiment, recording=recording, plant=plant, initial_conditions=initial)
+    initial = dynamic.InitialConditions.at_rest(
+        plant, experiment.initial_conditions.known["pressure"]
+    )
+    recording = experiment.recording.with_columns(
+        **{sensor_of(plant): experiment.recording["pressure"]}
+    )
+    return dataclasses.replace(
+        experiment, recording=recording, plant=plant, initial_conditions=initial
+    )
 
 
 def describe_tube(fit: dynamic.DynamicFit) -> str:
     """The tube between valves and muscle, as a sentence."""
-    volume, conductance = fit[TUBE_VOLUME], fit[TUBE_CONDUCTANCE]
+    volume = fit[TUBE_VOLUME]
+    conductance = fit[TUBE_CONDUCTANCE]
     circuit = plant_of(fit.plant()).circuit
     assert isinstance(circuit, WithTubes)
     count = circuit.tube.segment_count
-    along = f"fills along its length ({count} segments by AICc)" if count > 1 else "fills evenly (one segment by AICc)"
+    along = (
+        f"fills along its length ({count} segments by AICc)"
+        if count > 1
+        else "fills evenly (one segment by AICc)"
+    )
     return (
-        f"A tube between valves and muscle, with the pressure sensor at the valves, {along}: its volume of "
-        f"{1e6 * volume.value:.3g} cm3 (standard error {1e6 * volume.stderr:.2g} cm3) and conductance of "
-        f"{conductance.value:.3g} m3/(s Pa) explain the records, which a muscle without a tube does not. Compare it "
-        f"with that of the rig (4 mm of inner diameter: {volume.value / TUBE_AREA:.2g} m), for other causes look alike."
+        f"A tube between valves and muscle, with the pressure sensor at the valves, {along}: its"
+        f" volume of {1e6 * volume.value:.3g} cm3 (standard error {1e6 * volume.stderr:.2g} cm3)"
+        f" and conductance of {conductance.value:.3g} m3/(s Pa) explain the records, which a muscle"
+        " without a tube does not. Compare it with that of the rig (4 mm of inner diameter:"
+        f" {volume.value / TUBE_AREA:.2g} m), for other causes look alike."
     )
 
 
@@ -206,14 +279,17 @@ def describe_supply(fit: dynamic.DynamicFit) -> str:
     names = ("supply.volume", "supply.feed.conductance")
     volume, feed = (next(e for e in fit.estimates if e.name.endswith(name)) for name in names)
     return (
-        f"The supply pressure sinks during a fill: a volume of {1e6 * volume.value:.3g} cm3 (standard error "
-        f"{1e6 * volume.stderr:.2g} cm3) before the valve, fed through a conductance of {feed.value:.3g} m3/(s Pa), "
-        "explains the records, which a constant supply pressure does not."
+        f"The supply pressure sinks during a fill: a volume of {1e6 * volume.value:.3g} cm3"
+        f" (standard error {1e6 * volume.stderr:.2g} cm3) before the valve, fed through a"
+        f" conductance of {feed.value:.3g} m3/(s Pa), explains the records, which a constant supply"
+        " pressure does not."
     )
 
 
 def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float], ...]]:
-    """The detected instants [s] and values of the commands of both valves, counted from the start of the first step."""
+    """The detected instants [s] and values of the commands of both valves, counted from the start
+    of the first step.
+    """
     start = record.steps[0].start
     points: dict[str, tuple[tuple[float, float], ...]] = {"fill": (), "discharge": ()}
     for step in record.steps:
@@ -226,7 +302,8 @@ def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float
 
 def detected_experiment(record: CampaignRecord, plant: Plant) -> dynamic.Experiment:
     """The record with the detected instants of its steps."""
-    began, pressure = record.steps[0].start, record.recording["pressure"]
+    began = record.steps[0].start
+    pressure = record.recording["pressure"]
     before = record.recording["time"] < began
     initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
     conditions = dynamic.InitialConditions.at_rest(plant, initial)
@@ -234,25 +311,36 @@ def detected_experiment(record: CampaignRecord, plant: Plant) -> dynamic.Experim
     return dynamic.Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
 
 
-def with_instants(experiment: dynamic.Experiment, fit: dynamic.DynamicFit, number: int) -> dynamic.Experiment:
+def with_instants(
+    experiment: dynamic.Experiment, fit: dynamic.DynamicFit, number: int
+) -> dynamic.Experiment:
     """The experiment with the instants that a fit has found for it as its record of this number."""
     model = fit.problem.record_models[number]
-    return dataclasses.replace(experiment, command=model.command(fit.values), start_time=model.start_time(fit.values))
+    return dataclasses.replace(
+        experiment, command=model.command(fit.values), start_time=model.start_time(fit.values)
+    )
 
 
 def fit_pressure(
-    records: Sequence[CampaignRecord], experiments: Sequence[dynamic.Experiment], free: Sequence[str | tuple[str, ...]],
+    records: Sequence[CampaignRecord],
+    experiments: Sequence[dynamic.Experiment],
+    free: Sequence[str | tuple[str, ...]],
     own: tuple[str, ...] = (),
-) -> dynamic.DynamicFit:  # fmt: skip
-    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact: by a
-    quarter of the shortest step, and two rows at least."""
-    first, sample = plant_of(experiments[0].plant), max(float(np.median(np.diff(r.recording["time"]))) for r in records)
+) -> dynamic.DynamicFit:
+    """A fit with the heat transfer, and own instants of the valve commands, because the detected
+    ones are inexact: by a quarter of the shortest step, and two rows at least."""
+    first = plant_of(experiments[0].plant)
+    sample = max(float(np.median(np.diff(r.recording["time"]))) for r in records)
     margin = max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
     return dynamic.fit_dynamic(
-        first, experiments, free=(HEAT_TRANSFER, *free), observed={sensor_of(first): pressure_deviation(records)},
+        first,
+        experiments,
+        free=(HEAT_TRANSFER, *free),
+        observed={sensor_of(first): pressure_deviation(records)},
         per_record=(*own, dynamic.StartTime(margin), dynamic.CommandInstants(margin)),
-        bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS}, starts=TUBE_STARTS if TUBE_VOLUME in free else 1,
-    )  # fmt: skip
+        bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
+        starts=TUBE_STARTS if TUBE_VOLUME in free else 1,
+    )
 
 
 def record_rms(fit: dynamic.DynamicFit) -> tuple[float, ...]:
@@ -261,16 +349,25 @@ def record_rms(fit: dynamic.DynamicFit) -> tuple[float, ...]:
 
 
 def fill_baselines(fit: dynamic.DynamicFit) -> tuple[dict[str, float], ...]:
-    """Rms errors [Pa] of the pressure of each record by persistence and by an ARX model of the others."""
-    records, values = [], fit.values
+    """Rms errors [Pa] of the pressure of each record by persistence and by an ARX model of the
+    others.
+    """
+    records = []
+    values = fit.values
     for model in fit.problem.record_models:
-        commands = dynamic.commands_at(model.plant, model.command(values), model.times - model.start_time(values))
+        commands = dynamic.commands_at(
+            model.plant, model.command(values), model.times - model.start_time(values)
+        )
         records.append(TimedRecord(model.times, model.measured, commands, model.valid))
-    return tuple({name: float(rms[0]) for name, rms in each.items()} for each in baseline_errors(records))
+    return tuple(
+        {name: float(rms[0]) for name, rms in each.items()} for each in baseline_errors(records)
+    )
 
 
 def describe_skills(errors: Sequence[float], baselines: Sequence[Mapping[str, float]]) -> str:
-    """The errors of the baselines and the skill of predictions with these errors, as a phrase; empty without them."""
+    """The errors of the baselines and the skill of predictions with these errors, as a phrase;
+    empty without them.
+    """
     parts = [
         f"{name} {min(known) / 1e3:.3g} to {max(known) / 1e3:.3g} kPa"
         for name in (PERSISTENCE, ARX)

@@ -19,27 +19,34 @@ Fitted = Callable[[Sequence[Experiment]], DynamicFit]
 NAME = "fills and volume"
 VOLUME = "muscle.geometry.enclosed_volume"
 REMEDY = (
-    "record a fill from ambient pressure and a discharge through the valve at a held length, at three lengths with the "
-    "same valve and supply, at 100 rows per second or more, until the pressure has settled"
+    "record a fill from ambient pressure and a discharge through the valve at a held length, at"
+    " three lengths with the same valve and supply, at 100 rows per second or more, until the"
+    " pressure has settled"
 )
-MAX_FOLLOWED, MAX_NOISE_RATIO = 2.0, 4.0
-"""Ratio of the residual to the noise of the pressure sensor up to which the model follows a record, and that above
-which it does not; between them, a supply whose pressure sinks and a tube are tried (chosen)."""
-MAX_VOLUME_ERROR, MAX_TUBE_VOLUME = 0.3, 1.5
-"""Maximum relative standard error of a volume before the valve, and maximum volume of a tube in relation to that of the
-muscle at rest (chosen)."""
+MAX_FOLLOWED = 2.0
+MAX_NOISE_RATIO = 4.0
+"""Ratio of the residual to the noise of the pressure sensor up to which the model follows a record,
+and that above which it does not; between them, a supply whose pressure sinks and a tube are tried
+(chosen)."""
+MAX_VOLUME_ERROR = 0.3
+MAX_TUBE_VOLUME = 1.5
+"""Maximum relative standard error of a volume before the valve, and maximum volume of a tube in
+relation to that of the muscle at rest (chosen)."""
 MIN_MISFIT = 0.01
-"""Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
+"""Minimum residual that is reported, as a fraction of the greatest change of the pressure
+(chosen).
+"""
 MIN_RANGE = 0.02
 """Minimum range of the contractions of the fills from which the volume follows (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
 class VolumeEstimate:
-    """Factor s of the volumes that a fit found for an assumed conductance, and the volume at rest [m3].
+    """Factor s of the volumes that a fit found for an assumed conductance, and the volume at rest
+    [m3].
 
-    s v_i = V(0) + dV(eps_i): a fill determines the ratio of volume and conductance, and fills at several lengths, whose
-    change of volume is known, determine both.
+    s v_i = V(0) + dV(eps_i): a fill determines the ratio of volume and conductance, and fills at
+    several lengths, whose change of volume is known, determine both.
     """
 
     scale: float
@@ -53,7 +60,9 @@ class VolumeEstimate:
 def relate_volumes(
     relative: Array, standard_errors: Array, contractions: Array, change: VolumeChange
 ) -> VolumeEstimate | None:
-    """The volume at rest and the scale of the relative volumes; None unless the contractions differ enough."""
+    """The volume at rest and the scale of the relative volumes; None unless the contractions differ
+    enough.
+    """
     if relative.size < 2 or float(np.ptp(contractions)) < MIN_RANGE:
         return None
     matrix = np.column_stack([relative, -np.ones(relative.size)])
@@ -75,8 +84,8 @@ def relate_volumes(
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class FillStage(ShortRepr):
-    """The joint fit of all fills with common valves and one volume curve, and the prediction of each from the others.
-    `estimate` is None where the geometry was given."""
+    """The joint fit of all fills with common valves and one volume curve, and the prediction of
+    each from the others. `estimate` is None where the geometry was given."""
 
     fit: DynamicFit
     records: tuple[CampaignRecord, ...]
@@ -85,9 +94,13 @@ class FillStage(ShortRepr):
     estimate: VolumeEstimate | None
     contractions: Array
     cross_rms: tuple[float, ...]
-    """Rms error of the pressure of each fill, predicted by the parameters of the others [Pa]; empty for one fill."""
+    """Rms error of the pressure of each fill, predicted by the parameters of the others [Pa]; empty
+    for one fill.
+    """
     baselines: tuple[Mapping[str, float], ...] = ()
-    """Those of the baselines of each fill [Pa], by name; the ARX model is fitted to the others, too."""
+    """Those of the baselines of each fill [Pa], by name; the ARX model is fitted to the others,
+    too.
+    """
     supposed: tuple[str, ...] = ()
     """What the records do not determine or state, and what is taken for it, as sentences."""
 
@@ -97,66 +110,89 @@ class FillStage(ShortRepr):
         return fills.valves_of(fills.plant_of(self.fit.plant()).circuit)
 
     def commands(self, record: CampaignRecord) -> Mapping[str, Sequence[tuple[float, float]]]:
-        """The instants [s] and values of the commands of both valves in a record, with the estimated instants."""
-        command = self.fit.problem.record_models[self.records.index(record)].command(self.fit.values)
+        """The instants [s] and values of the commands of both valves in a record, with the
+        estimated instants.
+        """
+        command = self.fit.problem.record_models[self.records.index(record)].command(
+            self.fit.values
+        )
         assert isinstance(command, Schedule)
         return command.changes
 
     @property
     def misfit(self) -> str:
-        """The remark that the model does not follow the pressure of the records, with its cause; empty if it does."""
+        """The remark that the model does not follow the pressure of the records, with its cause;
+        empty if it does.
+        """
         noise = fills.pressure_deviation(self.records)
         change = max(abs(step.change) for record in self.records for step in record.steps)
-        worst, rms = max(zip(self.records, fills.record_rms(self.fit), strict=True), key=lambda each: each[1])
+        worst, rms = max(
+            zip(self.records, fills.record_rms(self.fit), strict=True), key=lambda each: each[1]
+        )
         if rms <= max(MAX_NOISE_RATIO * noise, MIN_MISFIT * change):
             return ""
         return (
-            f"The rms residual of {worst.origin}, {rms / 1e3:.3g} kPa, is {rms / noise:.3g} times the noise of the "
-            "pressure sensor: the model does not follow the records, and conductances, heat transfer and volume are "
-            "not to be used. Check that the supply pressure was constant, that each change of the pressure goes "
-            "through an open valve until it has settled, and that no tube or leak lies between valve and muscle."
+            f"The rms residual of {worst.origin}, {rms / 1e3:.3g} kPa, is {rms / noise:.3g} times"
+            " the noise of the pressure sensor: the model does not follow the records, and"
+            " conductances, heat transfer and volume are not to be used. Check that the supply"
+            " pressure was constant, that each change of the pressure goes through an open valve"
+            " until it has settled, and that no tube or leak lies between valve and muscle."
         )
 
     @property
     def verdict(self) -> str:
         """Cross-prediction, volume and residuals, as sentences."""
-        rms, cross = ([each / 1e3 for each in errors] for errors in (fills.record_rms(self.fit), self.cross_rms))
-        predicted = f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
+        rms, cross = (
+            [each / 1e3 for each in errors]
+            for errors in (fills.record_rms(self.fit), self.cross_rms)
+        )
+        predicted = (
+            f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
+        )
         if cross:
             predicted = (
-                f"Each fill predicted by the parameters of the others: rms error {min(cross):.3g} to "
-                f"{max(cross):.3g} kPa{fills.describe_skills(self.cross_rms, self.baselines)}. {predicted}"
+                f"Each fill predicted by the parameters of the others: rms error {min(cross):.3g}"
+                f" to {max(cross):.3g} kPa{fills.describe_skills(self.cross_rms, self.baselines)}."
+                f" {predicted}"
             )
         volume = "The volume is that of the given geometry."
         if self.estimate is not None:
             volume = (
-                f"Volume at zero contraction {1e6 * self.estimate.volume_at_rest:.4g} cm3 (standard error "
-                f"{1e6 * self.estimate.volume_stderr:.2g} cm3), from the change of the volume with contraction by "
-                "virtual work and the fills at several lengths."
+                f"Volume at zero contraction {1e6 * self.estimate.volume_at_rest:.4g} cm3 (standard"
+                f" error {1e6 * self.estimate.volume_stderr:.2g} cm3), from the change of the"
+                " volume with contraction by virtual work and the fills at several lengths."
             )
         return " ".join(filter(None, (predicted, volume, self.misfit, *self.supposed)))
 
 
 def fit_fill_stage(
-    records: Sequence[CampaignRecord], geometry: Geometry | None, change: VolumeChange | None,
+    records: Sequence[CampaignRecord],
+    geometry: Geometry | None,
+    change: VolumeChange | None,
     progress: Callable[[float], None],
-) -> FillStage | LeftOutStage:  # fmt: skip
+) -> FillStage | LeftOutStage:
     """Fit conductances, critical ratios, heat transfer and supply pressure to all fills together.
 
-    Each record has the ambient air that it states, and its own instants of the valve commands. A valve that no record
-    shows is supposed to be equal to the other one, and so is a critical ratio that the records do not determine.
+    Each record has the ambient air that it states, and its own instants of the valve commands. A
+    valve that no record shows is supposed to be equal to the other one, and so is a critical ratio
+    that the records do not determine.
 
     geometry  the given geometry of the muscle; then the conductance follows from it
-    change    the change of the volume with contraction; then fills at several lengths determine the volume at rest
+    change    the change of the volume with contraction; then fills at several lengths determine the
+    volume at rest
     """
     if not records:
         return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)
     estimate = None
     try:
-        rising = [record for record in records if any(step.change > 0 for step in record.steps)] or list(records)
-        relative, held = _fit_relative(rising), np.array([fills.held_contraction(record) for record in rising])
+        rising = [
+            record for record in records if any(step.change > 0 for step in record.steps)
+        ] or list(records)
+        relative = _fit_relative(rising)
+        held = np.array([fills.held_contraction(record) for record in rising])
         own = [each for each in relative.estimates if each.name.startswith(VOLUME)]
-        volumes, errors = np.array([each.value for each in own]), np.array([each.stderr for each in own])
+        volumes = np.array([each.value for each in own])
+        errors = np.array([each.stderr for each in own])
         progress(0.5)
         if geometry is not None:  # the factor that makes the relative volumes its own
             known = np.array([float(geometry.volume(contraction)) for contraction in held])
@@ -164,13 +200,15 @@ def fit_fill_stage(
         else:
             estimate = None if change is None else relate_volumes(volumes, errors, held, change)
             if estimate is None or change is None:
-                ratio, ends = "the ratio of conductance and volume only", [100 * held.min(), 100 * held.max()]
+                ratio = "the ratio of conductance and volume only"
+                ends = [100 * held.min(), 100 * held.max()]
                 reason = f"the fills determine {ratio}, and no static law gives the volume"
                 if change is not None:
                     at = f"at contractions of {ends[0]:.3g} to {ends[1]:.3g} %"
                     reason = f"the fills {at} determine {ratio}; give the braid of the muscle"
                 return LeftOutStage(NAME, reason, REMEDY)
-            geometry, scale = change.geometry(estimate.volume_at_rest), estimate.scale
+            geometry = change.geometry(estimate.volume_at_rest)
+            scale = estimate.scale
         experiments = _experiments(records, rising, relative, geometry, scale)
         return _fit_jointly(records, experiments, geometry, estimate, progress)
     except AirmuscleError as error:
@@ -178,11 +216,16 @@ def fit_fill_stage(
 
 
 def _fit_relative(records: Sequence[CampaignRecord]) -> DynamicFit:
-    """A fit of own volumes of the records for an assumed conductance of the valve of their first direction."""
+    """A fit of own volumes of the records for an assumed conductance of the valve of their first
+    direction.
+    """
 
     def fitted(experiments: Sequence[Experiment]) -> DynamicFit:
         valves = fills.ValveUnknowns.of(records, experiments[0].plant)
-        free = [*valves.shared, *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else [])]
+        free = [
+            *valves.shared,
+            *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else []),
+        ]
         return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
     detected = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
@@ -190,28 +233,46 @@ def _fit_relative(records: Sequence[CampaignRecord]) -> DynamicFit:
 
 
 def _experiments(
-    records: Sequence[CampaignRecord], rising: Sequence[CampaignRecord], relative: DynamicFit, geometry: Geometry,
+    records: Sequence[CampaignRecord],
+    rising: Sequence[CampaignRecord],
+    relative: DynamicFit,
+    geometry: Geometry,
     scale: float,
-) -> list[Experiment]:  # fmt: skip
-    """All records with the volumes of a geometry, from the valves of the scaled relative fit and its instants."""
+) -> list[Experiment]:
+    """All records with the volumes of a geometry, from the valves of the scaled relative fit and
+    its instants.
+    """
     found = fills.rescaled(fills.plant_of(relative.plant()), scale)
-    plants = [fills.at_record(found, each, float(geometry.volume(fills.held_contraction(each)))) for each in records]
+    plants = [
+        fills.at_record(found, each, float(geometry.volume(fills.held_contraction(each))))
+        for each in records
+    ]
     detected = list(map(fills.detected_experiment, records, plants))
     return [
-        fills.with_instants(experiment, relative, rising.index(record)) if record in rising else experiment
+        (
+            fills.with_instants(experiment, relative, rising.index(record))
+            if record in rising
+            else experiment
+        )
         for record, experiment in zip(records, detected, strict=True)
     ]
 
 
 def _fit_jointly(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], geometry: Geometry,
-    estimate: VolumeEstimate | None, progress: Callable[[float], None],
-) -> FillStage:  # fmt: skip
+    records: Sequence[CampaignRecord],
+    experiments: Sequence[Experiment],
+    geometry: Geometry,
+    estimate: VolumeEstimate | None,
+    progress: Callable[[float], None],
+) -> FillStage:
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
-    everything, common_ratio = range(len(records)), ""
+    everything = range(len(records))
+    common_ratio = ""
 
     def fitted(experiments: Sequence[Experiment], chosen: Sequence[int] = everything) -> DynamicFit:
-        own = fills.ValveUnknowns.of([records[i] for i in chosen], experiments[0].plant, common_ratio)
+        own = fills.ValveUnknowns.of(
+            [records[i] for i in chosen], experiments[0].plant, common_ratio
+        )
         free = [*own.shared, *own.paths(fills.CONDUCTANCE)]
         return fills.fit_pressure(records, [experiments[i] for i in chosen], free)
 
@@ -233,21 +294,36 @@ def _fit_jointly(
     supposed += [*valves.supposed, *describe_ambient([record.recording for record in records])]
     cross = tuple(rms for each in predictions for rms in each.rms.values())
     others = fills.fill_baselines(fit) if len(cross) == len(records) else ()
-    parts = (tuple(records), tuple(experiments), geometry, estimate, contractions, cross, others, tuple(supposed))
+    parts = (
+        tuple(records),
+        tuple(experiments),
+        geometry,
+        estimate,
+        contractions,
+        cross,
+        others,
+        tuple(supposed),
+    )
     return FillStage(fit, *parts)
 
 
 def _with_supply(
     records: Sequence[CampaignRecord], experiments: Sequence[Experiment], fitted: Fitted
 ) -> tuple[DynamicFit, Sequence[Experiment]]:
-    """The fit with a constant supply; where it does not follow the records, with a volume before the valve or a tube,
-    if the records determine it and the fit then follows them. Too large a tube stands for an error of the model."""
-    constant, valves = fitted(experiments), fills.ValveUnknowns.of(records, experiments[0].plant)
+    """The fit with a constant supply; where it does not follow the records, with a volume before
+    the valve or a tube, if the records determine it and the fit then follows them. Too large a tube
+    stands for an error of the model.
+    """
+    constant = fitted(experiments)
+    valves = fills.ValveUnknowns.of(records, experiments[0].plant)
     limit = MAX_FOLLOWED * fills.pressure_deviation(records)
     if not valves.fill or valves.sinks or valves.tube or max(fills.record_rms(constant)) <= limit:
         return constant, experiments
     found = [fills.with_instants(each, constant, i) for i, each in enumerate(experiments)]
-    for change, begun, volume in ((_with_volume, found, "supply.volume"), (_with_tube, experiments, "tube.volume")):
+    for change, begun, volume in (
+        (_with_volume, found, "supply.volume"),
+        (_with_tube, experiments, "tube.volume"),
+    ):
         try:
             fit, changed = change(begun, fitted)
         except AirmuscleError:  # the simulation fails on the way
@@ -261,19 +337,25 @@ def _with_supply(
     return constant, experiments
 
 
-def _with_volume(experiments: Sequence[Experiment], fitted: Fitted) -> tuple[DynamicFit, list[Experiment]]:
+def _with_volume(
+    experiments: Sequence[Experiment], fitted: Fitted
+) -> tuple[DynamicFit, list[Experiment]]:
     """The fit with a volume before the valve."""
     changed = list(map(fills.with_supply_volume, experiments))
     return fitted(changed), changed
 
 
-def _with_tube(experiments: Sequence[Experiment], fitted: Fitted) -> tuple[DynamicFit, list[Experiment]]:
+def _with_tube(
+    experiments: Sequence[Experiment], fitted: Fitted
+) -> tuple[DynamicFit, list[Experiment]]:
     """The fit with a tube between valves and muscle, whose number of segments AICc chooses."""
     plant = fills.plant_of(experiments[0].plant)
 
     def divided(changed: Plant) -> list[Experiment]:
         return [fills.with_circuit(each, changed.circuits[0]) for each in experiments]
 
-    guess = dataclasses.replace(plant, circuit=WithTubes(fills.valves_of(plant.circuit), fills.tube_guess(plant)))
+    guess = dataclasses.replace(
+        plant, circuit=WithTubes(fills.valves_of(plant.circuit), fills.tube_guess(plant))
+    )
     fit = fit_tube(guess, lambda changed, _: fitted(divided(changed)))
     return fit, divided(fills.plant_of(fit.plant()))

@@ -1,5 +1,5 @@
-"""Friction of all loops of a campaign, dependent on the pressure; damping by the quick releases of a hanging load; the
-force of friction and creep along a recorded motion."""
+"""Friction of all loops of a campaign, dependent on the pressure; damping by the quick releases of
+a hanging load; the force of friction and creep along a recorded motion."""
 
 import dataclasses
 import itertools
@@ -12,17 +12,43 @@ import numpy as np
 from ....core import STANDARD_GRAVITY, AirmuscleError, Array, ShortRepr
 from ....engine.distribution import DistributedCalls
 from ....engine.loop.inputs import Schedule
-from ....physics import ClosedChamber, CreepElements, HangingMass, LinearDamper, Muscle, Plant, Polytropic, WithLatch
+from ....physics import (
+    ClosedChamber,
+    CreepElements,
+    HangingMass,
+    LinearDamper,
+    Muscle,
+    Plant,
+    Polytropic,
+    WithLatch,
+)
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ...segment.sensor import estimate_noise
 from .. import hysteresis
 from ..candidates import evaluate_force
-from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
+from ..dynamic import (
+    DynamicFit,
+    Experiment,
+    InitialConditions,
+    StartTime,
+    fit_dynamic,
+    stated_ambient,
+)
 from .record import CampaignRecord, RecordKind
-from .transient import LeftOutStage, displacement, find_motion, held_steady, path_rows, thin, thinned_rows, with_force
+from .transient import (
+    LeftOutStage,
+    displacement,
+    find_motion,
+    held_steady,
+    path_rows,
+    thin,
+    thinned_rows,
+    with_force,
+)
 
-FIT_ROWS, INITIAL_DAMPING = 300, 100.0
+FIT_ROWS = 300
+INITIAL_DAMPING = 100.0
 """Maximum number of rows of a release, and initial damping of the search [N s/m] (chosen)."""
 MIN_DEVIATIONS = (("position", "length", 2e-5), ("pressure", "pressure", 100.0))
 """Quantities, their columns, and least standard deviations of the sensors [m], [Pa] (chosen)."""
@@ -30,8 +56,9 @@ SETTLED_SHARE = 0.1
 """Share of the rows at the end of a release from which the load follows (chosen)."""
 DAMPING = "muscle.damper.damping"
 REMEDY = (
-    "hold the muscle at its resting length with a latch at constant air mass, release it with a hanging mass, and "
-    "record pressure, length and force at 500 rows per second or more until it is at rest"
+    "hold the muscle at its resting length with a latch at constant air mass, release it with a"
+    " hanging mass, and record pressure, length and force at 500 rows per second or more until it"
+    " is at rest"
 )
 
 
@@ -53,22 +80,28 @@ class ReleaseStage(ShortRepr):
     def verdict(self) -> str:
         """Damping and residuals, as sentences."""
         damping = self.fit[DAMPING]
-        rms = ", ".join(f"{1e3 * self.fit.rms('position', i):.3g} mm" for i in range(len(self.records)))
+        rms = ", ".join(
+            f"{1e3 * self.fit.rms('position', i):.3g} mm" for i in range(len(self.records))
+        )
         loads = ", ".join(f"{mass:.4g} kg" for mass in self.masses)
         return (
-            f"Damping {damping.value:.4g} N s/m (2 standard errors {damping.format_interval()}), with a load of "
-            f"{loads}; rms residual of the position {rms}. The damping is that of this speed and load."
+            f"Damping {damping.value:.4g} N s/m (2 standard errors {damping.format_interval()}),"
+            f" with a load of {loads}; rms residual of the position {rms}. The damping is that of"
+            " this speed and load."
         )
 
 
-def fit_release_stage(records: Sequence[CampaignRecord], muscle: Muscle | None) -> ReleaseStage | LeftOutStage:
-    """Fit the damping of the muscle to the position and the pressure after the release of a hanging mass. The muscle
-    has its static law, friction and volume. The mass is the constant `mass` [kg] of the file, or follows from the force
-    at the end of the record."""
+def fit_release_stage(
+    records: Sequence[CampaignRecord], muscle: Muscle | None
+) -> ReleaseStage | LeftOutStage:
+    """Fit the damping of the muscle to the position and the pressure after the release of a hanging
+    mass. The muscle has its static law, friction and volume. The mass is the constant `mass` [kg]
+    of the file, or follows from the force at the end of the record."""
     if not records:
         return LeftOutStage("release", "no record is a release", REMEDY)
     if muscle is None:
-        reason, remedy = "the enclosed volume of the muscle is not known", "identify the volume from fills"
+        reason = "the enclosed volume of the muscle is not known"
+        remedy = "identify the volume from fills"
         return LeftOutStage("release", reason, remedy)
     masses = {record: mass for record in records if (mass := _mass(record)) is not None}
     if not masses:
@@ -85,16 +118,22 @@ def fit_release_stage(records: Sequence[CampaignRecord], muscle: Muscle | None) 
         first = experiments[0].plant
         assert first is not None
         fit = fit_dynamic(
-            first, experiments, free=(DAMPING, "gas.exponent"), observed=deviations, per_record=(StartTime(0.02),),
+            first,
+            experiments,
+            free=(DAMPING, "gas.exponent"),
+            observed=deviations,
+            per_record=(StartTime(0.02),),
             bounds={DAMPING: (0.1, 1e5)},
-        )  # fmt: skip
+        )
     except AirmuscleError as error:
         return LeftOutStage("release", str(error.message), REMEDY)
     return ReleaseStage(fit, tuple(masses), tuple(masses.values()))
 
 
 def _mass(record: CampaignRecord) -> float | None:
-    """Moving mass [kg]: stated in the file, or from the force at the end, when the load hangs at rest."""
+    """Moving mass [kg]: stated in the file, or from the force at the end, when the load hangs at
+    rest.
+    """
     stated = record.recording.constants.get("mass")
     if isinstance(stated, float | int) and stated > 0:
         return float(stated)
@@ -107,21 +146,26 @@ def _mass(record: CampaignRecord) -> float | None:
 
 def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experiment:
     whole = record.recording
-    mechanism, ambient = WithLatch(HangingMass(mass)), stated_ambient(whole)
+    mechanism = WithLatch(HangingMass(mass))
+    ambient = stated_ambient(whole)
     plant = Plant(muscle, ClosedChamber(), mechanism, gas=Polytropic(1.2), ambient=ambient)
-    motion, path = find_motion(whole), displacement(whole)
+    motion = find_motion(whole)
+    path = displacement(whole)
     assert motion is not None
     count = max(int((whole["time"] < motion.start).sum()), 3)
     pressure, position = (float(np.median(column[:count])) for column in (whole["pressure"], path))
     conditions = InitialConditions.at_coordinates(plant, pressure, position=position, speed=0.0)
     recording = thin(whole.with_columns(position=path), FIT_ROWS)
     command = Schedule({"latched": ((0.0, 0.0),)})
-    return Experiment(recording, command, conditions, max(motion.start - 0.005, float(whole["time"][0])), plant)
+    return Experiment(
+        recording, command, conditions, max(motion.start - 0.005, float(whole["time"][0])), plant
+    )
 
 
-MAX_LOOPS, PREDICTED_ROWS = 6, 3000
-"""Maximum number of loops that are fitted, of more those at evenly spaced pressures, and of rows of a record for which
-the friction is computed (chosen)."""
+MAX_LOOPS = 6
+PREDICTED_ROWS = 3000
+"""Maximum number of loops that are fitted, of more those at evenly spaced pressures, and of rows of
+a record for which the friction is computed (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -148,36 +192,56 @@ class FrictionStage(ShortRepr):
         if self.joint:
             return f"{self.joint[0].verdict} The muscle is written without friction."
         if len(self.loops) > 1:
-            return "Fewer than two loops can be fitted together; the muscle is written without friction."
+            return (
+                "Fewer than two loops can be fitted together; the muscle is written without"
+                " friction."
+            )
         best = self.loops[0].recommended
         if best is None:
             return "The loops justify no friction; the muscle is written without friction."
-        return f"{best.verdict} A single loop does not show the dependence of the friction on the pressure."
+        return (
+            f"{best.verdict} A single loop does not show the dependence of the friction on the"
+            " pressure."
+        )
 
 
 def fit_friction_stage(
-    records: Sequence[CampaignRecord], creep: CreepElements, progress: Callable[[float], None],
+    records: Sequence[CampaignRecord],
+    creep: CreepElements,
+    progress: Callable[[float], None],
     executor: Executor | None = None,
-) -> FrictionStage | LeftOutStage:  # fmt: skip
-    """Fit every friction law to the loops at constant pressure of all specimens together. The force of the creep
-    elements is added before, so that it is not taken for friction. Each loop has its own static curve, a polynomial in
-    the contraction."""
+) -> FrictionStage | LeftOutStage:
+    """Fit every friction law to the loops at constant pressure of all specimens together. The force
+    of the creep elements is added before, so that it is not taken for friction. Each loop has its
+    own static curve, a polynomial in the contraction."""
     loops, failed = _find_loops(records, creep)
     if not loops:
-        reason = failed[0] if failed else "no record at constant pressure has a rising and a falling branch"
-        remedy = "shorten and lengthen the muscle slowly at constant pressure, at three pressures or more"
+        reason = (
+            failed[0]
+            if failed
+            else "no record at constant pressure has a rising and a falling branch"
+        )
+        remedy = (
+            "shorten and lengthen the muscle slowly at constant pressure, at three pressures or"
+            " more"
+        )
         return LeftOutStage("hysteresis", reason, remedy)
     ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
     kept = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
-    fits = DistributedCalls(executor, _fit_loop, None).results(kept, lambda done: progress(0.5 * done / len(kept)))
+    fits = DistributedCalls(executor, _fit_loop, None).results(
+        kept, lambda done: progress(0.5 * done / len(kept))
+    )
     laws = itertools.count(1)
     joint = hysteresis.fit_jointly(
-        fits, progress=lambda _: progress(0.5 + 0.5 * min(next(laws) / 5.0, 1.0)), workers=executor or 1
+        fits,
+        progress=lambda _: progress(0.5 + 0.5 * min(next(laws) / 5.0, 1.0)),
+        workers=executor or 1,
     )
     best = hysteresis.preferred_fit(joint)
     runs = () if best is None else best.series
     if best is None and len(fits) == 1 and (only := fits[0].recommended) is not None:
-        best, runs = only, (only.series,)
+        best = only
+        runs = (only.series,)
     friction = NoFriction() if best is None else hysteresis.identified_friction(best.friction, runs)
     return FrictionStage(friction, tuple(fits), joint, len(loops) - len(kept))
 
@@ -195,7 +259,8 @@ def _find_loops(
     for record in records:
         if record.kind is RecordKind.ISOBARIC and record.resting_length is not None:
             recording = with_force(record.recording, creep_force(creep, record.recording))
-            recording, own = recording.rows(path_rows(recording)), usable.setdefault(record.resting_length, [])
+            recording = recording.rows(path_rows(recording))
+            own = usable.setdefault(record.resting_length, [])
             try:
                 hysteresis.find_loops([recording], all_rows=True)
             except AirmuscleError as error:
@@ -207,9 +272,10 @@ def _find_loops(
 
 
 def friction_along(friction: Friction, recording: Recording) -> Array:
-    """Friction force against contraction [N] along the motion of a recording, relaxed at its start; shape (N,). It is
-    computed at rows whose steps are beyond the noise of the displacement, and interpolated between them. The motion is
-    that outside a dead band of the noise, so that a held length keeps its friction."""
+    """Friction force against contraction [N] along the motion of a recording, relaxed at its start;
+    shape (N,). It is computed at rows whose steps are beyond the noise of the displacement, and
+    interpolated between them. The motion is that outside a dead band of the noise, so that a held
+    length keeps its friction."""
     if isinstance(friction, NoFriction):
         return np.zeros(len(recording))
     rows = path_rows(recording, PREDICTED_ROWS)
@@ -222,11 +288,16 @@ def friction_along(friction: Friction, recording: Recording) -> Array:
 
 
 def creep_stretches(time: Array, path: Array, relaxation_times: Array) -> Array:
-    """Stretch z [m] of each Maxwell element along a path x [m], z' = x' - z/tau, exact for linear motion; (N, E)."""
-    steps, durations = np.diff(path, prepend=path[:1]), np.diff(time, prepend=time[:1])
+    """Stretch z [m] of each Maxwell element along a path x [m], z' = x' - z/tau, exact for linear
+    motion; (N, E).
+    """
+    steps = np.diff(path, prepend=path[:1])
+    durations = np.diff(time, prepend=time[:1])
     decay = np.exp(-durations[:, None] / relaxation_times)
     ratio = durations[:, None] / relaxation_times
-    gain = np.where(ratio > 1e-9, -np.expm1(-ratio) / np.maximum(ratio, 1e-300), 1.0) * steps[:, None]
+    gain = (
+        np.where(ratio > 1e-9, -np.expm1(-ratio) / np.maximum(ratio, 1e-300), 1.0) * steps[:, None]
+    )
     stretches = np.zeros((time.size, relaxation_times.size))
     for i in range(1, time.size):
         stretches[i] = stretches[i - 1] * decay[i] + gain[i]
@@ -234,22 +305,34 @@ def creep_stretches(time: Array, path: Array, relaxation_times: Array) -> Array:
 
 
 def creep_force(elements: CreepElements, recording: Recording) -> Array:
-    """Force of the elements against contraction [N] along the motion of a recording, relaxed at its start; (N,)."""
+    """Force of the elements against contraction [N] along the motion of a recording, relaxed at its
+    start; (N,).
+    """
     if not elements.stiffnesses or "time" not in recording:
         return np.zeros(len(recording))
-    stretches = creep_stretches(recording["time"], displacement(recording), np.array(elements.relaxation_times))
+    stretches = creep_stretches(
+        recording["time"], displacement(recording), np.array(elements.relaxation_times)
+    )
     return np.asarray(stretches @ np.array(elements.stiffnesses))
 
 
 def has_path(recording: Recording) -> bool:
     """Whether a recording has the displacement over time."""
-    return "time" in recording and isinstance(recording.constants.get("resting_length"), float | int)
+    return "time" in recording and isinstance(
+        recording.constants.get("resting_length"), float | int
+    )
 
 
 def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> list[Recording]:
-    """The recordings with the force of the creep elements along their motion added to the measured force."""
+    """The recordings with the force of the creep elements along their motion added to the measured
+    force.
+    """
     return [
-        with_force(each, creep_force(elements, each)) if elements.stiffnesses and has_path(each) else each
+        (
+            with_force(each, creep_force(elements, each))
+            if elements.stiffnesses and has_path(each)
+            else each
+        )
         for each in recordings
     ]
 
@@ -257,9 +340,10 @@ def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> l
 def predicted_force(
     law: Any, recording: Recording, friction: Friction, creep: CreepElements, max_force: float
 ) -> Array:
-    """The force [N] along the pressure and the motion of a recording, negative where the muscle is slack; shape (N,).
-    Friction and creep, relaxed at the first row, are left out without the constant `resting_length`. `max_force` [N]
-    limits the force of laws that give contraction or pressure. Raises ColumnError."""
+    """The force [N] along the pressure and the motion of a recording, negative where the muscle is
+    slack; shape (N,). Friction and creep, relaxed at the first row, are left out without the
+    constant `resting_length`. `max_force` [N] limits the force of laws that give contraction or
+    pressure. Raises ColumnError."""
     force = evaluate_force(law, recording["pressure"], recording["contraction"], max_force)
     if recording.constants.get("resting_length") is None:
         return force

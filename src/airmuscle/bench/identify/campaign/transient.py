@@ -1,4 +1,6 @@
-"""Transients of a record, steps of the pressure and the motion of a release, and its rows for fits."""
+"""Transients of a record, steps of the pressure and the motion of a release, and its rows for
+fits.
+"""
 
 import dataclasses
 import itertools
@@ -8,7 +10,14 @@ import numpy as np
 
 from ....core import Array
 from ....recording import Recording
-from ...segment import CONTRACTION_BAND, Mask, Sensor, estimate_noise, quasi_static_rows, running_median
+from ...segment import (
+    CONTRACTION_BAND,
+    Mask,
+    Sensor,
+    estimate_noise,
+    quasi_static_rows,
+    running_median,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -22,14 +31,18 @@ class LeftOutStage:
     @property
     def verdict(self) -> str:
         """The reason and what to measure, as sentences."""
-        return f"Not identified: {self.reason.rstrip('.')}. To identify it, {self.remedy.rstrip('.')}."
+        return (
+            f"Not identified: {self.reason.rstrip('.')}. To identify it, {self.remedy.rstrip('.')}."
+        )
 
 
 MAX_ROWS = 1000
 """Maximum number of rows of a record for a fit of friction (chosen)."""
-NOISE_STEPS, NOISE_RANGE, DEAD_BAND = 4.0, 8.0, 4.0
-"""Mean step of the displacement between two rows, range of the noise of a held contraction, and half width of the dead
-band of a motion, in standard deviations of the noise (chosen)."""
+NOISE_STEPS = 4.0
+NOISE_RANGE = 8.0
+DEAD_BAND = 4.0
+"""Mean step of the displacement between two rows, range of the noise of a held contraction, and
+half width of the dead band of a motion, in standard deviations of the noise (chosen)."""
 
 
 def thinned_rows(size: int, count: int) -> Array:
@@ -39,7 +52,11 @@ def thinned_rows(size: int, count: int) -> Array:
 
 def thin(recording: Recording, count: int) -> Recording:
     """The recording reduced to at most `count` rows, evenly spaced by number."""
-    return recording if len(recording) <= count else recording.rows(thinned_rows(len(recording), count))
+    return (
+        recording
+        if len(recording) <= count
+        else recording.rows(thinned_rows(len(recording), count))
+    )
 
 
 def displacement(recording: Recording) -> Array:
@@ -52,17 +69,25 @@ def path_rows(recording: Recording, max_rows: int = MAX_ROWS) -> Array:
     path = displacement(recording)
     noise = estimate_noise(path)
     span = float(np.ptp(path))
-    count = max_rows if noise == 0.0 else int(min(max_rows, max(2.0 * span / (NOISE_STEPS * noise), 20)))
+    count = (
+        max_rows
+        if noise == 0.0
+        else int(min(max_rows, max(2.0 * span / (NOISE_STEPS * noise), 20)))
+    )
     return thinned_rows(len(recording), count)
 
 
 def held_steady(path: Array, noise: float) -> Array:
-    """The motion without its noise: the output of a play operator, which rests while the path [m] stays within a dead
-    band of `DEAD_BAND` standard deviations of the noise [m]; shape (N,). The noise of a held length would otherwise
-    unload the friction: cycles within the presliding distance relax the force of most friction laws towards zero."""
+    """The motion without its noise: the output of a play operator, which rests while the path [m]
+    stays within a dead band of `DEAD_BAND` standard deviations of the noise [m]; shape (N,). The
+    noise of a held length would otherwise unload the friction: cycles within the presliding
+    distance relax the force of most friction laws towards zero.
+    """
     if noise == 0.0:
         return path
-    half, output, current = DEAD_BAND * noise, np.empty(path.size), float(path[0])
+    half = DEAD_BAND * noise
+    output = np.empty(path.size)
+    current = float(path[0])
     for i, value in enumerate(path.tolist()):
         current = min(max(current, value - half), value + half)
         output[i] = current
@@ -70,9 +95,13 @@ def held_steady(path: Array, noise: float) -> Array:
 
 
 def is_held(recording: Recording) -> bool:
-    """Whether the length of a recording is held: its contraction stays within the band of an isometric run."""
+    """Whether the length of a recording is held: its contraction stays within the band of an
+    isometric run.
+    """
     path = recording["contraction"]
-    return float(np.nanmax(path) - np.nanmin(path)) <= CONTRACTION_BAND + NOISE_RANGE * estimate_noise(path)
+    return float(
+        np.nanmax(path) - np.nanmin(path)
+    ) <= CONTRACTION_BAND + NOISE_RANGE * estimate_noise(path)
 
 
 def with_force(recording: Recording, added: Array) -> Recording:
@@ -85,26 +114,41 @@ def named(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings with different origins: repeated names are numbered."""
     names = [recording.origin for recording in recordings]
     return tuple(
-        each if names.count(each.origin) == 1 else dataclasses.replace(each, origin=f"{each.origin} ({i + 1})")
+        (
+            each
+            if names.count(each.origin) == 1
+            else dataclasses.replace(each, origin=f"{each.origin} ({i + 1})")
+        )
         for i, each in enumerate(recordings)
     )
 
 
-MIN_STEP, MAX_MIDDLE, MIN_TRANSIENT = 20e3, 0.47, 0.5
-"""Minimum change of the pressure of a step [Pa], maximum time of half of it, as a fraction of the time from 5 to 95 %,
-which is 0.5 in a ramp, and minimum fraction of its rows that are not quasi-static (chosen)."""
+MIN_STEP = 20e3
+MAX_MIDDLE = 0.47
+MIN_TRANSIENT = 0.5
+"""Minimum change of the pressure of a step [Pa], maximum time of half of it, as a fraction of the
+time from 5 to 95 %, which is 0.5 in a ramp, and minimum fraction of its rows that are not
+quasi-static (chosen)."""
 MAX_PULSES = 2
-"""Maximum number of rises after a rest within a step (chosen); more are the pulses of a valve that makes a ramp."""
-PULSE_POINTS, PULSE_WINDOW = 200, 4
-"""Number of points of a step, and of those of a moving difference, by which pulses are counted (chosen)."""
-MAX_RELEASE, MEDIAN_ROWS = 2.0, 5
-"""Maximum duration of the motion of a release [s], and width of the median of pressure and length [rows] (chosen)."""
+"""Maximum number of rises after a rest within a step (chosen); more are the pulses of a valve that
+makes a ramp.
+"""
+PULSE_POINTS = 200
+PULSE_WINDOW = 4
+"""Number of points of a step, and of those of a moving difference, by which pulses are counted
+(chosen).
+"""
+MAX_RELEASE = 2.0
+MEDIAN_ROWS = 5
+"""Maximum duration of the motion of a release [s], and width of the median of pressure and length
+[rows] (chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class PressureStep:
-    """A step of the pressure: instant of its start [s], duration from 5 % to 95 % [s], change, and value at its end
-    [Pa]."""
+    """A step of the pressure: instant of its start [s], duration from 5 % to 95 % [s], change, and
+    value at its end [Pa]."""
 
     start: float
     duration: float
@@ -114,7 +158,9 @@ class PressureStep:
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """The motion of a record: start and end [s] between 2 % and 95 % of its net travel [m], range of its path [m]."""
+    """The motion of a record: start and end [s] between 2 % and 95 % of its net travel [m], range
+    of its path [m].
+    """
 
     start: float
     end: float
@@ -127,11 +173,17 @@ class Motion:
         return self.end - self.start
 
 
-def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> tuple[PressureStep, ...]:
-    """The steps of the pressure through a valve; empty for a slow or a linear change of the pressure. Each step
-    approaches its final value with a decreasing rate, so that half of the change takes less than half of the time."""
-    time, pressure = recording["time"], running_median(recording["pressure"], MEDIAN_ROWS)
-    low, high = float(pressure.min()), float(pressure.max())
+def find_pressure_steps(
+    recording: Recording, sensors: Mapping[str, Sensor]
+) -> tuple[PressureStep, ...]:
+    """The steps of the pressure through a valve; empty for a slow or a linear change of the
+    pressure. Each step approaches its final value with a decreasing rate, so that half of the
+    change takes less than half of the time.
+    """
+    time = recording["time"]
+    pressure = running_median(recording["pressure"], MEDIAN_ROWS)
+    low = float(pressure.min())
+    high = float(pressure.max())
     if high - low < MIN_STEP or not (np.diff(time) > 0).all():
         return ()
     fraction = (pressure - low) / (high - low)
@@ -148,20 +200,29 @@ def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> 
         if step is None:
             return ()
         start, duration, first, last = step
-        steps.append(PressureStep(start, duration, (last - first) * (high - low), low + last * (high - low)))
+        steps.append(
+            PressureStep(start, duration, (last - first) * (high - low), low + last * (high - low))
+        )
     return tuple(steps)
 
 
-def _measure(time: Array, fraction: Array, transient: Mask, rising: bool) -> tuple[float, float, float, float] | None:
+def _measure(
+    time: Array, fraction: Array, transient: Mask, rising: bool
+) -> tuple[float, float, float, float] | None:
     """Start, duration, first and last value of a step; None if it is not that of a valve."""
     values = fraction if rising else 1.0 - fraction
-    first, last = float(np.min(values)), float(np.max(values))
+    first = float(np.min(values))
+    last = float(np.max(values))
     marks = [first + share * (last - first) for share in (0.05, 0.5, 0.95)]
     begin = int(np.flatnonzero(values <= marks[0])[-1]) if (values <= marks[0]).any() else 0
     later = [begin + int(np.argmax(values[begin:] >= mark)) for mark in marks[1:]]
     duration = float(time[later[1]] - time[begin])
     half = float(time[later[0]] - time[begin])
-    if later[1] <= begin or transient[begin : later[1] + 1].mean() < MIN_TRANSIENT or half > MAX_MIDDLE * duration:
+    if (
+        later[1] <= begin
+        or transient[begin : later[1] + 1].mean() < MIN_TRANSIENT
+        or half > MAX_MIDDLE * duration
+    ):
         return None
     step_rows = slice(begin, later[1] + 1)
     if count_pulses(time[step_rows], values[step_rows]) > MAX_PULSES:
@@ -173,7 +234,9 @@ def _measure(time: Array, fraction: Array, transient: Mask, rising: bool) -> tup
 
 
 def count_pulses(time: Array, values: Array) -> int:
-    """Number of rises above the mean rate after a rest, in a rising signal; a fill through an open valve has none."""
+    """Number of rises above the mean rate after a rest, in a rising signal; a fill through an open
+    valve has none.
+    """
     even = np.interp(np.linspace(time[0], time[-1], PULSE_POINTS), time, values)
     mean = PULSE_WINDOW * float(even[-1] - even[0]) / PULSE_POINTS
     changes = even[PULSE_WINDOW:] - even[:-PULSE_WINDOW]
@@ -188,9 +251,13 @@ def find_motion(recording: Recording) -> Motion | None:
     span = float(np.ptp(contraction))
     if span <= CONTRACTION_BAND:
         return None
-    rows, time = max(1, contraction.size // 50), recording["time"]
-    first, last = float(np.median(contraction[:rows])), float(np.median(contraction[-rows:]))
-    travel, begin, end = last - first, 0, time.size - 1
+    rows = max(1, contraction.size // 50)
+    time = recording["time"]
+    first = float(np.median(contraction[:rows]))
+    last = float(np.median(contraction[-rows:]))
+    travel = last - first
+    begin = 0
+    end = time.size - 1
     if abs(travel) > CONTRACTION_BAND:
         fraction = (contraction - first) / travel
         begin = int(np.argmax(fraction > 0.02))

@@ -1,4 +1,6 @@
-"""Report chapters: a dynamic fit with estimates, identifiability, profiles, and measured and modelled records."""
+"""Report chapters: a dynamic fit with estimates, identifiability, profiles, and measured and
+modelled records.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -20,50 +22,80 @@ MAX_OPTIMA = 8
 
 
 def dynamic_chapters(
-    fit: DynamicFit, title: str, profiles: Sequence[DynamicProfile] = (), remarks: Sequence[str] = (),
+    fit: DynamicFit,
+    title: str,
+    profiles: Sequence[DynamicProfile] = (),
+    remarks: Sequence[str] = (),
     cross: Sequence[CrossPrediction] = (),
-) -> list[Chapter]:  # fmt: skip
-    """Return the chapters of a dynamic fit: estimates and identifiability, profiles, and one chapter per record.
-    `remarks` are sentences about the records, `cross` the predictions of each record by the others, which stand
-    first."""
-    first, records = _estimates(fit, title, remarks, cross), range(len(fit.problem.record_models))
-    return [first, *([_profiles(profiles)] if profiles else []), *(_record(fit, i) for i in records)]
+) -> list[Chapter]:
+    """Return the chapters of a dynamic fit: estimates and identifiability, profiles, and one
+    chapter per record. `remarks` are sentences about the records, `cross` the predictions of each
+    record by the others, which stand first."""
+    first = _estimates(fit, title, remarks, cross)
+    records = range(len(fit.problem.record_models))
+    return [
+        first,
+        *([_profiles(profiles)] if profiles else []),
+        *(_record(fit, i) for i in records),
+    ]
 
 
 def regulator_chapters(result: RegulatorFit, title: str) -> list[Chapter]:
     """Return the chapters of the fit of a pressure regulator, as those of a dynamic fit."""
-    first, own = _estimates(result.fit, title, (), ()), result.chapter()
+    first = _estimates(result.fit, title, (), ())
+    own = result.chapter()
     records = [_record(result.fit, i) for i in range(len(result.zeros))]
-    return [dataclasses.replace(first, tables=(*first.tables, own.tables[-1]), notes=own.notes), *records]
+    return [
+        dataclasses.replace(first, tables=(*first.tables, own.tables[-1]), notes=own.notes),
+        *records,
+    ]
 
 
-def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str], cross: Sequence[CrossPrediction]) -> Chapter:
+def _estimates(
+    fit: DynamicFit, title: str, remarks: Sequence[str], cross: Sequence[CrossPrediction]
+) -> Chapter:
     chapter = fit.chapter()
     estimates, residuals = chapter.tables
     if cross:  # the table of the cross-predictions contains the residuals, too
         residuals = dataclasses.replace(residuals, brief=0)
-    names, undetermined = [e.name for e in fit.estimates], fit.identifiability.undetermined
+    names = [e.name for e in fit.estimates]
+    undetermined = fit.identifiability.undetermined
     rows = {"unknown": names, **{name: fit.correlations[:, i] for i, name in enumerate(names)}}
     correlations = Table("correlations", "Correlations", rows, shown=False)
     columns: dict[str, Any] = {
         "combination (relative changes)": [
-            ", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in undetermined
+            ", ".join(f"{name} {share:+.2g}" for name, share in each.shares)
+            for each in undetermined
         ],
         "relative standard deviation": [each.relative_stderr for each in undetermined],
         "experiment that determines it": [each.remedy for each in undetermined],
     }
-    open_ends = Table("not-determined", "Parameter combinations that the records do not determine", columns)
-    tables = (_cross_table(cross), estimates, open_ends, _optima_table(fit), residuals, correlations)
+    open_ends = Table(
+        "not-determined", "Parameter combinations that the records do not determine", columns
+    )
+    tables = (
+        _cross_table(cross),
+        estimates,
+        open_ends,
+        _optima_table(fit),
+        residuals,
+        correlations,
+    )
     return dataclasses.replace(
-        chapter, title=title, summary=(describe_cross_predictions(cross), *chapter.paragraphs),
-        tables=tuple(filter(len, tables)), plots=(), notes=(*chapter.notes, *remarks),
+        chapter,
+        title=title,
+        summary=(describe_cross_predictions(cross), *chapter.paragraphs),
+        tables=tuple(filter(len, tables)),
+        plots=(),
+        notes=(*chapter.notes, *remarks),
         references=tuple(cite(fit.plant())),
-    )  # fmt: skip
+    )
 
 
 def _cross_table(cross: Sequence[CrossPrediction]) -> Table:
     pairs = [(each, name) for each in cross for name in each.rms]
-    errors, residuals = [each.rms[name] for each, name in pairs], [each.fitted[name] for each, name in pairs]
+    errors = [each.rms[name] for each, name in pairs]
+    residuals = [each.fitted[name] for each, name in pairs]
     columns: dict[str, Any] = {
         "record": [each.record for each, _ in pairs],
         "quantity": [name for _, name in pairs],
@@ -76,15 +108,21 @@ def _cross_table(cross: Sequence[CrossPrediction]) -> Table:
 
 
 def _optima_table(fit: DynamicFit) -> Table:
-    """Return a table of the optima of the searches with their estimates; empty unless there are several."""
+    """Return a table of the optima of the searches with their estimates; empty unless there are
+    several.
+    """
     shown = fit.optima[:MAX_OPTIMA] if len(fit.optima) > 1 else ()
     lowest = max(fit.costs[0], 1e-300)
     columns: dict[str, Any] = {
         "searches": [each.searches for each in shown],
-        "rms residual relative to the lowest": [float(np.sqrt(each.cost / lowest)) for each in shown],
+        "rms residual relative to the lowest": [
+            float(np.sqrt(each.cost / lowest)) for each in shown
+        ],
     }
     for i, estimate in enumerate(fit.estimates):
-        columns[estimate.name] = TableColumn([float(each.values[i]) for each in shown], estimate.unit)
+        columns[estimate.name] = TableColumn(
+            [float(each.values[i]) for each in shown], estimate.unit
+        )
     return Table("optima", "Optima of the searches", columns)
 
 
@@ -102,24 +140,36 @@ def _profiles(profiles: Sequence[DynamicProfile]) -> Chapter:
         "unit": [p.unit for p, _ in rows],
     }
     summary = (
-        "One parameter is fixed at a series of values and all others are estimated again. An end is missing if the sum "
-        "of squares does not rise enough within these values: the records do not limit the parameter there."
+        "One parameter is fixed at a series of values and all others are estimated again. An end is"
+        " missing if the sum of squares does not rise enough within these values: the records do"
+        " not limit the parameter there."
     )
     tables = (
         Table("profiles", "95 % intervals", columns, brief=MAX_ROWS),
-        Table("profile-courses", "Increase of the sum of squares [residual variances]", courses, shown=False),
+        Table(
+            "profile-courses",
+            "Increase of the sum of squares [residual variances]",
+            courses,
+            shown=False,
+        ),
     )
     caption = "Increase of the sum of squares; dashed: limit of the 95 % interval."
     plots = (Plot("profiles", caption, partial(_profile_figure, profiles)),)
     better = [p.name for p in profiles if p.cost_increase.min() < -MIN_IMPROVEMENT]
-    notes = tuple(f"{name}: a better fit was found on the profile: fit again from there" for name in better)
-    return Chapter("profiles", "Profile likelihood", summary, tables=tables, plots=plots, notes=notes)
+    notes = tuple(
+        f"{name}: a better fit was found on the profile: fit again from there" for name in better
+    )
+    return Chapter(
+        "profiles", "Profile likelihood", summary, tables=tables, plots=plots, notes=notes
+    )
 
 
 def _profile_figure(profiles: Sequence[DynamicProfile]) -> Any:
     columns = min(3, len(profiles))
     rows = -(-len(profiles) // columns)
-    figure, axes = new_figure(rows, columns, width=2.5 * columns + 0.6, height=2.4 * rows + 0.4, squeeze=False)
+    figure, axes = new_figure(
+        rows, columns, width=2.5 * columns + 0.6, height=2.4 * rows + 0.4, squeeze=False
+    )
     for axis, profile in zip(axes.ravel(), profiles, strict=False):
         axis.plot(profile.values, profile.cost_increase, "o-", color=BLUE, markersize=3)
         axis.axhline(NORMAL_95**2, color=RED, linewidth=0.8, linestyle="--")
@@ -139,23 +189,33 @@ def _profile_figure(profiles: Sequence[DynamicProfile]) -> Any:
 def _record(fit: DynamicFit, number: int) -> Chapter:
     course = fit.problem.record_models[number]
     origin = course.experiment.recording.origin
-    measured, modelled, errors = course.experiment.recording, fit.modelled(number), fit.residuals(number)
+    measured = course.experiment.recording
+    modelled = fit.modelled(number)
+    errors = fit.residuals(number)
     columns: dict[str, Any] = {"time": TableColumn(course.times, "s")}
     for name, unit in zip(course.names, unit_column(course.names), strict=True):
         columns[f"measured {name}"] = TableColumn(measured[name], unit)
         columns[f"modelled {name}"] = TableColumn(modelled[name], unit)
         columns[f"residual of {name}"] = TableColumn(errors[name], unit)
     rms = ", ".join(f"{name} {displayed(name, fit.rms(name, number))}" for name in course.names)
-    summary = f"Rms residual: {rms}. The run begins at {course.start_time(fit.values):.4g} s of the record's time."
-    stem, caption = f"record-{number + 1}", f"{origin}: measured and modelled values, and residuals."
+    summary = (
+        f"Rms residual: {rms}. The run begins at {course.start_time(fit.values):.4g} s of the"
+        " record's time."
+    )
+    stem = f"record-{number + 1}"
+    caption = f"{origin}: measured and modelled values, and residuals."
     table = Table(stem, "Measured and modelled values", columns, series=True)
-    plot, title = Plot(stem, caption, partial(_record_figure, fit, number)), f"Record {number + 1}: {origin}"
+    plot = Plot(stem, caption, partial(_record_figure, fit, number))
+    title = f"Record {number + 1}: {origin}"
     return Chapter(stem, title, summary, tables=(table,), plots=(plot,), brief=False)
 
 
 def _record_figure(fit: DynamicFit, number: int) -> Any:
-    """Return a figure with measured and modelled values above the residuals, for every observed quantity."""
-    course, modelled = fit.problem.record_models[number], fit.modelled(number)
+    """Return a figure with measured and modelled values above the residuals, for every observed
+    quantity.
+    """
+    course = fit.problem.record_models[number]
+    modelled = fit.modelled(number)
     figure, axes = residual_panels(len(course.names))
     for name, panels in zip(course.names, axes.T, strict=True):
         factor, unit = display_scale(name)
@@ -168,15 +228,21 @@ def _record_figure(fit: DynamicFit, number: int) -> Any:
 
 
 def residual_panels(count: int, **options: Any) -> Any:
-    """Return a figure and its axes (2, count): panels of values, and flat ones of residuals below."""
+    """Return a figure and its axes (2, count): panels of values, and flat ones of residuals
+    below.
+    """
     size = {"width": 2.2 + 4.2 * count if count > 1 else 6.4, "height": 4.6}
-    return new_figure(2, count, **{**size, "sharex": "col", **options}, squeeze=False, height_ratios=(2, 1))
+    return new_figure(
+        2, count, **{**size, "sharex": "col", **options}, squeeze=False, height_ratios=(2, 1)
+    )
 
 
 def draw_residuals(
     panels: Any, x: Array, measured: Array, modelled: Array, label: str, rows: Any = slice(None)
 ) -> None:
-    """Draw the measured rows and the model over x in the first panel, and their difference in the second."""
+    """Draw the measured rows and the model over x in the first panel, and their difference in the
+    second.
+    """
     dots = {"linestyle": "none", "marker": ".", "markersize": 3, "color": BLUE}
     panels[0].plot(x[rows], measured[rows], label="measured", **dots)
     panels[0].plot(x, modelled, color=RED, linewidth=1.0, label=label)
@@ -185,6 +251,8 @@ def draw_residuals(
 
 
 def running_extreme(values: Array, extreme: np.ufunc, width: int = 9) -> Array:
-    """Return the running minimum or maximum over `width` rows (chosen), the envelope of a band with two branches."""
+    """Return the running minimum or maximum over `width` rows (chosen), the envelope of a band with
+    two branches.
+    """
     padded = np.pad(values, width // 2, mode="edge")
     return np.asarray(extreme.reduce([padded[i : i + values.size] for i in range(width)]))

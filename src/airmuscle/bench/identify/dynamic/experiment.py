@@ -1,4 +1,6 @@
-"""Experiment: one record with its command, initial state, plant and ambient air, and the unknowns of its own."""
+"""Experiment: one record with its command, initial state, plant and ambient air, and the unknowns
+of its own.
+"""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -16,9 +18,10 @@ from .initial_conditions import InitialConditions
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Experiment(ShortRepr):
-    """One record: the recording, the command that was applied, and the initial conditions. `command` counts from the
-    start of the run, which is at `start_time` [s] on the clock of the recording; rows before it are at the initial
-    state. `plant` replaces the plant of the fit, for example with another load."""
+    """One record: the recording, the command that was applied, and the initial conditions.
+    `command` counts from the start of the run, which is at `start_time` [s] on the clock of the
+    recording; rows before it are at the initial state. `plant` replaces the plant of the fit, for
+    example with another load."""
 
     recording: Recording
     command: InputSignal
@@ -56,8 +59,8 @@ class InitialValue(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class CommandInstants(_Checked):
-    """The instants at which the command of a run, a Schedule, changes after its first one, each as an unknown; they
-    count from the start of the run, whose error is that of `StartTime`."""
+    """The instants at which the command of a run, a Schedule, changes after its first one, each as
+    an unknown; they count from the start of the run, whose error is that of `StartTime`."""
 
     margin: float
     """Maximum deviation from an instant of the command of the experiment [s]."""
@@ -65,7 +68,9 @@ class CommandInstants(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class CommandInstant:
-    """One instant of a command as an unknown: the instant in the command of the experiment [s], and its margin [s]."""
+    """One instant of a command as an unknown: the instant in the command of the experiment [s], and
+    its margin [s].
+    """
 
     instant: float
     margin: float
@@ -81,8 +86,9 @@ RecordUnknown = ParameterPaths | StartTime | InitialValue | CommandInstants
 
 @dataclasses.dataclass(frozen=True)
 class Unknown:
-    """One unknown number: parameters with a common value, a start time or an initial value. `record` is the index of
-    the record it belongs to, None for all records. Value and bounds are SI."""
+    """One unknown number: parameters with a common value, a start time or an initial value.
+    `record` is the index of the record it belongs to, None for all records. Value and bounds are
+    SI."""
 
     name: str
     target: tuple[str, ...] | Nuisance
@@ -109,12 +115,16 @@ class Unknown:
 
     @property
     def origin(self) -> float:
-        """Value from which the unknown is counted in the search: of an instant that of the experiment, otherwise 0."""
+        """Value from which the unknown is counted in the search: of an instant that of the
+        experiment, otherwise 0.
+        """
         return self.value if isinstance(self.target, StartTime | CommandInstant) else 0.0
 
     @property
     def search_range(self) -> tuple[float, float]:
-        """Range of the initial guesses of a multi-start: a factor of three both ways, within the bounds."""
+        """Range of the initial guesses of a multi-start: a factor of three both ways, within the
+        bounds.
+        """
         if isinstance(self.target, Nuisance):
             return self.low, self.high
         ends = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
@@ -122,10 +132,15 @@ class Unknown:
 
 
 def make_unknowns(
-    plant: System, experiments: Sequence[Experiment], free: Sequence[ParameterPaths],
-    per_record: Sequence[RecordUnknown], bounds: Mapping[str, tuple[float, float]],
-) -> tuple[Unknown, ...]:  # fmt: skip
-    """The unknowns common to all records, then those of each record. Raises ParameterError for unknown names."""
+    plant: System,
+    experiments: Sequence[Experiment],
+    free: Sequence[ParameterPaths],
+    per_record: Sequence[RecordUnknown],
+    bounds: Mapping[str, tuple[float, float]],
+) -> tuple[Unknown, ...]:
+    """The unknowns common to all records, then those of each record. Raises ParameterError for
+    unknown names.
+    """
     unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
     for i, experiment in enumerate(experiments):
         for target in per_record:
@@ -139,12 +154,17 @@ def make_unknowns(
     for name in bounds:
         if name not in {u.name.partition(" of record")[0] for u in unknowns}:
             free = ", ".join(u.name for u in unknowns)
-            raise ParameterError(f"bounds are given for '{name}', which is not free; free are {free}.")
+            raise ParameterError(
+                f"bounds are given for '{name}', which is not free; free are {free}."
+            )
     return tuple(unknowns)
 
 
 def _plant_unknown(
-    plant: System, target: ParameterPaths, record: int | None, bounds: Mapping[str, tuple[float, float]]
+    plant: System,
+    target: ParameterPaths,
+    record: int | None,
+    bounds: Mapping[str, tuple[float, float]],
 ) -> Unknown:
     paths = (target,) if isinstance(target, str) else target
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
@@ -154,45 +174,63 @@ def _plant_unknown(
     name = paths[0] + ("" if record is None else f" of record {record + 1}")
     if not low <= leaf.value <= high:
         raise ParameterError(
-            f"the initial value of {name} is {leaf.value:g}, outside its bounds {low:g} to {high:g}. Change the value "
-            "or the bounds."
+            f"the initial value of {name} is {leaf.value:g}, outside its bounds {low:g} to"
+            f" {high:g}. Change the value or the bounds."
         )
     declared = leaf.declared
-    return Unknown(name, paths, record, leaf.value, low, high, declared.unit, declared.symbol, declared.meaning)
+    return Unknown(
+        name, paths, record, leaf.value, low, high, declared.unit, declared.symbol, declared.meaning
+    )
 
 
 def _record_unknowns(
     experiment: Experiment, target: StartTime | InitialValue | CommandInstants, record: int
 ) -> list[Unknown]:
-    """A start time, an initial value, or the instants of a command after its first one. Raises ParameterError."""
+    """A start time, an initial value, or the instants of a command after its first one. Raises
+    ParameterError.
+    """
     found: list[tuple[str, Nuisance, float, str, str]]  # name, target, value, unit and symbol
     if isinstance(target, StartTime):
         found = [("start time", target, experiment.start_time, "s", "t_0")]
     elif isinstance(target, InitialValue):
-        known, where = experiment.initial_conditions.known, f"the initial conditions of record {record + 1}"
+        known = experiment.initial_conditions.known
+        where = f"the initial conditions of record {record + 1}"
         check_known(f"{where} have no known value", target.name, known, "known are")
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
         found = [(f"initial {target.name}", target, known[target.name], unit, f"{target.name}_0")]
     elif isinstance(experiment.command, Schedule):
-        instants = sorted({instant for points in experiment.command.changes.values() for instant, _ in points})
-        further = [(i, CommandInstant(instant, target.margin)) for i, instant in enumerate(instants[1:], 2)]
+        instants = sorted(
+            {instant for points in experiment.command.changes.values() for instant, _ in points}
+        )
+        further = [
+            (i, CommandInstant(instant, target.margin)) for i, instant in enumerate(instants[1:], 2)
+        ]
         found = [(f"command instant {i}", each, each.instant, "s", f"t_{i}") for i, each in further]
     else:
         raise ParameterError(
-            f"the command of record {record + 1} is a {type(experiment.command).__name__}, which has no "
-            "instants; give a Schedule, or leave CommandInstants out."
+            f"the command of record {record + 1} is a {type(experiment.command).__name__}, which"
+            " has no instants; give a Schedule, or leave CommandInstants out."
         )
     return [
         Unknown(
-            f"{name} of record {record + 1}", each, record, value, value - target.margin, value + target.margin, unit,
-            symbol, "command instant" if isinstance(each, CommandInstant) else name,
+            f"{name} of record {record + 1}",
+            each,
+            record,
+            value,
+            value - target.margin,
+            value + target.margin,
+            unit,
+            symbol,
+            "command instant" if isinstance(each, CommandInstant) else name,
         )
         for name, each, value, unit, symbol in found
-    ]  # fmt: skip
+    ]
 
 
 def with_command_instants(command: InputSignal, instants: Mapping[float, float]) -> InputSignal:
-    """The command with its instants [s] replaced by others, all inputs that change at an instant together."""
+    """The command with its instants [s] replaced by others, all inputs that change at an instant
+    together.
+    """
     if not instants:
         return command
     assert isinstance(command, Schedule)
@@ -203,15 +241,18 @@ def with_command_instants(command: InputSignal, instants: Mapping[float, float])
     return Schedule(changes)
 
 
-PRESSURE_TOLERANCE, TEMPERATURE_TOLERANCE = 1e-3, 1.0
-"""Relative difference of two ambient pressures, and difference of two temperatures [K], that are neglected (chosen)."""
+PRESSURE_TOLERANCE = 1e-3
+TEMPERATURE_TOLERANCE = 1.0
+"""Relative difference of two ambient pressures, and difference of two temperatures [K], that are
+neglected (chosen).
+"""
 CONSTANTS = {"ambient": "pressure", "ambient_temperature": "temperature"}
 """The constants of a recording by the field of `Ambient`."""
 
 
 def stated_ambient(recording: Recording, default: Ambient | None = None) -> Ambient:
-    """The ambient air of a recording: its constants `ambient` [Pa] and `ambient_temperature` [K]; what it does not
-    state is that of `default`, by default the standard atmosphere at 20 degC."""
+    """The ambient air of a recording: its constants `ambient` [Pa] and `ambient_temperature` [K];
+    what it does not state is that of `default`, by default the standard atmosphere at 20 degC."""
     known = recording.constants
     stated = {field: float(known[name]) for name, field in CONSTANTS.items() if name in known}
     return dataclasses.replace(default or Ambient(), **stated)
@@ -222,27 +263,34 @@ def check_ambient(plant: System, experiment: Experiment) -> None:
     own = getattr(experiment.plant or plant, "ambient", None)
     if not isinstance(own, Ambient):
         return
-    stated, origin = stated_ambient(experiment.recording, own), experiment.recording.origin
+    stated = stated_ambient(experiment.recording, own)
+    origin = experiment.recording.origin
     if abs(stated.pressure - own.pressure) > PRESSURE_TOLERANCE * own.pressure:
-        name, values = "pressure", [f"{each.pressure / 1e3:.4g} kPa" for each in (stated, own)]
+        name = "pressure"
+        values = [f"{each.pressure / 1e3:.4g} kPa" for each in (stated, own)]
     elif abs(stated.temperature - own.temperature) > TEMPERATURE_TOLERANCE:
-        name, values = "temperature", [f"{each.temperature:.4g} K" for each in (stated, own)]
+        name = "temperature"
+        values = [f"{each.temperature:.4g} K" for each in (stated, own)]
     else:
         return
     raise ParameterError(
-        f"{origin} states an ambient {name} of {values[0]}, but its plant has {values[1]}. The mass flow and the heat "
-        "depend on it: give the plant of this record the ambient air of the record, Plant(..., ambient=Ambient(...)), "
-        "or correct the record."
+        f"{origin} states an ambient {name} of {values[0]}, but its plant has {values[1]}. The mass"
+        " flow and the heat depend on it: give the plant of this record the ambient air of the"
+        " record, Plant(..., ambient=Ambient(...)), or correct the record."
     )
 
 
 def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
-    """A note where the plant of an experiment has another ambient air than a plant; empty otherwise."""
+    """A note where the plant of an experiment has another ambient air than a plant; empty
+    otherwise.
+    """
     own, other = (getattr(each, "ambient", None) for each in (plant, experiment.plant))
     if not (isinstance(own, Ambient) and isinstance(other, Ambient)) or own == other:
         return []
     texts = [f"{each.pressure / 1e3:.4g} kPa and {each.temperature:.4g} K" for each in (other, own)]
-    return [f"the ambient air is that of the record, {texts[0]}; the plant was identified at {texts[1]}"]
+    return [
+        f"the ambient air is that of the record, {texts[0]}; the plant was identified at {texts[1]}"
+    ]
 
 
 def describe_ambient(recordings: Sequence[Recording]) -> list[str]:
@@ -250,8 +298,8 @@ def describe_ambient(recordings: Sequence[Recording]) -> list[str]:
     silent = [recording.origin for recording in recordings if "ambient" not in recording.constants]
     some = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not state"
     text = (
-        f"{'No record states' if len(silent) == len(recordings) else some} the ambient pressure: "
-        f"{Ambient().pressure / 1e3:.4g} kPa are supposed; an error of 5 % of it changes a fitted heat transfer by "
-        "about 20 %."
+        f"{'No record states' if len(silent) == len(recordings) else some} the ambient pressure:"
+        f" {Ambient().pressure / 1e3:.4g} kPa are supposed; an error of 5 % of it changes a fitted"
+        " heat transfer by about 20 %."
     )
     return [text] if silent else []

@@ -1,4 +1,6 @@
-"""Start of a record: initial state from known values and equilibrium conditions, and rows on the clock of the run."""
+"""Start of a record: initial state from known values and equilibrium conditions, and rows on the
+clock of the run.
+"""
 
 import dataclasses
 import itertools
@@ -8,7 +10,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array, IdentificationError, ParameterError, Status, System, autodiff, check_known, tree
+from ....core import (
+    Array,
+    IdentificationError,
+    ParameterError,
+    Status,
+    System,
+    autodiff,
+    check_known,
+    tree,
+)
 from ....engine import InputSignal, PiecewiseLinear
 from ....engine.compile.cache.kernel import newton
 from ....engine.compile.function import Function
@@ -18,7 +29,9 @@ from ....physics.plant.validation import check_pressures
 PRESSURE_STEP = 100.0
 """Increase of gauge pressure [Pa] by which states that depend on the pressure are detected."""
 NOMINAL_VOLUME = 1e-4
-"""Volume of a muscle [m3] at which circuits are settled; the state of a supply does not depend on it."""
+"""Volume of a muscle [m3] at which circuits are settled; the state of a supply does not depend on
+it.
+"""
 MusclePressures = float | str | Sequence[float | str]
 """Gauge pressure [Pa] of all muscles, or one for each; also as texts with a unit."""
 _compiled_conditions: dict[Any, Function] = {}
@@ -32,7 +45,8 @@ class InitialConditions:
     guess       initial guess of every state for Newton's method [SI]
     stationary  states whose time derivative is zero
     equal       pairs of outputs that are equal
-    settled     states of supplies and regulators in the steady state that follows from their parameters
+    settled     states of supplies and regulators in the steady state that follows from their
+    parameters
     """
 
     known: Mapping[str, float]
@@ -43,49 +57,74 @@ class InitialConditions:
 
     @classmethod
     def at_rest(cls, plant: Plant, pressure: MusclePressures) -> "InitialConditions":
-        """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls, tubes and tanks are settled.
-        Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none."""
+        """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls, tubes
+        and tanks are settled. Raises ParameterError for another number of pressures than muscles,
+        EquilibriumError where there is none.
+        """
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
-        return _steady_conditions(plant, find_equilibrium(plant, pressure=tuple(pressures)), pressures, at_rest=True)
+        return _steady_conditions(
+            plant, find_equilibrium(plant, pressure=tuple(pressures)), pressures, at_rest=True
+        )
 
     @classmethod
-    def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> "InitialConditions":
-        """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI]. Speeds are
-        zero unless given. Walls and tubes are in steady state at these pressures, tanks and regulators at their supply,
-        also where their parameters are unknowns. Raises ParameterError for another number of pressures than muscles, or
-        an unknown name."""
+    def at_coordinates(
+        cls, plant: Plant, pressure: MusclePressures, **coordinates: float
+    ) -> "InitialConditions":
+        """A plant at gauge pressures [Pa], one for all muscles or one for each, and given
+        coordinates [SI]. Speeds are zero unless given. Walls and tubes are in steady state at these
+        pressures, tanks and regulators at their supply, also where their parameters are unknowns.
+        Raises ParameterError for another number of pressures than muscles, or an unknown name."""
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
-        return _steady_conditions(plant, plant.state_at(pressure=pressures, **coordinates), pressures, at_rest=False)
+        return _steady_conditions(
+            plant, plant.state_at(pressure=pressures, **coordinates), pressures, at_rest=False
+        )
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
-        """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
-        names, of_states = [s.name for s in system.states], (*self.stationary, *self.settled)
+        """Raise ParameterError for a name that the system lacks, or where the number of conditions
+        is wrong.
+        """
+        names = [s.name for s in system.states]
+        of_states = (*self.stationary, *self.settled)
         for name in (*self.known, *of_states, *itertools.chain(*self.equal)):
             allowed = names if name in of_states else values
             check_known("the initial conditions name", name, allowed, "the system has")
-        if len(self.known) + len(of_states) + len(self.equal) != len(names) or set(self.guess) != set(names):
+        if len(self.known) + len(of_states) + len(self.equal) != len(names) or set(
+            self.guess
+        ) != set(names):
             raise ParameterError(
-                f"the initial conditions must give as many conditions as there are states ({', '.join(names)}), and a "
-                f"guess of each state; known are {', '.join(self.known) or 'none'}, stationary are "
-                f"{', '.join(self.stationary) or 'none'}."
+                "the initial conditions must give as many conditions as there are states"
+                f" ({', '.join(names)}), and a guess of each state; known are"
+                f" {', '.join(self.known) or 'none'}, stationary are"
+                f" {', '.join(self.stationary) or 'none'}."
             )
 
 
 def _steady_conditions(
     plant: Plant, state: Mapping[str, float], pressures: Sequence[float], at_rest: bool
 ) -> InitialConditions:
-    """The gauge pressures [Pa] of the muscles, and one condition for each state but the air masses: settled or known if
-    no pressure changes it, equal pressure of a tube, else stationary, as the speeds of a mechanism at rest are."""
+    """The gauge pressures [Pa] of the muscles, and one condition for each state but the air masses:
+    settled or known if no pressure changes it, equal pressure of a tube, else stationary, as the
+    speeds of a mechanism at rest are.
+    """
     motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
     motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
-    increased = [[p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)] for k in range(len(pressures))]
+    increased = [
+        [p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)]
+        for k in range(len(pressures))
+    ]
     others = [plant.state_at(pressure=each, **motion) for each in increased]
     outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
     of_circuits = _circuit_states(plant)
-    known = {f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)}
-    stationary, equal, settled = list[str](), list[tuple[str, str]](), list[str]()
+    known = {
+        f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)
+    }
+    stationary = list[str]()
+    equal = list[tuple[str, str]]()
+    settled = list[str]()
     for name, value in state.items():
-        if (at_rest and name in motion) or name in [f"{prefix}air_mass" for prefix in plant.prefixes]:
+        if (at_rest and name in motion) or name in [
+            f"{prefix}air_mass" for prefix in plant.prefixes
+        ]:
             continue
         if all(other[name] == value for other in others):
             if name in of_circuits:
@@ -103,18 +142,30 @@ def _steady_conditions(
 
 
 def _circuit_states(plant: Plant) -> dict[str, Any]:
-    """Steady states of the circuits with ambient pressure in the muscles; those of supplies do not depend on it."""
+    """Steady states of the circuits with ambient pressure in the muscles; those of supplies do not
+    depend on it.
+    """
     count = len(plant.muscles)
-    air = {f"{prefix}{name}" for prefix in plant.prefixes for name in ("air_mass", "internal_energy")}
+    air = {
+        f"{prefix}{name}" for prefix in plant.prefixes for name in ("air_mass", "internal_energy")
+    }
     states = plant.fill_muscles([0.0] * count, [NOMINAL_VOLUME] * count, {})
     return {name: value for name, value in states.items() if name not in air}
 
 
 def compile_conditions(system: System, initial: InitialConditions) -> Function:
-    """The compiled function (state, leaves) -> (known values and rates, their derivatives by state and by leaf)."""
+    """The compiled function (state, leaves) -> (known values and rates, their derivatives by state
+    and by leaf).
+    """
     import casadi
 
-    key = (tree.structure(system), tuple(initial.known), initial.stationary, initial.equal, initial.settled)
+    key = (
+        tree.structure(system),
+        tuple(initial.known),
+        initial.stationary,
+        initial.equal,
+        initial.settled,
+    )
     if key not in _compiled_conditions:
         model, p = autodiff.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
@@ -136,23 +187,38 @@ def compile_conditions(system: System, initial: InitialConditions) -> Function:
 
 
 def solve_initial_state(
-    function: Function, initial: InitialConditions, leaves: Array, known: Array, guess: Array, nominal: Array
+    function: Function,
+    initial: InitialConditions,
+    leaves: Array,
+    known: Array,
+    guess: Array,
+    nominal: Array,
 ) -> tuple[Array, Array, Array]:
-    """The initial state (n,) by `compile_conditions` for states of `nominal` size, and its derivatives by the known
-    values (n, k) and the leaves (n, p) (implicit function theorem). Raises IdentificationError if there is none."""
-    n, x = guess.size, guess.copy()
+    """The initial state (n,) by `compile_conditions` for states of `nominal` size, and its
+    derivatives by the known values (n, k) and the leaves (n, p) (implicit function theorem). Raises
+    IdentificationError if there is none.
+    """
+    n = guess.size
+    x = guess.copy()
     target = np.concatenate([known, np.zeros(n - known.size)])
-    values, by_state, by_leaf = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size))
+    values = np.empty(n)
+    by_state = np.empty((n, n))
+    by_leaf = np.empty((n, leaves.size))
     workspace = np.zeros((n, n)), np.zeros(n)
-    status = Status(newton(function.address, leaves, target, nominal, x, values, by_state, by_leaf, *workspace))
+    status = Status(
+        newton(function.address, leaves, target, nominal, x, values, by_state, by_leaf, *workspace)
+    )
     if status != Status.DONE:
-        conditions = [f"{name} = {value:.4g}" for name, value in zip(initial.known, known.tolist(), strict=True)]
+        conditions = [
+            f"{name} = {value:.4g}"
+            for name, value in zip(initial.known, known.tolist(), strict=True)
+        ]
         conditions += [f"{name} stationary" for name in initial.stationary]
         conditions += [f"{a} = {b}" for a, b in initial.equal]
         conditions += [f"{name} settled" for name in initial.settled]
         raise IdentificationError(
-            f"no state satisfies the initial conditions ({', '.join(conditions)}; SI): {status.message}. Change "
-            "the conditions or the guess."
+            f"no state satisfies the initial conditions ({', '.join(conditions)}; SI):"
+            f" {status.message}. Change the conditions or the guess."
         )
     inverse = nominal[:, None] * np.linalg.inv(by_state * nominal)
     return x, inverse[:, : known.size], -inverse @ by_leaf
@@ -163,7 +229,9 @@ MIN_DURATION = 1e-9
 
 
 class CommandInterval(NamedTuple):
-    """Segments of a command from `begin` [s] on, rows within them (K,), and column of their first instant or None."""
+    """Segments of a command from `begin` [s] on, rows within them (K,), and column of their first
+    instant or None.
+    """
 
     begin: float
     segments: PiecewiseLinear
@@ -172,8 +240,9 @@ class CommandInterval(NamedTuple):
 
 
 class TimeGrid(NamedTuple):
-    """The rows of a record relative to the start of the run, shape (N,), with the inputs there (N, m); `instants` are
-    those of the command that are unknowns [s], by those of the command of the experiment."""
+    """The rows of a record relative to the start of the run, shape (N,), with the inputs there (N,
+    m); `instants` are those of the command that are unknowns [s], by those of the command of the
+    experiment."""
 
     start_time: float
     instants: Mapping[float, float]
@@ -184,20 +253,29 @@ class TimeGrid(NamedTuple):
 
 
 def make_time_grid(
-    times: Array, start_time: float, command: InputSignal, inputs: tuple[str, ...], instants: Mapping[float, float],
+    times: Array,
+    start_time: float,
+    command: InputSignal,
+    inputs: tuple[str, ...],
+    instants: Mapping[float, float],
     columns: Mapping[float, int],
-) -> TimeGrid:  # fmt: skip
-    """The grid of rows at `times` (N,) on the clock of the record; `instants` has the estimate of each instant of the
-    experiment's command that is an unknown, `columns` its sensitivity column."""
+) -> TimeGrid:
+    """The grid of rows at `times` (N,) on the clock of the record; `instants` has the estimate of
+    each instant of the experiment's command that is an unknown, `columns` its sensitivity
+    column."""
     elapsed = times - start_time
     rows = np.maximum(elapsed, 0.0)
     segments = command.checked_segments(inputs, 0.0, max(float(elapsed[-1]), MIN_DURATION))
     at_rows = np.ascontiguousarray(segments.inputs_at(rows, 0.0))
-    intervals = _split(segments, rows, {instants[instant]: column for instant, column in columns.items()})
+    intervals = _split(
+        segments, rows, {instants[instant]: column for instant, column in columns.items()}
+    )
     return TimeGrid(start_time, instants, rows, elapsed < 0, at_rows, intervals)
 
 
-def _split(segments: PiecewiseLinear, rows: Array, switches: Mapping[float, int]) -> tuple[CommandInterval, ...]:
+def _split(
+    segments: PiecewiseLinear, rows: Array, switches: Mapping[float, int]
+) -> tuple[CommandInterval, ...]:
     """The segments and rows between the instants that are unknowns."""
     inner = segments.ends[:-1].tolist()
     cuts = [i + 1 for i, end in enumerate(inner) if end in switches]
@@ -205,7 +283,8 @@ def _split(segments: PiecewiseLinear, rows: Array, switches: Mapping[float, int]
         return (CommandInterval(0.0, segments, rows, None),)
     begins = [inner[i - 1] for i in cuts]
     first_rows = [0, *np.searchsorted(rows, begins).tolist(), rows.size]
-    columns, intervals = [None, *(switches[begin] for begin in begins)], []
+    columns = [None, *(switches[begin] for begin in begins)]
+    intervals = []
     parts = itertools.pairwise([0, *cuts, segments.ends.size]), itertools.pairwise(first_rows)
     for begin, column, (a, b), (first, last) in zip([0.0, *begins], columns, *parts, strict=True):
         part = PiecewiseLinear(segments.ends[a:b], segments.values[a:b], segments.slopes[a:b])

@@ -10,7 +10,14 @@ from ....engine import InputSignal, Integrator, WithSensitivities
 from ....engine.compile.cache.kernel import evaluate
 from ....engine.compile.program import CompiledSystem, compile_system
 from ....engine.run.integrators import BoundIntegrator
-from .experiment import CommandInstant, Experiment, InitialValue, StartTime, Unknown, with_command_instants
+from .experiment import (
+    CommandInstant,
+    Experiment,
+    InitialValue,
+    StartTime,
+    Unknown,
+    with_command_instants,
+)
 from .initial_conditions import TimeGrid, compile_conditions, make_time_grid, solve_initial_state
 
 MAX_STEPS = 1_000_000
@@ -29,14 +36,23 @@ class RecordModel:
     """
 
     def __init__(
-        self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
-        observed: Mapping[str, float], method: Integrator,
-    ) -> None:  # fmt: skip
+        self,
+        plant: System,
+        experiment: Experiment,
+        number: int,
+        unknowns: Sequence[Unknown],
+        observed: Mapping[str, float],
+        method: Integrator,
+    ) -> None:
         self._arguments = plant, experiment, number, unknowns, dict(observed), method
-        self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
+        self.plant = experiment.plant or plant
+        self.experiment = experiment
+        self.method = method
         self.unknowns = unknowns
         self.unknown_indices = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
-        self.sensitivity_indices = [k for k in self.unknown_indices if not isinstance(unknowns[k].target, StartTime)]
+        self.sensitivity_indices = [
+            k for k in self.unknown_indices if not isinstance(unknowns[k].target, StartTime)
+        ]
         self.names = tuple(observed)
         self.times = _check_times(experiment)
         self.measured = np.column_stack([experiment.recording[name] for name in self.names])
@@ -50,20 +66,31 @@ class RecordModel:
             raise error.located(experiment.recording.origin) from None
         self._nominal = self._system.nominal
         leaf_index = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
-        changed = [(leaf_index[path], k) for k in self.unknown_indices for path in unknowns[k].paths]
-        self._changed = np.array([i for i, _ in changed], dtype=int), np.array([k for _, k in changed], dtype=int)
+        changed = [
+            (leaf_index[path], k) for k in self.unknown_indices for path in unknowns[k].paths
+        ]
+        self._changed = (
+            np.array([i for i, _ in changed], dtype=int),
+            np.array([k for _, k in changed], dtype=int),
+        )
         self._leaves = tree.flatten(self.plant)
         self._conditions = compile_conditions(self.plant, experiment.initial_conditions)
         known = experiment.initial_conditions.known
         self._known = np.array(list(known.values()), dtype=float)
         targets = [(j, unknowns[k].target) for j, k in enumerate(self.sensitivity_indices)]
-        self._initial_values = [(j, list(known).index(t.name)) for j, t in targets if isinstance(t, InitialValue)]
-        self._instant_columns = [(j, target) for j, target in targets if isinstance(target, CommandInstant)]
+        self._initial_values = [
+            (j, list(known).index(t.name)) for j, t in targets if isinstance(t, InitialValue)
+        ]
+        self._instant_columns = [
+            (j, target) for j, target in targets if isinstance(target, CommandInstant)
+        ]
         self._leaf_by_column = np.zeros((self._leaves.size, len(self.sensitivity_indices)))
         for j, k in enumerate(self.sensitivity_indices):
             self._leaf_by_column[[leaf_index[path] for path in unknowns[k].paths], j] = 1.0
         self._state_nominal = np.array([s.nominal for s in self.plant.states])
-        self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
+        self._guess = np.array(
+            [experiment.initial_conditions.guess[s.name] for s in self.plant.states]
+        )
         self._last_grid: TimeGrid | None = None
         self._idle: list[BoundIntegrator] = []
         """Bound integrators that no simulation uses at present."""
@@ -81,11 +108,17 @@ class RecordModel:
 
     def initial_state(self, values: Array) -> tuple[Array, Array]:
         """The initial state (n,) and its derivatives by every sensitivity column (n, K)."""
-        known, conditions = self._known.copy(), self.experiment.initial_conditions
+        known = self._known.copy()
+        conditions = self.experiment.initial_conditions
         for j, i in self._initial_values:
             known[i] = values[self.sensitivity_indices[j]]
         state, by_known, by_leaf = solve_initial_state(
-            self._conditions, conditions, self.leaves(values), known, self._guess, self._state_nominal
+            self._conditions,
+            conditions,
+            self.leaves(values),
+            known,
+            self._guess,
+            self._state_nominal,
         )
         derivatives = by_leaf @ self._leaf_by_column
         for j, i in self._initial_values:
@@ -94,7 +127,11 @@ class RecordModel:
 
     def start_time(self, values: Array) -> float:
         """The start of the run on the clock of the recording [s]."""
-        times = [values[k] for k in self.unknown_indices if isinstance(self.unknowns[k].target, StartTime)]
+        times = [
+            values[k]
+            for k in self.unknown_indices
+            if isinstance(self.unknowns[k].target, StartTime)
+        ]
         return float(times[0]) if times else self.experiment.start_time
 
     def command(self, values: Array) -> InputSignal:
@@ -103,10 +140,15 @@ class RecordModel:
 
     def _instants(self, values: Array) -> dict[float, float]:
         """The estimated instants [s] by those of the command of the experiment."""
-        return {target.instant: float(values[self.sensitivity_indices[j]]) for j, target in self._instant_columns}
+        return {
+            target.instant: float(values[self.sensitivity_indices[j]])
+            for j, target in self._instant_columns
+        }
 
     def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> "ModelOutputs":
-        """The modelled outputs at the rows for unknowns at `values` (P,) [SI]. Raises IdentificationError."""
+        """The modelled outputs at the rows for unknowns at `values` (P,) [SI]. Raises
+        IdentificationError.
+        """
         state, derivatives = self.initial_state(values)
         grid = self._time_grid(values)
         leaves = self._system.parameters.copy()
@@ -125,8 +167,11 @@ class RecordModel:
         rows, steps = self._integrate(bound, system, full_state, grid, max_steps)
         outputs = np.empty((grid.times.size, system.sizes.outputs))
         evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, outputs)
-        self._idle.append(bound)  # only now: another thread that takes it overwrites the precomputed values
-        count, columns = len(self.names), self._system.sizes.outputs // len(self.names) - 2
+        self._idle.append(
+            bound
+        )  # only now: another thread that takes it overwrites the precomputed values
+        count = len(self.names)
+        columns = self._system.sizes.outputs // len(self.names) - 2
         by_column = outputs[:, count:-count].reshape(-1, count, columns)
         if len(self.sensitivity_indices) == len(self.unknowns):
             return ModelOutputs(outputs[:, :count], by_column, steps)
@@ -138,40 +183,63 @@ class RecordModel:
         return ModelOutputs(outputs[:, :count], jacobian, steps)
 
     def _integrate(
-        self, bound: BoundIntegrator, system: CompiledSystem, state: Array, grid: TimeGrid, max_steps: int
+        self,
+        bound: BoundIntegrator,
+        system: CompiledSystem,
+        state: Array,
+        grid: TimeGrid,
+        max_steps: int,
     ) -> tuple[Array, int]:
-        """The states with their sensitivities at the rows, and the steps; the sensitivity to an instant of the command
-        begins there with the difference of the rates before and after it."""
-        rows, steps, held = list[Array](), 0, grid.intervals[0].segments.values[0]
+        """The states with their sensitivities at the rows, and the steps; the sensitivity to an
+        instant of the command begins there with the difference of the rates before and after it."""
+        rows = list[Array]()
+        steps = 0
+        held = grid.intervals[0].segments.values[0]
         for interval in grid.intervals:
             if interval.column is not None:
                 own = self._guess.size
-                before, after = (system.rates(state.tolist(), u)[:own] for u in (held, interval.segments.values[0]))
+                before, after = (
+                    system.rates(state.tolist(), u)[:own]
+                    for u in (held, interval.segments.values[0])
+                )
                 state[own:].reshape(own, -1)[:, interval.column] += before - after
-            solution = bound.run(interval.segments, interval.begin, state, interval.times, max_steps - steps)
+            solution = bound.run(
+                interval.segments, interval.begin, state, interval.times, max_steps - steps
+            )
             if solution.status == Status.INTERRUPTED:
                 raise KeyboardInterrupt
             if solution.status != Status.DONE:
                 raise IdentificationError(
-                    f"{self.experiment.recording.origin}: the simulation ended early, at {solution.time:.4g} s."
+                    f"{self.experiment.recording.origin}: the simulation ended early, at"
+                    f" {solution.time:.4g} s."
                 )
             rows.append(solution.rows)
-            state, held, steps = solution.state, interval.segments.values[-1], steps + solution.steps
+            state = solution.state
+            held = interval.segments.values[-1]
+            steps = steps + solution.steps
         return rows[0] if len(rows) == 1 else np.concatenate(rows), steps
 
     def _time_grid(self, values: Array) -> TimeGrid:
-        """The rows relative to the start of the run; the last result is kept, as the instants rarely change."""
-        grid, start_time, instants = self._last_grid, self.start_time(values), self._instants(values)
+        """The rows relative to the start of the run; the last result is kept, as the instants
+        rarely change.
+        """
+        grid = self._last_grid
+        start_time = self.start_time(values)
+        instants = self._instants(values)
         if grid is None or (grid.start_time, grid.instants) != (start_time, instants):
             command = with_command_instants(self.experiment.command, instants)
             columns = {target.instant: j for j, target in self._instant_columns}
-            grid = make_time_grid(self.times, start_time, command, self.plant.inputs, instants, columns)
+            grid = make_time_grid(
+                self.times, start_time, command, self.plant.inputs, instants, columns
+            )
             self._last_grid = grid
         return grid
 
 
 class ModelOutputs(NamedTuple):
-    """Modelled outputs (N, Q), their derivatives by all unknowns (N, Q, P), and the steps of the simulation."""
+    """Modelled outputs (N, Q), their derivatives by all unknowns (N, Q, P), and the steps of the
+    simulation.
+    """
 
     values: Array
     jacobian: Array
@@ -179,22 +247,30 @@ class ModelOutputs(NamedTuple):
 
 
 def _check_times(experiment: Experiment) -> Array:
-    """The times of a record [s]. Raises IdentificationError where they decrease or there are none."""
-    times, origin = experiment.recording["time"], experiment.recording.origin
+    """The times of a record [s]. Raises IdentificationError where they decrease or there are
+    none.
+    """
+    times = experiment.recording["time"]
+    origin = experiment.recording.origin
     bad = np.flatnonzero(~(np.diff(times) >= 0))
     if bad.size:
         raise IdentificationError(
-            f"{origin}: time must not decrease, but row {bad[0] + 2} is at {times[bad[0] + 1]:g} s. Correct the record "
-            "or use a part of it."
+            f"{origin}: time must not decrease, but row {bad[0] + 2} is at {times[bad[0] + 1]:g} s."
+            " Correct the record or use a part of it."
         )
     if not times.size:
-        raise IdentificationError(f"{origin}: the record has no rows. Give another one, or use a longer part of it.")
+        raise IdentificationError(
+            f"{origin}: the record has no rows. Give another one, or use a longer part of it."
+        )
     return times
 
 
 def separate_residuals(models: Sequence[RecordModel], residuals: Array) -> list[Array]:
-    """The stacked residuals (R,) of each quantity of each record in order of time, missing values omitted."""
-    series, begin = [], 0
+    """The stacked residuals (R,) of each quantity of each record in order of time, missing values
+    omitted.
+    """
+    series = []
+    begin = 0
     for model in models:
         rows = residuals[begin : begin + int(model.valid.sum())]
         quantity = np.nonzero(model.valid)[1]

@@ -16,16 +16,24 @@ from .result import DynamicFit
 
 VALVE = ("conductance", "critical_ratio", "subsonic_index")
 """Parameters of a valve, by the last part of their paths."""
-WALL = ("heat_transfer", "exponent", "enclosed_volume", "rest_volume", "growth_volume", "radius", "resting_length")
+WALL = (
+    "heat_transfer",
+    "exponent",
+    "enclosed_volume",
+    "rest_volume",
+    "growth_volume",
+    "radius",
+    "resting_length",
+)
 """Parameters of the wall of a muscle and of its volume, by the last part of their paths."""
 PRIOR = 10.0
-"""Standard deviation of the normal prior of each unknown, relative to its value, which keeps undetermined ones finite
-(chosen)."""
+"""Standard deviation of the normal prior of each unknown, relative to its value, which keeps
+undetermined ones finite (chosen)."""
 START_MARGIN = 0.05
 """Standard deviation of the prior of the start time of a candidate [s] (chosen)."""
 MIN_GAIN = 1.5
-"""Least factor by which a record reduces the greater standard error of a pair to count as one that separates it
-(chosen); a repeat reduces it by 1.41."""
+"""Least factor by which a record reduces the greater standard error of a pair to count as one that
+separates it (chosen); a repeat reduces it by 1.41."""
 
 
 class PairPrecision(NamedTuple):
@@ -42,7 +50,9 @@ class PairPrecision(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class RankedRecord:
-    """A candidate record, and the precision of the pair with it in addition to the records of the fit."""
+    """A candidate record, and the precision of the pair with it in addition to the records of the
+    fit.
+    """
 
     description: str
     precision: PairPrecision
@@ -52,7 +62,9 @@ class RankedRecord:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class RecordRanking(Reported):
-    """Candidate records in the order of their gain for a pair of parameters; the first separates it best."""
+    """Candidate records in the order of their gain for a pair of parameters; the first separates it
+    best.
+    """
 
     pair: tuple[str, str]
     now: PairPrecision
@@ -62,23 +74,30 @@ class RecordRanking(Reported):
 
     @property
     def verdict(self) -> str:
-        """What the records determine now, and which record would separate the pair, as sentences."""
+        """What the records determine now, and which record would separate the pair, as
+        sentences.
+        """
         best = self.ranking[0]
         before, after = (
-            [f"{each.correlation:.2f}", " and ".join(f"{100.0 * error:.2g} %" for error in each.standard_errors)]
+            [
+                f"{each.correlation:.2f}",
+                " and ".join(f"{100.0 * error:.2g} %" for error in each.standard_errors),
+            ]
             for each in (self.now, best.precision)
         )
         now = f"have a correlation of {before[0]} and relative standard errors of {before[1]}."
         then = f"None of the {len(self.ranking)} compared records would separate them."
         if best.gain >= MIN_GAIN:
             then = (
-                f"To separate them, measure {best.description}: with it, the correlation is expected to be {after[0]} "
-                f"and the relative standard errors {after[1]}."
+                f"To separate them, measure {best.description}: with it, the correlation is"
+                f" expected to be {after[0]} and the relative standard errors {after[1]}."
             )
         return f"{' and '.join(self.pair)} {now} {then}"
 
     def chapter(self) -> Chapter:
-        """The description of the ranking: verdict, and gain, correlation and standard errors with each record."""
+        """The description of the ranking: verdict, and gain, correlation and standard errors with
+        each record.
+        """
         precisions = [self.now, *(each.precision for each in self.ranking)]
         columns: dict[str, Any] = {
             "record in addition": ["none", *(each.description for each in self.ranking)],
@@ -87,8 +106,13 @@ class RecordRanking(Reported):
         }
         for i, name in enumerate(self.pair):
             errors = [each.standard_errors[i] for each in precisions]
-            columns[f"standard error of {name}"] = TableColumn(errors, "1", "%", digits=3, short=f"error of {i + 1}")
-        title = f"Expected precision of 1, {self.pair[0]}, and 2, {self.pair[1]}, with one further record"
+            columns[f"standard error of {name}"] = TableColumn(
+                errors, "1", "%", digits=3, short=f"error of {i + 1}"
+            )
+        title = (
+            f"Expected precision of 1, {self.pair[0]}, and 2, {self.pair[1]}, with one further"
+            " record"
+        )
         tables = (Table("ranking", title, columns, brief=len(precisions)),)
         notes = tuple(f"left out: {reason}" for reason in self.failed)
         return Chapter("ranking", "Next record", self.verdict, tables=tables, notes=notes)
@@ -97,21 +121,26 @@ class RecordRanking(Reported):
 def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> RecordRanking:
     """Rank candidate records by the expected precision of a pair of parameters of a fit.
 
-    The Fisher information of a candidate, from its sensitivities at the estimates, is added to that of the records of
-    the fit. Each candidate has the rows and the residual standard deviation of the fit, and an unknown start time. What
-    the fit keeps fixed counts as known, except a valve that only the candidate opens.
+    The Fisher information of a candidate, from its sensitivities at the estimates, is added to that
+    of the records of the fit. Each candidate has the rows and the residual standard deviation of
+    the fit, and an unknown start time. What the fit keeps fixed counts as known, except a valve
+    that only the candidate opens.
 
-    pair  names of two estimates; by default the most correlated pair of a valve parameter (conductance, critical ratio)
+    pair  names of two estimates; by default the most correlated pair of a valve parameter
+    (conductance, critical ratio)
           and a parameter of the wall or the gas (heat transfer, exponent, volume)
 
     Raises ParameterError for names that the fit lacks, IdentificationError without a pair.
     """
-    common = [i for i, u in enumerate(fit.unknowns) if u.record is None and not fit.estimates[i].on_bound]
+    common = [
+        i for i, u in enumerate(fit.unknowns) if u.record is None and not fit.estimates[i].on_bound
+    ]
     names = [fit.unknowns[i].name for i in common]
     information = _fit_information(fit, common)
     chosen = _check_pair(pair, names, fit) if pair else _most_correlated(information, names)
     now = _precision(information, names, chosen)
-    ranked, failed = list[RankedRecord](), list[str]()
+    ranked = list[RankedRecord]()
+    failed = list[str]()
     for candidate in candidate_records(fit):
         try:
             own = _candidate_information(fit, candidate, common)
@@ -122,15 +151,22 @@ def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> Record
         ranked.append(RankedRecord(candidate.description, after, now.worst / after.worst))
     if not ranked:
         raise IdentificationError(f"no candidate record can be simulated: {'; '.join(failed)}")
-    return RecordRanking(chosen, now, tuple(sorted(ranked, key=lambda each: -each.gain)), tuple(failed))
+    return RecordRanking(
+        chosen, now, tuple(sorted(ranked, key=lambda each: -each.gain)), tuple(failed)
+    )
 
 
 def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
-    """The Fisher information of the common unknowns from the records of the fit, with the prior; relative to their
-    estimates, or scales if these are zero, and for start times and initial values, whose zero is arbitrary, margins."""
+    """The Fisher information of the common unknowns from the records of the fit, with the prior;
+    relative to their estimates, or scales if these are zero, and for start times and initial
+    values, whose zero is arbitrary, margins.
+    """
     _, jacobian = fit.problem.residuals(fit.problem.scaled(fit.values))
     pairs = zip(fit.estimates, fit.unknowns, strict=True)
-    magnitudes = [(abs(estimate.value) if unknown.paths else 0.0) or unknown.scale for estimate, unknown in pairs]
+    magnitudes = [
+        (abs(estimate.value) if unknown.paths else 0.0) or unknown.scale
+        for estimate, unknown in pairs
+    ]
     factors = np.array(magnitudes) / fit.problem.scales
     matrix = jacobian * factors / max(fit.residual_std, 1e-12)
     others = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]
@@ -138,27 +174,41 @@ def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
 
 
 def _without(matrix: Array, nuisance: Array, prior: Array | float = PRIOR) -> Array:
-    """The information of the columns of a matrix, with nuisance unknowns of prior deviations estimated as well."""
-    own, cross = matrix.T @ matrix, matrix.T @ nuisance
+    """The information of the columns of a matrix, with nuisance unknowns of prior deviations
+    estimated as well.
+    """
+    own = matrix.T @ matrix
+    cross = matrix.T @ nuisance
     if not nuisance.shape[1]:
         return np.asarray(own)
     weight = nuisance.T @ nuisance + np.diag(1.0 / np.broadcast_to(prior, nuisance.shape[1]) ** 2)
     return np.asarray(own - cross @ np.linalg.solve(weight, cross.T))
 
 
-def _candidate_information(fit: DynamicFit, candidate: CandidateRecord, common: Sequence[int]) -> Array:
-    """The information of a candidate on the relative common unknowns; those that it lacks have none."""
-    plant, part = candidate.experiment.plant, candidate.replaced
+def _candidate_information(
+    fit: DynamicFit, candidate: CandidateRecord, common: Sequence[int]
+) -> Array:
+    """The information of a candidate on the relative common unknowns; those that it lacks have
+    none.
+    """
+    plant = candidate.experiment.plant
+    part = candidate.replaced
     assert plant is not None
     known = {leaf.path for leaf in tree.leaves(plant) if not (part and leaf.path.startswith(part))}
     own = [i for i, u in enumerate(fit.unknowns) if u.paths and u.record == 0]
-    kept = [i for i in (*common, *own) if fit.unknowns[i].paths and set(fit.unknowns[i].paths) <= known]
+    kept = [
+        i for i in (*common, *own) if fit.unknowns[i].paths and set(fit.unknowns[i].paths) <= known
+    ]
     unknowns = [dataclasses.replace(fit.unknowns[i], record=None) for i in kept]
     named = {path for unknown in unknowns for path in unknown.paths}
     further = [path for path in candidate.changed if path not in named]
     unknowns += make_unknowns(plant, [candidate.experiment], further, (), {}) if further else ()
     matrix = _candidate_sensitivities(fit, candidate, unknowns)
-    shared = [k for k, i in enumerate(kept) if i in common and not set(unknowns[k].paths) & set(candidate.changed)]
+    shared = [
+        k
+        for k, i in enumerate(kept)
+        if i in common and not set(unknowns[k].paths) & set(candidate.changed)
+    ]
     nuisance = [k for k in range(len(unknowns) + 1) if k not in shared]
     prior = np.where(np.array(nuisance) == len(unknowns), START_MARGIN, PRIOR)
     information = np.zeros((len(common), len(common)))
@@ -167,18 +217,28 @@ def _candidate_information(fit: DynamicFit, candidate: CandidateRecord, common: 
     return information
 
 
-def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknowns: Sequence[Unknown]) -> Array:
-    """The scaled outputs of a candidate by its relative unknowns, and by its start time [1/s] in the last column."""
-    plant, problem = candidate.experiment.plant, fit.problem
+def _candidate_sensitivities(
+    fit: DynamicFit, candidate: CandidateRecord, unknowns: Sequence[Unknown]
+) -> Array:
+    """The scaled outputs of a candidate by its relative unknowns, and by its start time [1/s] in
+    the last column.
+    """
+    plant = candidate.experiment.plant
+    problem = fit.problem
     assert plant is not None
-    start = Unknown("start time", StartTime(START_MARGIN), 0, 0.0, -START_MARGIN, START_MARGIN, "s", "t_0", "")
-    names, method = problem.record_models[0].names, problem.record_models[0].method
+    start = Unknown(
+        "start time", StartTime(START_MARGIN), 0, 0.0, -START_MARGIN, START_MARGIN, "s", "t_0", ""
+    )
+    names = problem.record_models[0].names
+    method = problem.record_models[0].method
     observed = dict(zip(names, problem.sensor_deviations.tolist(), strict=True))
     model = RecordModel(plant, candidate.experiment, 0, [*unknowns, start], observed, method)
     leaves = {leaf.path: float(leaf.value) for leaf in tree.leaves(plant)}
     values = [leaves[unknown.paths[0]] for unknown in unknowns]
     outputs = model.evaluate(np.array([*values, 0.0]))
-    scales = np.array([*(abs(value) or u.scale for value, u in zip(values, unknowns, strict=True)), 1.0])
+    scales = np.array(
+        [*(abs(value) or u.scale for value, u in zip(values, unknowns, strict=True)), 1.0]
+    )
     deviations = problem.sensor_deviations * max(fit.residual_std, 1e-12)
     matrix = (outputs.jacobian * scales / deviations[:, None]).reshape(-1, scales.size)
     if not np.isfinite(matrix).all():
@@ -189,22 +249,30 @@ def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknow
 def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) -> PairPrecision:
     covariance = np.linalg.inv(information)
     i, k = (names.index(name) for name in pair)
-    first, second = float(np.sqrt(covariance[i, i])), float(np.sqrt(covariance[k, k]))
+    first = float(np.sqrt(covariance[i, i]))
+    second = float(np.sqrt(covariance[k, k]))
     return PairPrecision((first, second), float(covariance[i, k] / (first * second)))
 
 
 def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str]:
-    """The most correlated pair of a valve and a wall parameter, else of any two. Raises IdentificationError."""
+    """The most correlated pair of a valve and a wall parameter, else of any two. Raises
+    IdentificationError.
+    """
     if len(names) < 2:
         raise IdentificationError(
-            f"the fit has {len(names)} common unknowns that are not on a bound; two are needed. Free another one."
+            f"the fit has {len(names)} common unknowns that are not on a bound; two are needed."
+            " Free another one."
         )
     covariance = np.linalg.inv(information)
     deviations = np.sqrt(np.diag(covariance))
     strength = np.abs(covariance / np.outer(deviations, deviations))
     fields = [name.rpartition(".")[2].partition("[")[0] for name in names]
-    valve, wall = ([i for i, field in enumerate(fields) if field in kinds] for kinds in (VALVE, WALL))
-    pairs = [(i, k) for i in valve for k in wall] or [(i, k) for i in range(len(names)) for k in range(i)]
+    valve, wall = (
+        [i for i, field in enumerate(fields) if field in kinds] for kinds in (VALVE, WALL)
+    )
+    pairs = [(i, k) for i in valve for k in wall] or [
+        (i, k) for i in range(len(names)) for k in range(i)
+    ]
     i, k = max(pairs, key=lambda pair: strength[pair])
     return names[i], names[k]
 

@@ -1,4 +1,6 @@
-"""Identification of a PressureRegulator from records of its command and of the pressure that it gives."""
+"""Identification of a PressureRegulator from records of its command and of the pressure that it
+gives.
+"""
 
 import contextlib
 import dataclasses
@@ -9,7 +11,16 @@ import numpy as np
 
 from ....core import Array, ColumnError, IdentificationError, ParameterError, tree
 from ....engine import Schedule
-from ....physics import Isometric, Isothermal, Muscle, Plant, PressureRegulator, Supply, Valve, Vessel
+from ....physics import (
+    Isometric,
+    Isothermal,
+    Muscle,
+    Plant,
+    PressureRegulator,
+    Supply,
+    Valve,
+    Vessel,
+)
 from ....recording import Recording
 from ....report import Chapter, Table, TableColumn
 from ...reported import Reported
@@ -20,10 +31,14 @@ from .result import DynamicFit
 
 SETTLED_AFTER = 0.8
 """Time [s] after a change of the command from which a held pressure counts as settled (chosen)."""
-FIRST_SPREAD, SPREAD, PATIENCE, GAINED = 0.5, 0.2, 8, 0.999
-"""A search starts from the initial regulator times exp(N(0, FIRST_SPREAD^2)); its fit is repeated from the estimates
-times exp(N(0, SPREAD^2)), until PATIENCE repetitions in turn have not reduced the sum of squares below GAINED times the
-lowest one (chosen): reversals of the valve leave many local minima."""
+FIRST_SPREAD = 0.5
+SPREAD = 0.2
+PATIENCE = 8
+GAINED = 0.999
+"""A search starts from the initial regulator times exp(N(0, FIRST_SPREAD^2)); its fit is repeated
+from the estimates times exp(N(0, SPREAD^2)), until PATIENCE repetitions in turn have not reduced
+the sum of squares below GAINED times the lowest one (chosen): reversals of the valve leave many
+local minima."""
 AT_NOISE = 1.1
 """Residuals relative to the noise at which no further search is needed (chosen)."""
 MIN_RANGE = 5.0
@@ -42,7 +57,12 @@ COMMANDS = {
     "leak": "sines of 20 kPa at 1 to 8 Hz, which hardly cross the overlap",
 }
 """The parameters of a regulator that are fitted, and the command that determines each."""
-LIMITS = {"sensitivity": (200.0, 2e4), "overlap": (0.02, 1.0), "pilot_time": (0.01, 0.3), "dead_time": (2e-3, 0.1)}
+LIMITS = {
+    "sensitivity": (200.0, 2e4),
+    "overlap": (0.02, 1.0),
+    "pilot_time": (0.01, 0.3),
+    "dead_time": (2e-3, 0.1),
+}
 """Range of the search [SI] where it is narrower than that of the model (chosen)."""
 
 
@@ -50,8 +70,9 @@ LIMITS = {"sensitivity": (200.0, 2e4), "overlap": (0.02, 1.0), "pilot_time": (0.
 class RegulatorFit(Reported):
     """A regulator identified from its records; `print` it.
 
-    `fit` is the dynamic fit of a vessel behind the regulator, `zeros` [Pa] settled pressure minus command, subtracted
-    from each record, `remarks` what the records excite too little, with the command that would excite it.
+    `fit` is the dynamic fit of a vessel behind the regulator, `zeros` [Pa] settled pressure minus
+    command, subtracted from each record, `remarks` what the records excite too little, with the
+    command that would excite it.
     """
 
     fit: DynamicFit
@@ -73,42 +94,56 @@ class RegulatorFit(Reported):
         return circuit
 
     def chapter(self) -> Chapter:
-        """The description of the fit: that of the dynamic fit, zeros, and what is too little excited."""
+        """The description of the fit: that of the dynamic fit, zeros, and what is too little
+        excited.
+        """
         chapter = self.fit.chapter()
         zeros = TableColumn(self.zeros, "Pa", "kPa", digits=3)
         title = "Settled pressure minus command, taken as the zero of the sensor"
         names = [each.experiment.recording.origin for each in self.fit.problem.record_models]
         table = Table("zeros", title, {"record": names, "zero": zeros}, brief=len(names))
         notes = (*(f"too little excited: {remark}" for remark in self.remarks), *chapter.notes)
-        return dataclasses.replace(chapter, title="Pressure regulator", tables=(*chapter.tables, table), notes=notes)
+        return dataclasses.replace(
+            chapter, title="Pressure regulator", tables=(*chapter.tables, table), notes=notes
+        )
 
 
 Fitted = Callable[[Plant, tuple[float, ...]], RegulatorFit]
 
 
 def fit_regulator(
-    recordings: Sequence[Recording], *, supply_pressure: float, volume: float = 1e-4, noise: float = 1e3,
-    initial: PressureRegulator | None = None, free: Sequence[str] = tuple(COMMANDS), starts: int = 8, seed: int = 0,
-) -> RegulatorFit:  # fmt: skip
-    """Identify a regulator from recordings with the columns `setpoint` and `pressure` [Pa], by `fit_dynamic`.
+    recordings: Sequence[Recording],
+    *,
+    supply_pressure: float,
+    volume: float = 1e-4,
+    noise: float = 1e3,
+    initial: PressureRegulator | None = None,
+    free: Sequence[str] = tuple(COMMANDS),
+    starts: int = 8,
+    seed: int = 0,
+) -> RegulatorFit:
+    """Identify a regulator from recordings with the columns `setpoint` and `pressure` [Pa], by
+    `fit_dynamic`.
 
     supply_pressure  gauge pressure of the supply [Pa]
-    volume           air volume behind the regulator [m3]; a record determines only conductance over volume, so that an
+    volume           air volume behind the regulator [m3]; a record determines only conductance over
+    volume, so that an
                      unknown volume may stay at its default (chosen)
     noise            standard deviation of the pressure sensor [Pa]
-    initial          regulator from which the search starts, by default from the slopes of the records
-    free             the fitted parameters, of `COMMANDS`
-    starts, seed     greatest number of searches, and the seed of their initial guesses
+    initial          regulator from which the search starts, by default from the slopes of the
+    records free             the fitted parameters, of `COMMANDS` starts, seed     greatest number
+    of searches, and the seed of their initial guesses
 
-    A command holds its value until the next row. What the records do not determine is named with the command that
-    would. Raises ColumnError for a missing column, IdentificationError for a command or a pressure that does not vary,
-    ParameterError for an unknown parameter.
+    A command holds its value until the next row. What the records do not determine is named with
+    the command that would. Raises ColumnError for a missing column, IdentificationError for a
+    command or a pressure that does not vary, ParameterError for an unknown parameter.
     """
     unknown = [name for name in free if name not in COMMANDS]
     if unknown or not recordings:
         raise ParameterError(
-            f"fit_regulator: {f'unknown parameter {unknown[0]!r}' if unknown else 'no recording is given'}; give "
-            f"recordings with setpoint and pressure, and parameters among {', '.join(COMMANDS)}."
+            "fit_regulator:"
+            f" {f'unknown parameter {unknown[0]!r}' if unknown else 'no recording is given'}; give"
+            f" recordings with setpoint and pressure, and parameters among {', '.join(COMMANDS)}."
         )
     for each in recordings:
         _check_excitation(each, noise)
@@ -117,39 +152,58 @@ def fit_regulator(
     plant = Plant(Muscle.ideal(Vessel(volume)), circuit, Isometric(0.0), Isothermal())
     paths = tuple(f"circuit.{name}" for name in free)
     fitted: Fitted = functools.partial(_fit, recordings, paths, noise)
-    rng, found = np.random.default_rng(seed), []
+    rng = np.random.default_rng(seed)
+    found = []
     for start in range(starts):
         deviations = rng.normal(0.0, FIRST_SPREAD * (start > 0), len(free))
         with contextlib.suppress(IdentificationError):  # a guess that cannot be simulated
-            found.append(_refined(fitted(_perturbed(plant, paths, deviations), zeros), paths, fitted, rng))
+            found.append(
+                _refined(fitted(_perturbed(plant, paths, deviations), zeros), paths, fitted, rng)
+            )
             if found[-1].fit.residual_std < AT_NOISE:
                 break
     if not found:
-        raise IdentificationError("fit_regulator: no initial guess can be simulated. Give an initial regulator.")
+        raise IdentificationError(
+            "fit_regulator: no initial guess can be simulated. Give an initial regulator."
+        )
     return min(found, key=lambda each: each.fit.costs[0])
 
 
 def _fit(
-    recordings: Sequence[Recording], paths: tuple[str, ...], noise: float, plant: Plant, zeros: tuple[float, ...]
+    recordings: Sequence[Recording],
+    paths: tuple[str, ...],
+    noise: float,
+    plant: Plant,
+    zeros: tuple[float, ...],
 ) -> RegulatorFit:
     records = [_experiment(plant, each, zero) for each, zero in zip(recordings, zeros, strict=True)]
-    limits = {path: LIMITS[name] for path in paths if (name := path.removeprefix("circuit.")) in LIMITS}
+    limits = {
+        path: LIMITS[name] for path in paths if (name := path.removeprefix("circuit.")) in LIMITS
+    }
     fit = fit_dynamic(plant, records, free=paths, observed={"pressure": noise}, bounds=limits)
     weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
     weak += [estimate.name for estimate in fit.estimates if estimate.on_bound]
     commands = {name: COMMANDS[name.removeprefix("circuit.")] for name in weak}
-    remarks = tuple(f"{name} is not determined; give {command}" for name, command in commands.items())
+    remarks = tuple(
+        f"{name} is not determined; give {command}" for name, command in commands.items()
+    )
     return RegulatorFit(fit, zeros, remarks)
 
 
-def _refined(best: RegulatorFit, paths: tuple[str, ...], fitted: Fitted, rng: np.random.Generator) -> RegulatorFit:
-    """The best of repetitions, the first of which only corrects the zeros of the sensors by the mean residuals, because
-    a regulator may rest anywhere within its sensitivity."""
-    failed, deviations = 0, np.zeros(len(paths))
+def _refined(
+    best: RegulatorFit, paths: tuple[str, ...], fitted: Fitted, rng: np.random.Generator
+) -> RegulatorFit:
+    """The best of repetitions, the first of which only corrects the zeros of the sensors by the
+    mean residuals, because a regulator may rest anywhere within its sensitivity."""
+    failed = 0
+    deviations = np.zeros(len(paths))
     while failed < PATIENCE:
-        attempt, failed = best, failed + 1
+        attempt = best
+        failed = failed + 1
         with contextlib.suppress(IdentificationError):
-            means = [float(np.nanmean(best.fit.residuals(i)["pressure"])) for i in range(len(best.zeros))]
+            means = [
+                float(np.nanmean(best.fit.residuals(i)["pressure"])) for i in range(len(best.zeros))
+            ]
             zeros = tuple(zero - mean for zero, mean in zip(best.zeros, means, strict=True))
             attempt = fitted(_perturbed(best.plant, paths, deviations), zeros)
         if attempt.fit.costs[0] < best.fit.costs[0]:
@@ -160,12 +214,17 @@ def _refined(best: RegulatorFit, paths: tuple[str, ...], fitted: Fitted, rng: np
 
 
 def _perturbed(plant: Plant, paths: Sequence[str], deviations: Array) -> Plant:
-    """A plant with the parameters of these paths multiplied by exp(deviation), within their bounds."""
-    factors, values = dict(zip(paths, np.exp(deviations).tolist(), strict=True)), []
+    """A plant with the parameters of these paths multiplied by exp(deviation), within their
+    bounds.
+    """
+    factors = dict(zip(paths, np.exp(deviations).tolist(), strict=True))
+    values = []
     for leaf in tree.leaves(plant):
         low, high = LIMITS.get(leaf.path.removeprefix("circuit."), leaf.declared.bounds)
         factor = factors.get(leaf.path, 1.0)
-        values.append(float(leaf.value if factor == 1.0 else np.clip(leaf.value * factor, low, high)))
+        values.append(
+            float(leaf.value if factor == 1.0 else np.clip(leaf.value * factor, low, high))
+        )
     return tree.with_parameters(plant, values)
 
 
@@ -173,28 +232,35 @@ def _check_excitation(recording: Recording, noise: float) -> None:
     for name in ("setpoint", "pressure"):
         if name not in recording.columns:
             raise ColumnError(
-                f"{recording.origin}: no column '{name}'; a regulator is identified from time, setpoint and pressure. "
-                f"It has {', '.join(recording.columns)}. Rename one with a mapping file."
+                f"{recording.origin}: no column '{name}'; a regulator is identified from time,"
+                f" setpoint and pressure. It has {', '.join(recording.columns)}. Rename one with a"
+                " mapping file."
             )
         known = recording[name][np.isfinite(recording[name])]
         change = float(np.ptp(known)) if known.size else 0.0
         if change < MIN_RANGE * noise:
             raise IdentificationError(
-                f"{recording.origin}: {name} varies by {change / 1e3:.3g} kPa only, less than {MIN_RANGE:g} standard "
-                f"deviations of the noise ({noise / 1e3:g} kPa). Record steps up and down over the range of use, some "
-                "of them reversed after 50 to 200 ms."
+                f"{recording.origin}: {name} varies by {change / 1e3:.3g} kPa only, less than"
+                f" {MIN_RANGE:g} standard deviations of the noise ({noise / 1e3:g} kPa). Record"
+                " steps up and down over the range of use, some of them reversed after 50 to"
+                " 200 ms."
             )
 
 
 def _changes(recording: Recording) -> tuple[Array, Array]:
-    """Times [s] from the first row and values [Pa] at which the command changes, the first row included."""
-    time, setpoint = recording["time"] - recording["time"][0], recording["setpoint"]
+    """Times [s] from the first row and values [Pa] at which the command changes, the first row
+    included.
+    """
+    time = recording["time"] - recording["time"][0]
+    setpoint = recording["setpoint"]
     rows = np.flatnonzero(np.concatenate([[True], np.diff(setpoint) != 0.0]))
     return time[rows], setpoint[rows]
 
 
 def _settled_difference(recording: Recording) -> float:
-    """Median of pressure minus command [Pa] over the rows where the command has been held for long; 0 without any."""
+    """Median of pressure minus command [Pa] over the rows where the command has been held for long;
+    0 without any.
+    """
     time = recording["time"] - recording["time"][0]
     at, _ = _changes(recording)
     since = time - at[np.searchsorted(at, time, side="right") - 1]
@@ -203,21 +269,31 @@ def _settled_difference(recording: Recording) -> float:
     return float(np.median(difference[rows])) if rows.any() else 0.0
 
 
-def _initial_regulator(recordings: Sequence[Recording], supply_pressure: float, volume: float) -> PressureRegulator:
-    """A regulator whose orifices give about the greatest slopes of the records; the rest is chosen."""
+def _initial_regulator(
+    recordings: Sequence[Recording], supply_pressure: float, volume: float
+) -> PressureRegulator:
+    """A regulator whose orifices give about the greatest slopes of the records; the rest is
+    chosen.
+    """
     slopes = np.concatenate([np.gradient(r["pressure"], r["time"]) for r in recordings])
-    rise, fall = float(np.nanpercentile(slopes, 99.5)), -float(np.nanpercentile(slopes, 0.5))
+    rise = float(np.nanpercentile(slopes, 99.5))
+    fall = -float(np.nanpercentile(slopes, 0.5))
     top = max(float(np.nanmax(r["pressure"])) for r in recordings) + 1e5
     fill = Valve(max(2.0 * volume * rise / (1e5 * (supply_pressure + 1e5)), 1e-12), 0.2)
     discharge = Valve(max(2.0 * volume * fall / (1e5 * top), 1e-12), 0.2)
-    supply, band = Supply(supply_pressure), 2.0 * rise / GAIN
+    supply = Supply(supply_pressure)
+    band = 2.0 * rise / GAIN
     return PressureRegulator(supply, fill, discharge, band, 0.04, 0.2, leak=1e-3, integral_rate=0.1)
 
 
 def _experiment(plant: Plant, recording: Recording, zero: float) -> Experiment:
     times, values = _changes(recording)
-    command = Schedule({"setpoint": tuple(zip(times.tolist(), np.maximum(values, 0.0).tolist(), strict=True))})
-    shifted = Recording({**recording.columns, "pressure": recording["pressure"] - zero}, recording.origin)
+    command = Schedule(
+        {"setpoint": tuple(zip(times.tolist(), np.maximum(values, 0.0).tolist(), strict=True))}
+    )
+    shifted = Recording(
+        {**recording.columns, "pressure": recording["pressure"] - zero}, recording.origin
+    )
     level = max(float(recording["setpoint"][0]), 0.0)
     guess = plant.state_at(pressure=level)
     resting = tuple(name for name in guess if name.endswith("_position"))

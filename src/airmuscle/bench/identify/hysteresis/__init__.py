@@ -1,4 +1,6 @@
-"""Identification of friction and creep from hysteresis loops, with tests whether the data justify them."""
+"""Identification of friction and creep from hysteresis loops, with tests whether the data justify
+them.
+"""
 
 from ....core.stubs import attach_stub
 

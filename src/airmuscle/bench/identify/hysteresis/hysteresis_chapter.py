@@ -1,4 +1,6 @@
-"""Report chapters of several loops: an overview, the friction laws of all runs together, and each loop."""
+"""Report chapters of several loops: an overview, the friction laws of all runs together, and each
+loop.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -10,11 +12,17 @@ from . import JointFit, LoopFit, loops_not_joined, preferred_fit
 from .loop_result import compared_laws, friction_tables
 
 SEPARATE_LOOPS = 2
-"""Maximum number of loops of which the brief view has the laws of each; of more it has one row each (chosen)."""
+"""Maximum number of loops of which the brief view has the laws of each; of more it has one row each
+(chosen).
+"""
 
 
-def hysteresis_chapters(loop_fits: Sequence[LoopFit], joint: Sequence[JointFit] = ()) -> list[Chapter]:
-    """Return the overview of several loops, the chapter of the joint fits, if any, and one chapter for each loop."""
+def hysteresis_chapters(
+    loop_fits: Sequence[LoopFit], joint: Sequence[JointFit] = ()
+) -> list[Chapter]:
+    """Return the overview of several loops, the chapter of the joint fits, if any, and one chapter
+    for each loop.
+    """
     chapters = [_overview(loop_fits)] if len(loop_fits) > 1 else []
     chapters += [joint_friction_chapter(joint, loops_not_joined(loop_fits))] if joint else []
     for i, each in enumerate(loop_fits, 1):
@@ -24,25 +32,36 @@ def hysteresis_chapters(loop_fits: Sequence[LoopFit], joint: Sequence[JointFit] 
 
 
 def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
-    """Return the chapter with one row for each loop: its preferred law, or that of the lowest AICc."""
+    """Return the chapter with one row for each loop: its preferred law, or that of the lowest
+    AICc.
+    """
     best = [each.recommended or next(iter(each.fits), None) for each in loop_fits]
     columns: dict[str, Any] = {
         "run": [each.loop.recording.origin for each in loop_fits],
         "kind": [each.loop.description for each in loop_fits],
         "rows": [int(each.loop.fitted_rows.sum()) for each in loop_fits],
         "law": [each and each.name for each in best],
-        "rms error without friction": TableColumn([each and each.rmse_without_friction for each in best], "N", digits=3,
-                                             short="without friction"),
+        "rms error without friction": TableColumn(
+            [each and each.rmse_without_friction for each in best],
+            "N",
+            digits=3,
+            short="without friction",
+        ),
         "rms error": TableColumn([each and each.rmse for each in best], "N", digits=3),
         "justified": [each.recommended is not None for each in loop_fits],
         "usable in a plant": TableColumn([each.usable_in_plant for each in loop_fits], brief=False),
-    }  # fmt: skip
+    }
     failed: dict[tuple[str, str], list[str]] = {}
     for each in loop_fits if len(loop_fits) > SEPARATE_LOOPS else ():
         for law in each.failed.items():
             failed.setdefault(law, []).append(each.loop.recording.origin)
-    runs = {law: origins[0] if len(origins) == 1 else f"{len(origins)} runs" for law, origins in failed.items()}
-    notes = tuple(f"{name} was not fitted to {which}: {reason}" for (name, reason), which in runs.items())
+    runs = {
+        law: origins[0] if len(origins) == 1 else f"{len(origins)} runs"
+        for law, origins in failed.items()
+    }
+    notes = tuple(
+        f"{name} was not fitted to {which}: {reason}" for (name, reason), which in runs.items()
+    )
     justified = sum(each.recommended is not None for each in loop_fits)
     summary = f"{len(loop_fits)} loops; the data justify a friction law for {justified} of them."
     tables = (Table("loops", "Best law of each loop", columns, brief=12),)
@@ -50,8 +69,9 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
 
 
 def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] = ()) -> Chapter:
-    """Return the chapter of the joint fits of all laws, lowest AICc first, with the friction of each run by the best
-    justified one; `not_joined` are sentences on the loops that the joint fit does not use."""
+    """Return the chapter of the joint fits of all laws, lowest AICc first, with the friction of
+    each run by the best justified one; `not_joined` are sentences on the loops that the joint fit
+    does not use."""
     shown = preferred_fit(fits) or fits[0]
     none = "The runs justify no friction law that holds for all of them, so none is written."
     none = "" if shown.justified else f"{none} {shown.name} is shown as the best one. "
@@ -59,7 +79,9 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
         "depends on pressure": [fit.law is not fit.friction for fit in fits],
         "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
     }
-    laws, own, runs = "Friction laws fitted to all runs together, best first", shown.chapter(), shown.agreement
+    laws = "Friction laws fitted to all runs together, best first"
+    own = shown.chapter()
+    runs = shown.agreement
     by_run: dict[str, Any] = {
         "run": [run.origin for run in runs],
         "level": [run.description for run in runs],
@@ -71,8 +93,14 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
         "agrees": TableColumn([not run.disagrees for run in runs], brief=False),
     }
     title = f"Friction of each run, {shown.name}: half the range of the force"
-    of_runs = Table("joint-runs", title, by_run, brief=[i for i, run in enumerate(runs) if run.disagrees])
+    of_runs = Table(
+        "joint-runs", title, by_run, brief=[i for i, run in enumerate(runs) if run.disagrees]
+    )
     tables = (compared_laws("joint-laws", laws, fits, columns), of_runs, *friction_tables(own))
     return dataclasses.replace(
-        own, title="Friction of all runs", summary=(f"{none}{shown.verdict}",), tables=tables, notes=tuple(not_joined)
+        own,
+        title="Friction of all runs",
+        summary=(f"{none}{shown.verdict}",),
+        tables=tables,
+        notes=tuple(not_joined),
     )

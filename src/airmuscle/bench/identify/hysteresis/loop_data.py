@@ -1,5 +1,5 @@
-"""Data of a loop: path of the friction and static curve, and limits of friction parameters that follow from the data,
-the maximum force, the lowest and the highest speed, and the stiffness."""
+"""Data of a loop: path of the friction and static curve, and limits of friction parameters that
+follow from the data, the maximum force, the lowest and the highest speed, and the stiffness."""
 
 import abc
 import dataclasses
@@ -18,8 +18,8 @@ from ..identifiability import UndeterminedCombination
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit. `si_unit` is the SI
-    unit of the driving quantity, of which `si_factor` correspond to a metre."""
+    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit.
+    `si_unit` is the SI unit of the driving quantity, of which `si_factor` correspond to a metre."""
 
     label: str
     factor: float
@@ -27,7 +27,9 @@ class Axis:
     si_factor: float = 1.0
 
     def display(self, value: float, unit: str) -> tuple[float, str]:
-        """The value and unit of a parameter of the friction with the driving quantity in place of the displacement."""
+        """The value and unit of a parameter of the friction with the driving quantity in place of
+        the displacement.
+        """
         if self.si_unit == "m":
             return value, "" if unit == "1" else unit
         conversions = {
@@ -72,14 +74,21 @@ class ContractionPath(FrictionPath):
 
 @model
 class PressurePath(FrictionPath):
-    """x = c p: friction of braid threads that shift with pressure, visible in a muscle at constant length.
+    """x = c p: friction of braid threads that shift with pressure, visible in a muscle at constant
+    length.
 
-    Only k_i c, a force by pressure, is determined; c is chosen as 1 mm for each 100 kPa, so that the friction laws keep
-    their units. Such a friction describes isometric loops only and cannot be part of a plant.
+    Only k_i c, a force by pressure, is determined; c is chosen as 1 mm for each 100 kPa, so that
+    the friction laws keep their units. Such a friction describes isometric loops only and cannot be
+    part of a plant.
     """
 
     displacement_per_pressure: float = parameter(
-        "m/Pa", "c", "displacement of the threads by pressure", bounds=(1e-12, 1e-3), fitted=False, default=1e-8
+        "m/Pa",
+        "c",
+        "displacement of the threads by pressure",
+        bounds=(1e-12, 1e-3),
+        fitted=False,
+        default=1e-8,
     )
 
     def displacement(self, recording: Recording) -> Array:
@@ -88,11 +97,15 @@ class PressurePath(FrictionPath):
     @property
     def axis(self) -> Axis:
         by_displacement = 1.0 / self.displacement_per_pressure
-        return Axis("gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", by_displacement)
+        return Axis(
+            "gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", by_displacement
+        )
 
 
 class StaticCurve(abc.ABC):
-    """The force without friction: a known part, and columns whose coefficients are fitted with the friction."""
+    """The force without friction: a known part, and columns whose coefficients are fitted with the
+    friction.
+    """
 
     def known_force(self, recording: Recording) -> Array:
         """The known part of the force [N] at every row, shape (N,); 0 unless overridden."""
@@ -110,7 +123,9 @@ class FixedCharacteristic(StaticCurve):
     characteristic: Characteristic
 
     def known_force(self, recording: Recording) -> Array:
-        return np.asarray(self.characteristic.force(recording["pressure"], recording["contraction"]), dtype=float)
+        return np.asarray(
+            self.characteristic.force(recording["pressure"], recording["contraction"]), dtype=float
+        )
 
     def design_matrix(self, recording: Recording) -> Array:
         return np.ones((len(recording), 1))
@@ -118,34 +133,48 @@ class FixedCharacteristic(StaticCurve):
 
 @dataclasses.dataclass(frozen=True)
 class PolynomialCurve(StaticCurve):
-    """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric runs."""
+    """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric
+    runs.
+    """
 
     column: str
     degree: int
 
     def design_matrix(self, recording: Recording) -> Array:
-        scale = 1e5 if self.column == "pressure" else 0.1  # so that the coefficients have similar magnitudes
+        scale = (
+            1e5 if self.column == "pressure" else 0.1
+        )  # so that the coefficients have similar magnitudes
         return np.vander(recording[self.column] / scale, self.degree + 1)
 
 
-SPEED_INTERVALS, SPEED_QUANTILES = 40, (0.05, 0.95)
-"""Intervals of the path over each of which a speed is measured, so that noise of the path has no effect, and quantiles
-of their speeds that count as the lowest and the highest speed of the data (chosen)."""
+SPEED_INTERVALS = 40
+SPEED_QUANTILES = (0.05, 0.95)
+"""Intervals of the path over each of which a speed is measured, so that noise of the path has no
+effect, and quantiles of their speeds that count as the lowest and the highest speed of the data
+(chosen)."""
 MIN_SPEED_RATIO = 3.0
-"""Minimum ratio of the highest to the lowest speed for the terms of speed to be determined (chosen)."""
+"""Minimum ratio of the highest to the lowest speed for the terms of speed to be determined
+(chosen).
+"""
 STEP_SHARE = 0.1
-"""Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a transition within
-this part of a step is complete at the next row."""
+"""Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a
+transition within this part of a step is complete at the next row."""
 MAX_REPEATED = 0.1
-"""Share of the rows that repeat a reading during the motion, above which a step is that of a reading (chosen)."""
+"""Share of the rows that repeat a reading during the motion, above which a step is that of a
+reading (chosen).
+"""
 AMPLITUDE_QUANTILE = 0.95
-"""Quantile of the forces without the static curve that counts as the amplitude of the hysteresis (chosen)."""
+"""Quantile of the forces without the static curve that counts as the amplitude of the hysteresis
+(chosen).
+"""
 
 
 @dataclasses.dataclass(frozen=True)
 class DataLimits:
-    """Maximum force [N], lowest and highest speed [m/s], and maximum stiffness [N/m] that the data show. The speeds are
-    NaN without a time. A stiffer transition of the friction lies between two readings of the path."""
+    """Maximum force [N], lowest and highest speed [m/s], and maximum stiffness [N/m] that the data
+    show. The speeds are NaN without a time. A stiffer transition of the friction lies between two
+    readings of the path.
+    """
 
     force: float
     low_speed: float
@@ -158,39 +187,49 @@ class DataLimits:
         return self.high_speed >= MIN_SPEED_RATIO * self.low_speed
 
     def bounds(self, leaf: Leaf) -> tuple[float, float]:
-        """Bounds of a parameter: the declared ones, narrowed to the force, also a viscous one at the highest speed, the
-        range of speed and the stiffness that the data show."""
+        """Bounds of a parameter: the declared ones, narrowed to the force, also a viscous one at
+        the highest speed, the range of speed and the stiffness that the data show."""
         narrowed = {"N": (-math.inf, self.force), "N/m": (-math.inf, self.stiffness)}
         if self.high_speed > 0:
             narrowed["N s/m"] = (-math.inf, self.force / self.high_speed)
         if 0 < self.low_speed < self.high_speed:
             narrowed["m/s"] = (self.low_speed, self.high_speed)
-        (low, high), ends = leaf.declared.bounds, narrowed.get(leaf.declared.unit, (-math.inf, math.inf))
+        low, high = leaf.declared.bounds
+        ends = narrowed.get(leaf.declared.unit, (-math.inf, math.inf))
         within = max(low, ends[0]), min(high, ends[1])
         return within if within[0] < within[1] else (low, high)
 
 
 def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> DataLimits:
-    """The limits of a run: forces [N] and the path [m] over the time [s], at the fitted rows; arrays (N,). The speeds
-    are those at which the path passed intervals of equal length in one direction and ended in a fitted row."""
-    greatest, low, high = float(np.max(np.abs(force[rows]), initial=0.0)), math.nan, math.nan
+    """The limits of a run: forces [N] and the path [m] over the time [s], at the fitted rows;
+    arrays (N,). The speeds are those at which the path passed intervals of equal length in one
+    direction and ended in a fitted row.
+    """
+    greatest = float(np.max(np.abs(force[rows]), initial=0.0))
+    low = math.nan
+    high = math.nan
     width = float(np.ptp(path)) / SPEED_INTERVALS if len(path) else 0.0
     if time is not None and width > 0:
         steps = np.sign(np.diff(np.floor((path - path.min()) / width)))
         crossings = np.flatnonzero(steps) + 1
         one_way = np.flatnonzero(steps[crossings[1:] - 1] == steps[crossings[:-1] - 1])
-        first, last = crossings[one_way], crossings[one_way + 1]
+        first = crossings[one_way]
+        last = crossings[one_way + 1]
         kept = rows[last] & (time[last] > time[first])
-        first, last = first[kept], last[kept]
+        first = first[kept]
+        last = last[kept]
         if first.size:
-            low, high = np.quantile(np.abs(path[last] - path[first]) / (time[last] - time[first]), SPEED_QUANTILES)
+            low, high = np.quantile(
+                np.abs(path[last] - path[first]) / (time[last] - time[first]), SPEED_QUANTILES
+            )
     return DataLimits(greatest, float(low), float(high))
 
 
 def resolved_stiffness(path: Array, hysteresis: Array) -> float:
-    """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis (N,) [N], the force without its
-    static curve, by the resolution of the path (N,) [m], both at the fitted rows. The resolution is the noise, a tenth
-    of the median step, or the step of a reading that is repeated in motion."""
+    """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis (N,) [N], the
+    force without its static curve, by the resolution of the path (N,) [m], both at the fitted rows.
+    The resolution is the noise, a tenth of the median step, or the step of a reading that is
+    repeated in motion."""
     steps = np.abs(np.diff(path))
     moving = steps > 0
     if not moving.any():
@@ -204,23 +243,31 @@ def resolved_stiffness(path: Array, hysteresis: Array) -> float:
 
 def combine_limits(limits: tuple[DataLimits, ...]) -> DataLimits:
     """The limits of several runs together."""
-    low, high = np.min([each.low_speed for each in limits]), np.max([each.high_speed for each in limits])
-    force, stiffness = max(each.force for each in limits), max(each.stiffness for each in limits)
+    low = np.min([each.low_speed for each in limits])
+    high = np.max([each.high_speed for each in limits])
+    force = max(each.force for each in limits)
+    stiffness = max(each.stiffness for each in limits)
     return DataLimits(force, float(low), float(high), stiffness)
 
 
 def parameters_on_bounds(friction: Friction, limits: DataLimits) -> tuple[str, ...]:
-    """Paths of the fitted parameters that are on a bound, declared or set by the data; 0 is no such bound."""
+    """Paths of the fitted parameters that are on a bound, declared or set by the data; 0 is no such
+    bound.
+    """
     bounds = [(leaf, *limits.bounds(leaf)) for leaf in leaves(friction) if leaf.declared.fitted]
     return tuple(
-        leaf.path for leaf, low, high in bounds if (low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high
+        leaf.path
+        for leaf, low, high in bounds
+        if (low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high
     )
 
 
 def undetermined_parameters(
     friction: Friction, limits: DataLimits, weak: Sequence[UndeterminedCombination]
 ) -> tuple[str, ...]:
-    """Paths of the parameters that the data do not determine: on a bound, or in a poorly determined combination."""
+    """Paths of the parameters that the data do not determine: on a bound, or in a poorly determined
+    combination.
+    """
     names = [name for each in weak for name, _ in each.shares]
     return tuple(dict.fromkeys([*parameters_on_bounds(friction, limits), *names]))
 
@@ -228,7 +275,9 @@ def undetermined_parameters(
 def limit_reservations(
     friction: Friction, limits: DataLimits, weak: Sequence[UndeterminedCombination], axis: Axis
 ) -> list[str]:
-    """Reasons, as sentences, against a friction: a force on its limit, or terms of speed that are not determined."""
+    """Reasons, as sentences, against a friction: a force on its limit, or terms of speed that are
+    not determined.
+    """
     declared = {leaf.path: leaf.declared for leaf in leaves(friction)}
     reasons = [
         f"{name} is on its limit, the maximum force in the data ({limits.force:.4g} N)."
@@ -236,19 +285,29 @@ def limit_reservations(
         if declared[name].unit == "N" and limits.force < declared[name].bounds[1]
     ]
     of_speed = "" if friction.rate_independent else speed_reservation(limits, axis)
-    if not friction.rate_independent and not of_speed and undetermined_parameters(friction, limits, weak):
-        of_speed = "A law with terms of speed is justified only if all of its parameters are determined."
+    if (
+        not friction.rate_independent
+        and not of_speed
+        and undetermined_parameters(friction, limits, weak)
+    ):
+        of_speed = (
+            "A law with terms of speed is justified only if all of its parameters are determined."
+        )
     return [*reasons, of_speed] if of_speed else reasons
 
 
 def speed_reservation(limits: DataLimits, axis: Axis) -> str:
-    """The reason, as a sentence, why the data cannot determine terms of speed; empty if they can."""
+    """The reason, as a sentence, why the data cannot determine terms of speed; empty if they
+    can.
+    """
     if limits.has_speed_variation:
         return ""
     if math.isnan(limits.high_speed):
         return "The data have no time, so the terms of speed are not determined."
-    (low, unit), (high, _) = (axis.display(speed, "m/s") for speed in (limits.low_speed, limits.high_speed))
+    (low, unit), (high, _) = (
+        axis.display(speed, "m/s") for speed in (limits.low_speed, limits.high_speed)
+    )
     return (
-        f"The speed in the data is {low:.3g} to {high:.3g} {unit}, so the terms of speed are not determined; measure "
-        "loops at clearly different speeds."
+        f"The speed in the data is {low:.3g} to {high:.3g} {unit}, so the terms of speed are not"
+        " determined; measure loops at clearly different speeds."
     )

@@ -1,4 +1,6 @@
-"""Friction laws of one loop with their chapter; the loop, its kind and level, tables of laws, and their minor loops."""
+"""Friction laws of one loop with their chapter; the loop, its kind and level, tables of laws, and
+their minor loops.
+"""
 
 import dataclasses
 import functools
@@ -8,7 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, DASHES, LINES, RED, Array, Reference, ShortRepr, leaves, legend_below, new_figure
+from ....core import (
+    BLACK,
+    BLUE,
+    DASHES,
+    LINES,
+    RED,
+    Array,
+    Reference,
+    ShortRepr,
+    leaves,
+    legend_below,
+    new_figure,
+)
 from ....physics.muscle.friction import Friction
 from ....recording import Recording
 from ....recording.columns import display_scale
@@ -24,7 +38,9 @@ from .search import LoopSeries, make_loop_series
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class HysteresisLoop(ShortRepr):
-    """One run with a rising and a falling branch, the path of the friction, the static curve and the fitted rows."""
+    """One run with a rising and a falling branch, the path of the friction, the static curve and
+    the fitted rows.
+    """
 
     recording: Recording
     run: Run
@@ -48,25 +64,52 @@ class HysteresisLoop(ShortRepr):
     @property
     def varied(self) -> str:
         """Name of the varied quantity: contraction or pressure."""
-        return "contraction" if {"contraction", "length"} & set(self.run.swept_columns) else "pressure"
+        return (
+            "contraction" if {"contraction", "length"} & set(self.run.swept_columns) else "pressure"
+        )
 
     @property
     def direction(self) -> Array:
-        """Direction of the motion at the rows, 1 on the rising branch, -1 on the falling one, shape (N,)."""
-        return motion_direction(self.friction_path.displacement(self.recording), self.recording.columns.get("time"))
+        """Direction of the motion at the rows, 1 on the rising branch, -1 on the falling one, shape
+        (N,).
+        """
+        return motion_direction(
+            self.friction_path.displacement(self.recording), self.recording.columns.get("time")
+        )
 
     def plot(self) -> Any:
-        """A figure of the force over the varied quantity, by branch; rows that are not used are light."""
-        recording, name, direction = self.recording, self.varied, self.direction
+        """A figure of the force over the varied quantity, by branch; rows that are not used are
+        light.
+        """
+        recording = self.recording
+        name = self.varied
+        direction = self.direction
         factor, unit = display_scale(name)
         figure, axes = new_figure(width=6.0, height=3.9)
-        axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
+        axes.plot(
+            recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3
+        )
         for sign, colour, branch in ((1, BLUE, "rising"), (-1, RED, "falling")):
-            for used, alpha, label in ((~self.fitted_rows, 0.05, None), (self.fitted_rows, 0.8, branch)):
+            for used, alpha, label in (
+                (~self.fitted_rows, 0.05, None),
+                (self.fitted_rows, 0.8, branch),
+            ):
                 rows = (direction == sign) & used
-                style = {"marker": "o", "linestyle": "none", "markersize": 3, "alpha": alpha, "color": colour}
-                axes.plot(recording[name][rows] * factor, recording["force"][rows], label=label, **style)
-        axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {self.description}")
+                style = {
+                    "marker": "o",
+                    "linestyle": "none",
+                    "markersize": 3,
+                    "alpha": alpha,
+                    "color": colour,
+                }
+                axes.plot(
+                    recording[name][rows] * factor, recording["force"][rows], label=label, **style
+                )
+        axes.set(
+            xlabel=f"{name} [{unit}]",
+            ylabel="force [N]",
+            title=f"{recording.origin}: {self.description}",
+        )
         legend_below(figure, axes)
         return figure
 
@@ -80,7 +123,9 @@ def describe_run(run: Run) -> str:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class LoopFit(Reported):
-    """The friction laws fitted to one loop, lowest AICc first, and the reasons why others could not be fitted."""
+    """The friction laws fitted to one loop, lowest AICc first, and the reasons why others could not
+    be fitted.
+    """
 
     loop: HysteresisLoop
     fits: tuple[HysteresisFit, ...]
@@ -93,18 +138,25 @@ class LoopFit(Reported):
 
     @property
     def usable_in_plant(self) -> bool:
-        """Whether the friction acts along the contraction; friction along pressure describes isometric loops only."""
+        """Whether the friction acts along the contraction; friction along pressure describes
+        isometric loops only.
+        """
         return isinstance(self.loop.friction_path, ContractionPath)
 
     def chapter(self) -> Chapter:
         """The description of the friction laws of the loop."""
-        loop, best = self.loop, self.recommended
+        loop = self.loop
+        best = self.recommended
         shown = best or next(iter(self.fits), None)
         plots = [Plot("loop", "Measured loop; light: rows that are not used.", loop.plot)]
-        tables, references = [_law_table(self)], tuple[Reference, ...]()
+        tables = [_law_table(self)]
+        references = tuple[Reference, ...]()
         if shown is not None:
             own = shown.chapter()
-            caption = f"{shown.name} with the fitted parameters: initial loading, outer loop and two minor loops."
+            caption = (
+                f"{shown.name} with the fitted parameters: initial loading, outer loop and two"
+                " minor loops."
+            )
             minor = functools.partial(plot_loops, shown.friction, loop.friction_path.axis)
             plots += [*own.plots, Plot("minor-loops", caption, minor)]
             tables += friction_tables(own)
@@ -119,16 +171,26 @@ class LoopFit(Reported):
         tables.append(Table("law-parameters", "Parameters of all laws", columns, shown=False))
         stated = {"recommended": best and best.name, "usable in a plant": self.usable_in_plant}
         return Chapter(
-            "friction", f"{loop.recording.origin}: {loop.description}", tuple(_summary(self, shown)),
-            values=tuple(NamedValue(name, value, brief=False) for name, value in stated.items()), tables=tuple(tables),
-            plots=tuple(plots), notes=tuple(_notes(self)), references=references,
-        )  # fmt: skip
+            "friction",
+            f"{loop.recording.origin}: {loop.description}",
+            tuple(_summary(self, shown)),
+            values=tuple(NamedValue(name, value, brief=False) for name, value in stated.items()),
+            tables=tuple(tables),
+            plots=tuple(plots),
+            notes=tuple(_notes(self)),
+            references=references,
+        )
 
 
 def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
     loop = loop_fit.loop
-    up, down = (int(np.count_nonzero((loop.direction == sign) & loop.fitted_rows)) for sign in (1, -1))
-    rows = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
+    up, down = (
+        int(np.count_nonzero((loop.direction == sign) & loop.fitted_rows)) for sign in (1, -1)
+    )
+    rows = (
+        f"{up} rows of the rising branch and {down} of the falling branch are used, of"
+        f" {len(loop.recording)}."
+    )
     if shown is None:
         return [rows]
     none = f"The data justify none of the laws; {shown.name} is shown as the best one. "
@@ -137,23 +199,40 @@ def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
 
 def _notes(loop_fit: LoopFit) -> list[str]:
     isometric = (
-        "The loop is isometric: the pressure moved the fibres at constant length, and only a friction force over "
-        "pressure is determined. Such a friction describes isometric loops and cannot be used in a plant. For a "
-        "friction that can, measure a loop of contraction at constant pressure."
+        "The loop is isometric: the pressure moved the fibres at constant length, and only a"
+        " friction force over pressure is determined. Such a friction describes isometric loops and"
+        " cannot be used in a plant. For a friction that can, measure a loop of contraction at"
+        " constant pressure."
     )
     notes = [] if loop_fit.usable_in_plant else [isometric]
     if loop_fit.loop.repeat is not None:
-        notes.append(f"Validated on {loop_fit.loop.repeat[0].origin}, a second run at the same level.")
-    return [*notes, *(f"{name} was not fitted: {reason}" for name, reason in loop_fit.failed.items())]
+        notes.append(
+            f"Validated on {loop_fit.loop.repeat[0].origin}, a second run at the same level."
+        )
+    return [
+        *notes,
+        *(f"{name} was not fitted: {reason}" for name, reason in loop_fit.failed.items()),
+    ]
 
 
 def _law_table(loop_fit: LoopFit) -> Table:
-    fits, repeat = loop_fit.fits, "rms error on second run"
-    columns: dict[str, Any] = {} if loop_fit.loop.repeat is None else {
-        repeat: TableColumn([f.repeat_rmse for f in fits], "N", digits=3, short="on second run"),
-        f"{repeat} without friction": TableColumn([f.repeat_rmse_without_friction for f in fits], "N", "", 3, False),
-        "repeatability": TableColumn([f.repeatability for f in fits], "N", digits=3, brief=False),
-    }  # fmt: skip
+    fits = loop_fit.fits
+    repeat = "rms error on second run"
+    columns: dict[str, Any] = (
+        {}
+        if loop_fit.loop.repeat is None
+        else {
+            repeat: TableColumn(
+                [f.repeat_rmse for f in fits], "N", digits=3, short="on second run"
+            ),
+            f"{repeat} without friction": TableColumn(
+                [f.repeat_rmse_without_friction for f in fits], "N", "", 3, False
+            ),
+            "repeatability": TableColumn(
+                [f.repeatability for f in fits], "N", digits=3, brief=False
+            ),
+        }
+    )
     columns |= {
         "branch gap without friction": TableColumn([f.gap for f in fits], "N", brief=False),
         "remaining branch gap": TableColumn([f.residual_gap for f in fits], "N", digits=3),
@@ -166,10 +245,14 @@ def compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict[
     """Return the errors and the tests of friction laws, with columns of their own."""
     columns: dict[str, Any] = {
         "law": [f.name for f in fits],
-        "rms error without friction": TableColumn([f.rmse_without_friction for f in fits], "N", digits=3, brief=False),
+        "rms error without friction": TableColumn(
+            [f.rmse_without_friction for f in fits], "N", digits=3, brief=False
+        ),
         "rms error": TableColumn([f.rmse for f in fits], "N", digits=3),
         **own,
-        "reduction of AICc": [f.aicc_reduction if np.isfinite(f.aicc_reduction) else None for f in fits],
+        "reduction of AICc": [
+            f.aicc_reduction if np.isfinite(f.aicc_reduction) else None for f in fits
+        ],
         P_VALUE: TableColumn([f.p_value for f in fits], brief=False),
         "justified": [f.justified for f in fits],
     }
@@ -178,12 +261,16 @@ def compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict[
 
 def friction_tables(chapter: Chapter) -> list[Table]:
     """Return the tables of the chapter of a friction, as parts of another one."""
-    return [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in chapter.tables]
+    return [
+        dataclasses.replace(table, name=f"friction-{table.name}", brief=0)
+        for table in chapter.tables
+    ]
 
 
-TURNING_POINTS, ROWS_PER_LEG = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0), 200
-"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law, and rows between two
-of them (chosen)."""
+TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
+ROWS_PER_LEG = 200
+"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law,
+and rows between two of them (chosen)."""
 INNER_LOOPS = ((3, 5), (6, 8))
 """Legs of the path that form the inner loops, first and last plus one."""
 
@@ -196,18 +283,26 @@ def loop_path(distance: float) -> Array:
 
 
 def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
-    """Friction force over displacement: from rest, around the outer loop, through two inner loops. Returns a Matplotlib
-    figure."""
+    """Friction force over displacement: from rest, around the outer loop, through two inner loops.
+    Returns a Matplotlib figure."""
     path = loop_path(friction.presliding_distance or 1e-3)
     force = friction.force_along(path)
-    outer, parts = force.copy(), [(force, 0, 1, "from rest", 1)]
+    outer = force.copy()
+    parts = [(force, 0, 1, "from rest", 1)]
     for (a, b), name in zip(INNER_LOOPS, ("inner loops", ""), strict=True):
         outer[a * ROWS_PER_LEG + 1 : b * ROWS_PER_LEG] = np.nan
         parts.append((force, a, b, name, 2))
     figure, axes = new_figure(width=5.6, height=3.9)
     for values, a, b, name, style in [(outer, 1, len(TURNING_POINTS), "outer loop", 0), *parts]:
-        rows, label = slice(a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1), name or None
-        axes.plot(path[rows] * axis.factor, values[rows], color=LINES[style], linestyle=DASHES[style], label=label)
+        rows = slice(a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1)
+        label = name or None
+        axes.plot(
+            path[rows] * axis.factor,
+            values[rows],
+            color=LINES[style],
+            linestyle=DASHES[style],
+            label=label,
+        )
     axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
     legend_below(figure, axes, 3)
     return figure

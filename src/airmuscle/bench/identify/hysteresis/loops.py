@@ -1,4 +1,6 @@
-"""Hysteresis loops found in recordings, their rows and repeated runs, and the fit of all friction laws to one."""
+"""Hysteresis loops found in recordings, their rows and repeated runs, and the fit of all friction
+laws to one.
+"""
 
 import dataclasses
 import warnings
@@ -22,31 +24,44 @@ CURVE_DEGREE = 5
 
 
 def find_loops(
-    recordings: Sequence[Recording], *, law: Characteristic | None = None, degree: int = CURVE_DEGREE,
+    recordings: Sequence[Recording],
+    *,
+    law: Characteristic | None = None,
+    degree: int = CURVE_DEGREE,
     all_rows: bool = False,
-) -> tuple[HysteresisLoop, ...]:  # fmt: skip
-    """The loops in the runs of recordings, one for each kind and level; a second run at a level validates the first.
+) -> tuple[HysteresisLoop, ...]:
+    """The loops in the runs of recordings, one for each kind and level; a second run at a level
+    validates the first.
 
-    Each run with a rising and a falling branch gives a loop; if a recording has several runs, the loop is named after
-    the file and the rows of the run, and runs of one direction are left out. A muscle of another resting length or
-    another specimen gives no repeat. A recording without a usable run is left out with an AirmuscleWarning if another
-    one has a loop.
+    Each run with a rising and a falling branch gives a loop; if a recording has several runs, the
+    loop is named after the file and the rows of the run, and runs of one direction are left out. A
+    muscle of another resting length or another specimen gives no repeat. A recording without a
+    usable run is left out with an AirmuscleWarning if another one has a loop.
 
-    The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `law`
-    with an offset. The fitted rows have a positive force below the limit of the sensor and, unless `all_rows`, are
-    quasi-static. Raises IdentificationError if no run gives a loop: each has one branch, or is neither isobaric nor
-    isometric while no characteristic is given.
+    The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or
+    `law` with an offset. The fitted rows have a positive force below the limit of the sensor and,
+    unless `all_rows`, are quasi-static. Raises IdentificationError if no run gives a loop: each has
+    one branch, or is neither isobaric nor isometric while no characteristic is given.
     """
-    sensors, loops, muscles = segment.estimate_sensors(recordings), list[HysteresisLoop](), list[Sequence[object]]()
+    sensors = segment.estimate_sensors(recordings)
+    loops = list[HysteresisLoop]()
+    muscles = list[Sequence[object]]()
     empty = [recording.origin for recording in recordings if not len(recording)]
-    failed = [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
-    for recording, run in (each for given in recordings if len(given) for each in _separate_runs(given, sensors)):
+    failed = [
+        IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.")
+        for origin in empty
+    ]
+    for recording, run in (
+        each for given in recordings if len(given) for each in _separate_runs(given, sensors)
+    ):
         try:
             loop = _make_loop(recording, run, sensors, law, degree, all_rows)
         except IdentificationError as error:
             failed.append(error)
             continue
-        muscle: Sequence[object] = [recording.constants.get(name) for name in ("resting_length", "specimen")]
+        muscle: Sequence[object] = [
+            recording.constants.get(name) for name in ("resting_length", "specimen")
+        ]
         at_level = [i for i, other in enumerate(loops) if _is_same_level(other.run, run)]
         same = next((i for i in at_level if muscles[i] == muscle), None)
         if same is None:
@@ -61,14 +76,23 @@ def find_loops(
     return tuple(loops)
 
 
-def _separate_runs(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> list[tuple[Recording, segment.Run]]:
-    """The runs of a recording with two directions and their rows, else the longest run; all rows of a single level."""
+def _separate_runs(
+    recording: Recording, sensors: Mapping[str, segment.Sensor]
+) -> list[tuple[Recording, segment.Run]]:
+    """The runs of a recording with two directions and their rows, else the longest run; all rows of
+    a single level.
+    """
     runs = segment.find_runs(recording, sensors)
     longest = max(runs, key=lambda run: len(run.interval))
-    if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (segment.ISOBARIC, segment.ISOMETRIC):
+    if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (
+        segment.ISOBARIC,
+        segment.ISOMETRIC,
+    ):
         return [(recording, longest)]
     parts = [(rows_of(recording, run.interval), run) for run in runs]
-    both = [(part, run) for part, run in parts if {1.0, -1.0} <= set(_directions(part, _path_of(run)))]
+    both = [
+        (part, run) for part, run in parts if {1.0, -1.0} <= set(_directions(part, _path_of(run)))
+    ]
     return both or [(rows_of(recording, longest.interval), longest)]
 
 
@@ -83,25 +107,34 @@ def _path_of(run: segment.Run) -> data.FrictionPath:
 
 
 def _directions(recording: Recording, friction_path: data.FrictionPath) -> Array:
-    return segment.motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
+    return segment.motion_direction(
+        friction_path.displacement(recording), recording.columns.get("time")
+    )
 
 
 def _make_loop(
-    recording: Recording, run: segment.Run, sensors: Mapping[str, segment.Sensor], law: Characteristic | None,
-    degree: int, all_rows: bool,
-) -> HysteresisLoop:  # fmt: skip
+    recording: Recording,
+    run: segment.Run,
+    sensors: Mapping[str, segment.Sensor],
+    law: Characteristic | None,
+    degree: int,
+    all_rows: bool,
+) -> HysteresisLoop:
     friction_path = _path_of(run)
     if law is not None:
         static_curve: data.StaticCurve = data.FixedCharacteristic(law)
     elif run.kind in (segment.ISOBARIC, segment.ISOMETRIC):
-        static_curve = data.PolynomialCurve("contraction" if run.kind == segment.ISOBARIC else "pressure", degree)
+        static_curve = data.PolynomialCurve(
+            "contraction" if run.kind == segment.ISOBARIC else "pressure", degree
+        )
     else:
         raise IdentificationError(
-            f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
-            "static curve cannot be a polynomial in one of them.",
+            f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change"
+            " together and the static curve cannot be a polynomial in one of them.",
             hint=Hint("To take the muscle's characteristic as the static curve", "law"),
         )
-    force, transient = recording["force"], 0
+    force = recording["force"]
+    transient = 0
     rows = (force > 0) & np.isfinite(force)
     if "force" in sensors:
         rows &= sensors["force"].censoring(force) == 0
@@ -110,13 +143,20 @@ def _make_loop(
     for sign, branch in ((1, "rising"), (-1, "falling")):
         if not np.any((direction == sign) & rows):
             count = np.count_nonzero(direction == sign)
-            excluded = f" ({count} are excluded: not quasi-static, without force, or saturated)" if count else ""
+            excluded = (
+                f" ({count} are excluded: not quasi-static, without force, or saturated)"
+                if count
+                else ""
+            )
             raise IdentificationError(
-                f"{recording.origin}: the {branch} branch has no rows to fit{excluded}, but a loop needs a rising and "
-                "a falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
+                f"{recording.origin}: the {branch} branch has no rows to fit{excluded}, but a loop"
+                " needs a rising and a falling branch. Give such a run, or run it more slowly"
+                " where its rows are not quasi-static.",
                 hint=Hint("To fit all rows, if only the length changes quickly", "all_rows", True),
             )
-    if run.kind != segment.ISOBARIC:  # rows in which the pressure changes quickly, whatever the length does
+    if (
+        run.kind != segment.ISOBARIC
+    ):  # rows in which the pressure changes quickly, whatever the length does
         columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
         steady = segment.quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
         transient = int(np.count_nonzero(rows & ~steady))
@@ -124,7 +164,9 @@ def _make_loop(
 
 
 def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
-    """Whether two runs have the same constant quantity and level, within the tolerance of one run."""
+    """Whether two runs have the same constant quantity and level, within the tolerance of one
+    run.
+    """
     same_kind = one.kind is other.kind and one.constant_column == other.constant_column
     if not same_kind or one.constant_value is None or other.constant_value is None:
         return False
@@ -137,66 +179,97 @@ def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
 def initial_friction_laws(
     path: Array, force: Array, elements: int = 8, others: Sequence[type[Friction]] = ()
 ) -> tuple[Friction, ...]:
-    """Every law of `friction` with a `guess`, its initial parameters scaled by a path [m] and the forces [N] along it.
-    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii, `others` are classes of a user. Raises
-    IdentificationError for a constant path, and for one of the `others` without a `guess`."""
+    """Every law of `friction` with a `guess`, its initial parameters scaled by a path [m] and the
+    forces [N] along it. `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii,
+    `others` are classes of a user. Raises IdentificationError for a constant path, and for one of
+    the `others` without a `guess`."""
     check_whole("initial_friction_laws", "elements", elements, 1)
     scales = LoopScales.of(path, force, elements)
-    known = [cls for name in dir(laws) if isinstance(cls := getattr(laws, name), type) and issubclass(cls, Friction)]
+    known = [
+        cls
+        for name in dir(laws)
+        if isinstance(cls := getattr(laws, name), type) and issubclass(cls, Friction)
+    ]
     started = {cls: cls.guess(scales) for cls in (*known, *others)}
     for cls in (each for each in others if started[each] is None):
-        raise IdentificationError(f"{cls.__name__} is not started from data; define its guess(scales).")
+        raise IdentificationError(
+            f"{cls.__name__} is not started from data; define its guess(scales)."
+        )
     return tuple(law for law in started.values() if law is not None)
 
 
 def fit_hysteresis(
-    friction: Friction, recording: Recording, *, static_curve: data.StaticCurve,
-    friction_path: data.FrictionPath = data.ContractionPath(), fitted_rows: segment.Mask | None = None,
+    friction: Friction,
+    recording: Recording,
+    *,
+    static_curve: data.StaticCurve,
+    friction_path: data.FrictionPath = data.ContractionPath(),
+    fitted_rows: segment.Mask | None = None,
     repeat: tuple[Recording, segment.Mask | None] | None = None,
-) -> HysteresisFit:  # fmt: skip
-    """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
+) -> HysteresisFit:
+    """Fit a friction law to the difference between a loop and its static curve, and test whether
+    the data justify it.
 
     friction       the law with its initial parameters, see `initial_friction_laws`
-    static_curve   the force without friction; its coefficients are fitted with the friction, and once more without it
+    static_curve   the force without friction; its coefficients are fitted with the friction, and
+    once more without it
                    for a fair comparison
     friction_path  the displacement along which the friction slides
-    fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive force. The path
+    fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive
+    force. The path
                    includes all rows from the first, where the bristles are relaxed
-    repeat         a second run of the same loop with its mask, for the repeatability and the error on other data
+    repeat         a second run of the same loop with its mask, for the repeatability and the error
+    on other data
 
     Raises IdentificationError where there are too few rows or the path is constant.
     """
     run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
-    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    second_run = (
+        make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    )
     return fit_series(friction, run, second_run)
 
 
 def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | None) -> HysteresisFit:
     """The fit of `fit_hysteresis` to the series of a run, and of a second run of the same loop."""
-    free, rows = free_parameters(friction), int(run.fitted_rows.sum())
+    free = free_parameters(friction)
+    rows = int(run.fitted_rows.sum())
     length = float(np.ptp(run.path)) if run.path.size else 0.0
     if rows <= free + run.design_matrix.shape[1] + 2 or not length > 0:
         raise IdentificationError(
-            f"{run.origin}: {rows} fitted rows along a path of {length:.3g} m cannot determine {free} parameters of "
-            f"{type(friction).__name__} and {run.design_matrix.shape[1]} of the static curve. Give a run with a rising "
-            "and a falling branch, or include more rows."
+            f"{run.origin}: {rows} fitted rows along a path of {length:.3g} m cannot determine"
+            f" {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of"
+            " the static curve. Give a run with a rising and a falling branch, or include more"
+            " rows."
         )
     fitted, undetermined = search_parameters(friction, (run,))
     return assess_fit(fitted, undetermined, run, second_run)
 
 
 def fit_loop(
-    loop: HysteresisLoop, *, elements: int = 8, others: Sequence[type[Friction]] = (),
+    loop: HysteresisLoop,
+    *,
+    elements: int = 8,
+    others: Sequence[type[Friction]] = (),
     progress: Callable[[str], None] | None = None,
-) -> LoopFit:  # fmt: skip
-    """Fit every friction law to a loop and sort the fits by AICc; laws with terms of speed need a speed that varies.
-    `elements` and `others` are those of `initial_friction_laws`; `progress` is called with the name of each law."""
-    run = dataclasses.replace(loop.series(loop.recording, loop.fitted_rows), transient_rows=loop.transient_rows)
+) -> LoopFit:
+    """Fit every friction law to a loop and sort the fits by AICc; laws with terms of speed need a
+    speed that varies. `elements` and `others` are those of `initial_friction_laws`; `progress` is
+    called with the name of each law.
+    """
+    run = dataclasses.replace(
+        loop.series(loop.recording, loop.fitted_rows), transient_rows=loop.transient_rows
+    )
     second_run = None if loop.repeat is None else loop.series(*loop.repeat)
-    fits, failed = list[HysteresisFit](), dict[str, HintedText]()
-    for initial in initial_friction_laws(run.path[loop.fitted_rows], run.fitted_residuals(None), elements, others):
+    fits = list[HysteresisFit]()
+    failed = dict[str, HintedText]()
+    for initial in initial_friction_laws(
+        run.path[loop.fitted_rows], run.fitted_residuals(None), elements, others
+    ):
         name = type(initial).__name__
-        too_uniform = "" if initial.rate_independent else data.speed_reservation(run.limits, run.axis)
+        too_uniform = (
+            "" if initial.rate_independent else data.speed_reservation(run.limits, run.axis)
+        )
         if too_uniform:
             failed[name] = HintedText(too_uniform)
             continue

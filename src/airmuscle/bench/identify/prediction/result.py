@@ -1,4 +1,6 @@
-"""Predicted quantities of a record beside the measured ones, with errors and 95 % bands, and their report chapters."""
+"""Predicted quantities of a record beside the measured ones, with errors and 95 % bands, and their
+report chapters.
+"""
 
 import dataclasses
 from collections.abc import Sequence
@@ -16,18 +18,20 @@ from ...reported import Reported, unit_column
 from ...segment import CONTRACTION_BAND, Mask
 from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
 
-MIN_SHARE, MIN_ROWS = 0.8, 5
-"""Share of the rows within a 95 % band below which the band does not hold for a record, and minimum number of compared
-rows for that statement (chosen)."""
+MIN_SHARE = 0.8
+MIN_ROWS = 5
+"""Share of the rows within a 95 % band below which the band does not hold for a record, and minimum
+number of compared rows for that statement (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class QuantityPrediction(ShortRepr):
     """One quantity of a record, measured and predicted [SI], shape (N,) each.
 
-    `half_width` (N,) is that of the 95 % band, None where the model states none. `compared` (N,) marks the rows that
-    are compared: a finite measured value, and for a static law tension, or no tension where the law pulls by more than
-    the half width. `band` says where the band comes from, or why there is none.
+    `half_width` (N,) is that of the 95 % band, None where the model states none. `compared` (N,)
+    marks the rows that are compared: a finite measured value, and for a static law tension, or no
+    tension where the law pulls by more than the half width. `band` says where the band comes from,
+    or why there is none.
     """
 
     name: str
@@ -58,7 +62,9 @@ class QuantityPrediction(ShortRepr):
         return float(self.errors[self.worst_row])
 
     def share_of(self, rows: Mask) -> float | None:
-        """Share of some rows, a mask (N,), within the 95 % band; None without a band or such a row."""
+        """Share of some rows, a mask (N,), within the 95 % band; None without a band or such a
+        row.
+        """
         if self.half_width is None or not rows.any():
             return None
         return float(np.mean(np.abs(self.errors[rows]) <= self.half_width[rows]))
@@ -71,7 +77,9 @@ class QuantityPrediction(ShortRepr):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class RecordPrediction(Reported):
-    """The prediction of one record: its recording, the predicted quantities, and notes on what limits them."""
+    """The prediction of one record: its recording, the predicted quantities, and notes on what
+    limits them.
+    """
 
     recording: Recording
     quantities: tuple[QuantityPrediction, ...]
@@ -79,7 +87,9 @@ class RecordPrediction(Reported):
     outside: Mask | None = None
     """Mask (N,) of the rows outside the range of the fit; None where the range is not known."""
     inputs: Array | None = None
-    """What drives the quantities at the rows (N, K) [SI]: commands of a plant, arguments of a law."""
+    """What drives the quantities at the rows (N, K) [SI]: commands of a plant, arguments of a
+    law.
+    """
 
     @property
     def origin(self) -> str:
@@ -87,49 +97,66 @@ class RecordPrediction(Reported):
         return self.recording.origin
 
     def chapter(self) -> Chapter:
-        """The description of the prediction: errors and shares within the bands, and the values at the rows."""
+        """The description of the prediction: errors and shares within the bands, and the values at
+        the rows.
+        """
         of_rows = _record(self)
         return dataclasses.replace(of_rows, tables=(_error_table([self]), *of_rows.tables))
 
 
-def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> RecordPrediction:
-    """The prediction with a note for each quantity whose band does not hold: by how much, and the likely reason, which
-    is what lies outside the fit, `differences`, or one of the usual causes."""
+def with_band_notes(
+    prediction: RecordPrediction, differences: Sequence[str], usual: str
+) -> RecordPrediction:
+    """The prediction with a note for each quantity whose band does not hold: by how much, and the
+    likely reason, which is what lies outside the fit, `differences`, or one of the usual causes."""
     notes = []
     for each in prediction.quantities:
         if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
             continue
-        mean, known = float(np.mean(each.errors[each.compared])), [*differences]
+        mean = float(np.mean(each.errors[each.compared]))
+        known = [*differences]
         if prediction.outside is not None and (each.compared & prediction.outside).any():
             inside = each.share_of(each.compared & ~prediction.outside)
-            text = "" if inside is None else f" (inside it {100 * inside:.3g} % are within the band)"
+            text = (
+                "" if inside is None else f" (inside it {100 * inside:.3g} % are within the band)"
+            )
             known.insert(0, f"rows outside the range of the fit{text}")
         reason = f"likely because of {', '.join(known)}"
         reason = reason if known else f"nothing recorded explains it; usual are {usual}"
         notes.append(
-            f"the 95 % band of the {each.name} does not hold for this record: {100 * each.share:.3g} % of the rows are "
-            f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
-            f"{'high' if mean > 0 else 'low'} on average; {reason}"
+            f"the 95 % band of the {each.name} does not hold for this record:"
+            f" {100 * each.share:.3g} % of the rows are within it, and the predicted {each.name} is"
+            f" {displayed(each.name, abs(mean))} too {'high' if mean > 0 else 'low'} on average;"
+            f" {reason}"
         )
     return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
 
 
 BASELINES = (
-    "Skill: 1 - error/error of the better baseline. Persistence keeps the first value; the ARX model is fitted to the "
-    "other records, or to the other half of a single one, and runs freely from the first rows."
+    "Skill: 1 - error/error of the better baseline. Persistence keeps the first value; the ARX"
+    " model is fitted to the other records, or to the other half of a single one, and runs freely"
+    " from the first rows."
 )
 NO_BAND = "the model states no band"
 MAX_BRIEF = 15
 """Maximum number of predicted quantities in the brief view (chosen)."""
 STEADY_PRESSURE = 0.03
-"""Variation of a constant pressure relative to its maximum, without the extreme 4 % of the rows (chosen)."""
+"""Variation of a constant pressure relative to its maximum, without the extreme 4 % of the rows
+(chosen).
+"""
 
 
-def prediction_chapters(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> list[Chapter]:
-    """Return the chapters of predicted records, the errors of all and one for each; `model` names the file of the
-    muscle or plant `thing`, whose references are cited."""
-    records = [dataclasses.replace(_record(each).among(suffix=f"-{i}"), title=f"Record {i}: {each.origin}", brief=False)
-               for i, each in enumerate(predictions, 1)]  # fmt: skip
+def prediction_chapters(
+    model: str, thing: Any, predictions: Sequence[RecordPrediction]
+) -> list[Chapter]:
+    """Return the chapters of predicted records, the errors of all and one for each; `model` names
+    the file of the muscle or plant `thing`, whose references are cited."""
+    records = [
+        dataclasses.replace(
+            _record(each).among(suffix=f"-{i}"), title=f"Record {i}: {each.origin}", brief=False
+        )
+        for i, each in enumerate(predictions, 1)
+    ]
     return [_overview(model, thing, predictions), *records]
 
 
@@ -138,7 +165,10 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
     quantities = [quantity for each in predictions for quantity in each.quantities]
     records = [each for each in predictions for _ in each.quantities]
     names = [quantity.name for quantity in quantities]
-    half_widths = [None if q.half_width is None else float(np.median(q.half_width[q.compared])) for q in quantities]
+    half_widths = [
+        None if q.half_width is None else float(np.median(q.half_width[q.compared]))
+        for q in quantities
+    ]
     columns: dict[str, Any] = {
         "record": [each.origin for each in records],
         "quantity": names,
@@ -149,7 +179,9 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
         "half width of the 95 % band": TableColumn(half_widths, BY_ROW, short="95 % band ±"),
         "unit": unit_column(names),
         **_baseline_columns(predictions),
-        "rows within the band": TableColumn([q.share for q in quantities], "1", "%", digits=3, short="within"),
+        "rows within the band": TableColumn(
+            [q.share for q in quantities], "1", "%", digits=3, short="within"
+        ),
         "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
         "notes": TableColumn(["; ".join(each.notes) for each in records], brief=False),
     }
@@ -160,26 +192,41 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
 def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
     quantities = [quantity for each in predictions for quantity in each.quantities]
     number = counted(len(predictions), "record")
-    sentences = [f"{number} that {model} was not fitted to, predicted and compared with the measured values."]
-    sources = list(filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None)))
+    sentences = [
+        f"{number} that {model} was not fitted to, predicted and compared with the measured values."
+    ]
+    sources = list(
+        filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None))
+    )
     sentences += [f"Band: {source.rstrip('.')}." for source in sources]
     if not sources and all(quantity.share is None for quantity in quantities):
         reasons = dict.fromkeys(quantity.band or NO_BAND for quantity in quantities)
         sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
     notes = tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes)
-    title, references = f"Prediction by {model}", tuple(cite(thing))
+    title = f"Prediction by {model}"
+    references = tuple(cite(thing))
     tables = (_error_table(predictions),)
-    return Chapter("prediction", title, " ".join(sentences), tables=tables, notes=notes, references=references)
+    return Chapter(
+        "prediction", title, " ".join(sentences), tables=tables, notes=notes, references=references
+    )
 
 
 def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
-    """The rms errors of the baselines of all quantities, and the skill of the model; empty without records in time."""
+    """The rms errors of the baselines of all quantities, and the skill of the model; empty without
+    records in time.
+    """
     timed = {each: record for each in predictions if (record := _timed(each)) is not None}
     names = {each: tuple(quantity.name for quantity in each.quantities) for each in predictions}
-    errors: dict[QuantityPrediction, dict[str, float]] = {q: {} for each in predictions for q in each.quantities}
-    for kind in dict.fromkeys(names.values()):  # the ARX model is fitted to the records with the same quantities
+    errors: dict[QuantityPrediction, dict[str, float]] = {
+        q: {} for each in predictions for q in each.quantities
+    }
+    for kind in dict.fromkeys(
+        names.values()
+    ):  # the ARX model is fitted to the records with the same quantities
         alike = [each for each in timed if names[each] == kind]
-        for each, found in zip(alike, baseline_errors([timed[other] for other in alike]), strict=True):
+        for each, found in zip(
+            alike, baseline_errors([timed[other] for other in alike]), strict=True
+        ):
             for k, quantity in enumerate(each.quantities):
                 errors[quantity] = {name: float(values[k]) for name, values in found.items()}
     if not any(errors.values()):
@@ -194,12 +241,16 @@ def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]
 
 
 def _timed(prediction: RecordPrediction) -> TimedRecord | None:
-    """The record of a prediction for the baselines; None without inputs or without times that rise."""
+    """The record of a prediction for the baselines; None without inputs or without times that
+    rise.
+    """
     time = prediction.recording["time"] if "time" in prediction.recording else np.zeros(0)
     if prediction.inputs is None or time.size < 2 or not np.all(np.diff(time) > 0.0):
         return None
     quantities = prediction.quantities
-    measured, compared = (np.column_stack([getattr(q, name) for q in quantities]) for name in ("measured", "compared"))
+    measured, compared = (
+        np.column_stack([getattr(q, name) for q in quantities]) for name in ("measured", "compared")
+    )
     return TimedRecord(time, measured, prediction.inputs, compared)
 
 
@@ -209,7 +260,8 @@ def _record(prediction: RecordPrediction) -> Chapter:
     if "time" in prediction.recording:
         columns["time"] = TableColumn(prediction.recording["time"], "s")
     for quantity in prediction.quantities:
-        name, unit = quantity.name, unit_column([quantity.name]).values[0]
+        name = quantity.name
+        unit = unit_column([quantity.name]).values[0]
         columns[f"measured {name}"] = TableColumn(quantity.measured, unit)
         columns[f"predicted {name}"] = TableColumn(quantity.predicted, unit)
         if quantity.half_width is not None:
@@ -223,7 +275,8 @@ def _record(prediction: RecordPrediction) -> Chapter:
         for quantity in prediction.quantities
     )
     caption = f"{prediction.origin}: measured and predicted values with the 95 % band, and errors."
-    title, summary = f"Prediction of {prediction.origin}", f"{errors[:1].upper()}{errors[1:]}."
+    title = f"Prediction of {prediction.origin}"
+    summary = f"{errors[:1].upper()}{errors[1:]}."
     tables = (Table("prediction", "Measured and predicted values", columns, series=True),)
     plots = (Plot("prediction", caption, partial(_figure, prediction)),)
     return Chapter("prediction", title, summary, tables=tables, plots=plots, notes=prediction.notes)
@@ -233,15 +286,20 @@ def _figure(prediction: RecordPrediction) -> Any:
     """Return a figure with measured and predicted values above the errors, for every quantity."""
     figure, axes = residual_panels(len(prediction.quantities))
     for (upper, lower), quantity in zip(axes.T, prediction.quantities, strict=True):
-        (x, label), (factor, unit) = _abscissa(prediction, quantity), display_scale(quantity.name)
+        x, label = _abscissa(prediction, quantity)
+        factor, unit = display_scale(quantity.name)
         predicted = factor * quantity.predicted
-        draw_residuals((upper, lower), x, factor * quantity.measured, predicted, "predicted", quantity.compared)
+        draw_residuals(
+            (upper, lower), x, factor * quantity.measured, predicted, "predicted", quantity.compared
+        )
         if quantity.half_width is not None:
             order = np.argsort(x, kind="stable")
             half = factor * quantity.half_width[order]
-            low, high = predicted[order] - half, predicted[order] + half
+            low = predicted[order] - half
+            high = predicted[order] + half
             if np.any(np.diff(x) < 0.0):  # two branches over one abscissa
-                low, high = running_extreme(low, np.minimum), running_extreme(high, np.maximum)
+                low = running_extreme(low, np.minimum)
+                high = running_extreme(high, np.maximum)
             style = {"color": RED, "alpha": 0.18, "linewidth": 0}
             upper.fill_between(x[order], low, high, label="95 % band", **style)
             lower.fill_between(x[order], -half, half, **style)
@@ -252,10 +310,13 @@ def _figure(prediction: RecordPrediction) -> Any:
 
 
 def _abscissa(prediction: RecordPrediction, quantity: QuantityPrediction) -> tuple[Array, str]:
-    """Return the contraction or the pressure of a slow run in which the other is constant, else the time or the row."""
+    """Return the contraction or the pressure of a slow run in which the other is constant, else the
+    time or the row.
+    """
     recording = prediction.recording
     if quantity.name == "force" and "contraction" in recording and "pressure" in recording:
-        pressure, contraction = recording["pressure"], recording["contraction"]
+        pressure = recording["pressure"]
+        contraction = recording["contraction"]
         moved = float(np.nanmax(contraction) - np.nanmin(contraction))
         steady = float(np.nanquantile(pressure, 0.98) - np.nanquantile(pressure, 0.02))
         if moved <= CONTRACTION_BAND:

@@ -19,7 +19,9 @@ _ROUNDING = 1e-9
 
 @dataclasses.dataclass(frozen=True)
 class MonotonicityRule:
-    """A forbidden sign of the slope of the `quantity` that a law gives, with respect to one of its arguments."""
+    """A forbidden sign of the slope of the `quantity` that a law gives, with respect to one of its
+    arguments.
+    """
 
     description: str
     """A violation of the rule in words."""
@@ -47,12 +49,15 @@ class MonotonicityViolation:
     """The slope there [SI]."""
 
     def __str__(self) -> str:
-        (p0, p1), (low, high) = self.pressure, (self._format_second(v) for v in self.second_argument)
-        share = f"{100 * self.area_fraction:.1f} %" if self.area_fraction >= 5e-4 else "less than 0.1 %"
+        p0, p1 = self.pressure
+        low, high = (self._format_second(v) for v in self.second_argument)
+        share = (
+            f"{100 * self.area_fraction:.1f} %" if self.area_fraction >= 5e-4 else "less than 0.1 %"
+        )
         return (
-            f"{self.rule.description} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {low} and {high} "
-            f"({share} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa and "
-            f"{self._format_second(self.worst_point[1])}"
+            f"{self.rule.description} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {low} and"
+            f" {high} ({share} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa"
+            f" and {self._format_second(self.worst_point[1])}"
         )
 
     def _format_second(self, value: float) -> str:
@@ -62,21 +67,31 @@ class MonotonicityViolation:
 def find_violations(
     law: Any, rules: Sequence[MonotonicityRule], pressure: Array, second_argument: Array
 ) -> tuple[MonotonicityViolation, ...]:
-    """The regions where exact slopes at grid points violate one of the rules, largest first. `pressure` [Pa] and
-    `second_argument` (contraction [1] or force [N]) are grids, shape (N, M) each."""
+    """The regions where exact slopes at grid points violate one of the rules, largest first.
+    `pressure` [Pa] and `second_argument` (contraction [1] or force [N]) are grids, shape (N, M)
+    each."""
     from scipy import ndimage
 
     violations: list[MonotonicityViolation] = []
     for rule in rules:
-        slope = np.asarray(autodiff.derivative(law, rule.quantity, pressure, second_argument, wrt=rule.argument))
+        slope = np.asarray(
+            autodiff.derivative(law, rule.quantity, pressure, second_argument, wrt=rule.argument)
+        )
         excess = rule.sign * slope
         labels, count = ndimage.label((excess > 0.0) & (excess > _ROUNDING * np.abs(excess).max()))
         for inside in (labels == label for label in range(1, count + 1)):
-            worst = np.unravel_index(int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape)
+            worst = np.unravel_index(
+                int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape
+            )
             arguments = pressure, second_argument
-            first, second = ((float(values[inside].min()), float(values[inside].max())) for values in arguments)
-            point, share = (float(pressure[worst]), float(second_argument[worst])), float(inside.mean())
-            violations.append(MonotonicityViolation(rule, first, second, share, point, float(slope[worst])))
+            first, second = (
+                (float(values[inside].min()), float(values[inside].max())) for values in arguments
+            )
+            point = (float(pressure[worst]), float(second_argument[worst]))
+            share = float(inside.mean())
+            violations.append(
+                MonotonicityViolation(rule, first, second, share, point, float(slope[worst]))
+            )
     return tuple(sorted(violations, key=lambda v: -v.area_fraction))
 
 
@@ -87,32 +102,47 @@ FORCE_FALLS = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
 
 
 def find_monotonicity_violations(
-    law: ContractionLaw, validity_range: LoadRange | None = None, points: tuple[int, int] = (201, 201)
+    law: ContractionLaw,
+    validity_range: LoadRange | None = None,
+    points: tuple[int, int] = (201, 201),
 ) -> tuple[MonotonicityViolation, ...]:
-    """The regions of a validity range where k rises with F or falls with p, largest first. `validity_range` is by
-    default that of the law. Exact slopes are evaluated on an even grid of `points` pressures and forces, edges
-    included."""
+    """The regions of a validity range where k rises with F or falls with p, largest first.
+    `validity_range` is by default that of the law. Exact slopes are evaluated on an even grid of
+    `points` pressures and forces, edges included."""
     validity_range = validity_range or LoadRange.from_law(law)
-    return find_violations(law, (RISES_WITH_FORCE, CONTRACTION_FALLS), *validity_range.grid(*points))
+    return find_violations(
+        law, (RISES_WITH_FORCE, CONTRACTION_FALLS), *validity_range.grid(*points)
+    )
 
 
 LEAST_SHARE = 1e-3
-"""Share of the validity range below which a region that violates the shape of a fitted law is not named (chosen)."""
+"""Share of the validity range below which a region that violates the shape of a fitted law is not
+named (chosen).
+"""
 
 
 def find_shape_violations(
     law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
 ) -> tuple[MonotonicityViolation, ...]:
-    """The regions of a validity range where a force falls with pressure or rises with contraction, largest first. Exact
-    slopes are evaluated on an even grid of `points` pressures and contractions."""
+    """The regions of a validity range where a force falls with pressure or rises with contraction,
+    largest first. Exact slopes are evaluated on an even grid of `points` pressures and
+    contractions."""
     check_whole("find_shape_violations", "points", points, 2)
-    sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
-    return find_violations(law, (FORCE_FALLS, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
+    sides = (
+        np.linspace(*validity_range.pressure, points),
+        np.linspace(*validity_range.contraction, points),
+    )
+    return find_violations(
+        law, (FORCE_FALLS, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij")
+    )
 
 
 def shape_violations_of_fit(fit: Fit) -> tuple[MonotonicityViolation, ...]:
-    """The shape violations of a fitted law in the range of its data; none for laws that are no closed-form force."""
-    law, varies = fit.model, all(low < high for low, high in fit.data_ranges.values())
+    """The shape violations of a fitted law in the range of its data; none for laws that are no
+    closed-form force.
+    """
+    law = fit.model
+    varies = all(low < high for low, high in fit.data_ranges.values())
     if not isinstance(law, ForceLaw) or not law.traceable or not varies:
         return ()
     found = find_shape_violations(law, fit.validity_range)
@@ -125,8 +155,12 @@ def violation_table(violations: Sequence[MonotonicityViolation], name: str, titl
         "constraint": [each.rule.description for each in violations],
         "pressure": TableColumn([each.pressure for each in violations], "Pa", "kPa"),
         "contraction": TableColumn([each.second_argument for each in violations], "1", "%"),
-        "fraction of the validity range": TableColumn([each.area_fraction for each in violations], "1", "%"),
+        "fraction of the validity range": TableColumn(
+            [each.area_fraction for each in violations], "1", "%"
+        ),
         "worst at pressure": TableColumn([each.worst_point[0] for each in violations], "Pa", "kPa"),
         "worst at contraction": TableColumn([each.worst_point[1] for each in violations], "1", "%"),
     }
-    return Table(name, title, columns, "`airmuscle fit --shape` fits a surface without such regions.")
+    return Table(
+        name, title, columns, "`airmuscle fit --shape` fits a surface without such regions."
+    )

@@ -1,7 +1,9 @@
-"""Kernel: a numerical kernel by its name, compiled once per machine and called without importing numba.
+"""Kernel: a numerical kernel by its name, compiled once per machine and called without importing
+numba.
 
-numba takes 0.35 s to import before it runs what it compiled on another day. So a kernel is compiled by numba once, its
-machine code is stored (`store`), and every later process loads that alone. It is called with addresses and lengths.
+numba takes 0.35 s to import before it runs what it compiled on another day. So a kernel is compiled
+by numba once, its machine code is stored (`store`), and every later process loads that alone. It is
+called with addresses and lengths.
 """
 
 import ctypes
@@ -20,9 +22,14 @@ from ..llvm.jit import build, engine_of, slot_count
 from . import store
 
 _ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
-_KINDS = {(dtype, dimensions): f"{item}{dimensions}" for dtype, item in _ITEMS.items() for dimensions in range(5)}
+_KINDS = {
+    (dtype, dimensions): f"{item}{dimensions}"
+    for dtype, item in _ITEMS.items()
+    for dimensions in range(5)
+}
 _compiling = threading.RLock()
-_address, _view = ctypes.addressof, ctypes.c_char.from_buffer
+_address = ctypes.addressof
+_view = ctypes.c_char.from_buffer
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
@@ -56,11 +63,14 @@ class Kernel:
     """A kernel that returns a status, by its name and that of its module in `compile.kernels`."""
 
     def __init__(self, name: str, module: str = "") -> None:
-        self.name, self.module = name, module or name
+        self.name = name
+        self.module = module or name
         self._entries: dict[tuple[str, ...], Any] = {}
 
     def bind(self, *arguments: Any) -> "BoundKernel":
-        """The kernel with its arguments: integers, floats, and C-contiguous arrays of int64, float64 or float32."""
+        """The kernel with its arguments: integers, floats, and C-contiguous arrays of int64,
+        float64 or float32.
+        """
         return BoundKernel(self, arguments)
 
     def __call__(self, *arguments: Any) -> int:
@@ -69,11 +79,15 @@ class Kernel:
 
     @property
     def numba(self) -> Any:
-        """The Python function of the kernel, which numba compiles for the types of its arguments."""
+        """The Python function of the kernel, which numba compiles for the types of its
+        arguments.
+        """
         return getattr(importlib.import_module(f"...kernels.{self.module}", __name__), self.name)
 
     def entry(self, kinds: tuple[str, ...]) -> Any:
-        """The machine code for arguments of these kinds, as a function of the address of slots; None without it."""
+        """The machine code for arguments of these kinds, as a function of the address of slots;
+        None without it.
+        """
         if kinds not in self._entries:
             with _compiling:
                 if kinds not in self._entries:
@@ -85,7 +99,11 @@ class Kernel:
         """The entry point, and the engine that owns its machine code."""
         code = store.load(self.name, kinds)
         if code is None:
-            print(f"compiling {self.name}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)
+            print(
+                f"compiling {self.name}, once on this machine (some seconds) ...",
+                file=sys.stderr,
+                flush=True,
+            )
             code = store.save(self.name, kinds, build(self.numba, kinds))
         if not code:
             return None
@@ -96,10 +114,21 @@ class Kernel:
 class BoundKernel:
     """A kernel with its arguments, for many runs; arrays are passed by address and referenced.
 
-    Between two runs the contents of arrays may change, and arguments may be replaced by others of their kind.
+    Between two runs the contents of arrays may change, and arguments may be replaced by others of
+    their kind.
     """
 
-    __slots__ = ("_address", "_arguments", "_floats", "_kernel", "_kinds", "_numba", "_offsets", "_run", "_slots")
+    __slots__ = (
+        "_address",
+        "_arguments",
+        "_floats",
+        "_kernel",
+        "_kinds",
+        "_numba",
+        "_offsets",
+        "_run",
+        "_slots",
+    )
 
     def __init__(self, kernel: Kernel, arguments: tuple[Any, ...]) -> None:
         self._kinds = tuple(map(_kind, arguments))
@@ -122,13 +151,17 @@ class BoundKernel:
             self._set(self._kinds[index], self._offsets[index], argument)
 
     def replace_input(self, index: int, array: Any) -> None:
-        """Take another array in place of number `index`, which the kernel only reads; it may be read-only."""
+        """Take another array in place of number `index`, which the kernel only reads; it may be
+        read-only.
+        """
         if self._arguments[index] is array:
             return
         if array.flags.writeable:
             self.replace(index, array)
         elif not array.flags.c_contiguous or _kind(array) != self._kinds[index]:
-            raise TypeError(f"argument {index} must be a C-contiguous array of kind {self._kinds[index]}")
+            raise TypeError(
+                f"argument {index} must be a C-contiguous array of kind {self._kinds[index]}"
+            )
         else:
             self._arguments[index], offset = array, self._offsets[index]
             self._slots[offset : offset + 1 + array.ndim] = [array.ctypes.data, *array.shape]
@@ -147,8 +180,12 @@ class BoundKernel:
                 slots[offset] = length
 
     def point(self, index: int, addresses: Sequence[int], length: int) -> None:
-        """Set the addresses of the arrays from number `index` on, within live arrays, and their first dimension."""
-        slots, offsets, arguments = self._slots, self._offsets, self._arguments
+        """Set the addresses of the arrays from number `index` on, within live arrays, and their
+        first dimension.
+        """
+        slots = self._slots
+        offsets = self._offsets
+        arguments = self._arguments
         for i, address in enumerate(addresses, index):
             offset = offsets[i]
             slots[offset] = address
@@ -159,12 +196,18 @@ class BoundKernel:
         for i, address in enumerate(addresses, index):
             shape = length, *arguments[i].shape[1:]
             count = math.prod(shape)
-            numbers = np.ctypeslib.as_array((ctypes.c_double * count).from_address(address)) if count else np.empty(0)
+            numbers = (
+                np.ctypeslib.as_array((ctypes.c_double * count).from_address(address))
+                if count
+                else np.empty(0)
+            )
             arguments[i] = numbers.reshape(shape)
 
     @property
     def entry_address(self) -> int | None:
-        """The address of the entry point, for other kernels that call this one; None without machine code."""
+        """The address of the entry point, for other kernels that call this one; None without
+        machine code.
+        """
         return None if self._numba else ctypes.cast(self._run, ctypes.c_void_p).value
 
     @property
@@ -178,7 +221,9 @@ class BoundKernel:
 
     @property
     def runner(self) -> Callable[[], int]:
-        """A function that runs the kernel with less overhead than the kernel itself, as long as the kernel lives."""
+        """A function that runs the kernel with less overhead than the kernel itself, as long as the
+        kernel lives.
+        """
         return self if self._numba else functools.partial(self._run, self._address)
 
     def __call__(self) -> int:
@@ -188,8 +233,15 @@ class BoundKernel:
         return int(self._numba(*self._arguments) or 0)
 
 
-rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lanes")
-evaluate, evaluate_rates = Kernel("evaluate"), Kernel("evaluate_rates", "evaluate")
-record, newton, sampled_loop = Kernel("record", "evaluate"), Kernel("newton"), Kernel("sampled_loop")
-begin_step, end_step = Kernel("begin_step", "evaluate"), Kernel("end_step", "evaluate")
-lane_blocks, loop_lanes = Kernel("lane_blocks", "lanes"), Kernel("loop_lanes")
+rodas4 = Kernel("rodas4")
+fixed_step = Kernel("fixed_step")
+lanes = Kernel("lanes")
+evaluate = Kernel("evaluate")
+evaluate_rates = Kernel("evaluate_rates", "evaluate")
+record = Kernel("record", "evaluate")
+newton = Kernel("newton")
+sampled_loop = Kernel("sampled_loop")
+begin_step = Kernel("begin_step", "evaluate")
+end_step = Kernel("end_step", "evaluate")
+lane_blocks = Kernel("lane_blocks", "lanes")
+loop_lanes = Kernel("loop_lanes")

@@ -1,4 +1,6 @@
-"""Emission of instructions into functions of a target language: straight-line code, and branches around blocks."""
+"""Emission of instructions into functions of a target language: straight-line code, and branches
+around blocks.
+"""
 
 import abc
 import functools
@@ -16,14 +18,30 @@ LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
 """Arguments that do not depend on the states: inputs, their slopes, and the step size."""
 
 _ARITHMETIC = {
-    Operation.ADD: "+", Operation.SUBTRACT: "-", Operation.MULTIPLY: "*", Operation.DIVIDE: "/", Operation.SQUARE: "*",
+    Operation.ADD: "+",
+    Operation.SUBTRACT: "-",
+    Operation.MULTIPLY: "*",
+    Operation.DIVIDE: "/",
+    Operation.SQUARE: "*",
     Operation.TWICE: "+",
-}  # fmt: skip
+}
 """Operators between the first and the last argument."""
 _FUNCTIONS = {Operation.SQRT: "sqrt", Operation.ABS: "abs", Operation.FLOOR: "floor", **CALLED}
-_COMPARISONS = {Operation.LESS: "<", Operation.LESS_EQUAL: "<=", Operation.EQUAL: "==", Operation.NOT_EQUAL: "!="}
-_EXTREMES = {Operation.FMIN: "<", Operation.FMAX: ">", Operation.MINIMUM: "<", Operation.MAXIMUM: ">"}
-"""Strict comparison, as in the processor's instruction: of two equal values either may be returned."""
+_COMPARISONS = {
+    Operation.LESS: "<",
+    Operation.LESS_EQUAL: "<=",
+    Operation.EQUAL: "==",
+    Operation.NOT_EQUAL: "!=",
+}
+_EXTREMES = {
+    Operation.FMIN: "<",
+    Operation.FMAX: ">",
+    Operation.MINIMUM: "<",
+    Operation.MAXIMUM: ">",
+}
+"""Strict comparison, as in the processor's instruction: of two equal values either may be
+returned.
+"""
 
 
 def nearest_single(value: float) -> float:
@@ -35,8 +53,9 @@ def nearest_single(value: float) -> float:
 class FunctionBlock(abc.ABC):
     """The lines of one function under construction, with elimination of common subexpressions.
 
-    A subclass states what its language writes: constants, array elements, arithmetic, calls and choices.
-    `needed` are the functions that the target must be given a definition of, with the number of their arguments.
+    A subclass states what its language writes: constants, array elements, arithmetic, calls and
+    choices. `needed` are the functions that the target must be given a definition of, with the
+    number of their arguments.
     """
 
     language: str
@@ -51,7 +70,9 @@ class FunctionBlock(abc.ABC):
         self._named = 0
 
     def put(self, expression: str) -> str:
-        """The name of the value of `expression`; the instruction is appended unless it exists already."""
+        """The name of the value of `expression`; the instruction is appended unless it exists
+        already.
+        """
         name = self.known.get(expression)
         if name is None:
             name = self.known[expression] = self.new_name()
@@ -93,7 +114,9 @@ class FunctionBlock(abc.ABC):
 
     @abc.abstractmethod
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
-        """`when_true` where a < b, a <= b, a > b, a == b or a != b, as `comparison` states, else `when_false`."""
+        """`when_true` where a < b, a <= b, a > b, a == b or a != b, as `comparison` states, else
+        `when_false`.
+        """
 
     def logical(self, operator: str, a: str, b: str) -> str:
         """The product or the sum of two conditions."""
@@ -106,12 +129,15 @@ class FunctionBlock(abc.ABC):
         return self.choose(">", x, zero, self.constant(1.0), negative)
 
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
+        """The value of one operation, whose instructions are appended; raises TraceError for an
+        unknown operation.
+        """
         if operation in _ARITHMETIC:
             return self.arithmetic(_ARITHMETIC[operation], x[0], x[-1])
         if operation in _FUNCTIONS:
             return self.call(_FUNCTIONS[operation], x)
-        one, zero = self.constant(1.0), self.constant(0.0)
+        one = self.constant(1.0)
+        zero = self.constant(0.0)
         if operation in _COMPARISONS:
             return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
         if operation in _EXTREMES:
@@ -132,24 +158,34 @@ class FunctionBlock(abc.ABC):
             case Operation.OR:
                 return self.choose("!=", self.logical("+", x[0], x[1]), zero, one, zero)
             case Operation.MASK | Operation.SELECT:
-                return self.choose("!=", x[0], zero, x[1], x[2] if operation == Operation.SELECT else zero)
+                return self.choose(
+                    "!=", x[0], zero, x[1], x[2] if operation == Operation.SELECT else zero
+                )
         raise TraceError(
-            f"operation {operation.name} has no {self.language} form; write the law over airmuscle.core.ops."
+            f"operation {operation.name} has no {self.language} form; write the law over"
+            " airmuscle.core.ops."
         )
 
     def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+        self,
+        gates: Sequence[str],
+        compute: Callable[[], dict[Operand, str]],
+        instead: Mapping[Operand, str],
     ) -> dict[Operand, str]:
-        """The results that `compute` appends and returns if a gate is not zero, otherwise those of `instead`.
+        """The results that `compute` appends and returns if a gate is not zero, otherwise those of
+        `instead`.
 
-        In a language without branches they are computed in any case: their product with the gate is zero.
+        In a language without branches they are computed in any case: their product with the gate is
+        zero.
         """
         inside = compute()
         return {operand: inside[operand] for operand in instead}
 
 
 class TargetLanguage(abc.ABC):
-    """A language in which functions of arrays are printed. Arrays are arguments that do not overlap."""
+    """A language in which functions of arrays are printed. Arrays are arguments that do not
+    overlap.
+    """
 
     labels: Mapping[str, Sequence[Any]] = {}
     """The names of the elements of arrays, in a language that has names for values."""
@@ -159,27 +195,41 @@ class TargetLanguage(abc.ABC):
         """An empty function of which some arguments are numbers, the others arrays."""
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: Any) -> str:
-        """The text of a function of arrays and numbers that computes `outputs`; in a language without, its lines."""
+        """The text of a function of arrays and numbers that computes `outputs`; in a language
+        without, its lines.
+        """
         return "\n".join(body.lines)
 
-    def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: Any) -> str:
+    def preparation(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: Any
+    ) -> str:
         """The text of a function that is called once for a set of parameters."""
         return self.function(name, inputs, outputs, body)
 
 
 def computed(
-    block: FunctionBlock, code: Code, inputs: Sequence[str], held: Mapping[Operand, int] | None = None
+    block: FunctionBlock,
+    code: Code,
+    inputs: Sequence[str],
+    held: Mapping[Operand, int] | None = None,
 ) -> dict[tuple[int, int], str]:
-    """Append code to a block; the names of its results by output and index. Other arguments as of `Emission`."""
+    """Append code to a block; the names of its results by output and index. Other arguments as of
+    `Emission`.
+    """
     emission = Emission(block, inputs, held or {}, {})
     emission.run(with_gates(code, inputs, held or {}))
     return {(o, i): emission.value_of(operand) for o, i, operand in code.outputs}
 
 
 def with_gates(
-    code: Code, inputs: Sequence[str], held: Mapping[Operand, int], early: frozenset[Operand] = frozenset()
+    code: Code,
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    early: frozenset[Operand] = frozenset(),
 ) -> list[Item]:
-    """The instructions of `code`, with those that a zero factor or an inactive clamp makes redundant in blocks."""
+    """The instructions of `code`, with those that a zero factor or an inactive clamp makes
+    redundant in blocks.
+    """
 
     def level(operand: Operand) -> int:
         return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
@@ -190,12 +240,16 @@ def with_gates(
 class Emission:
     """Instructions appended to a block, and the names of their results, `values`.
 
-    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
-    values.
+    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given`
+    the names of known values.
     """
 
     def __init__(
-        self, block: FunctionBlock, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+        self,
+        block: FunctionBlock,
+        inputs: Sequence[str],
+        held: Mapping[Operand, int],
+        given: Mapping[Operand, str],
     ) -> None:
         self.block, self.inputs, self.held, self.values = block, inputs, held, dict(given)
 
@@ -206,9 +260,13 @@ class Emission:
                 instead = {operand: self.value_of(value) for operand, value in line.instead}
                 inside = Emission(self.block, self.inputs, self.held, self.values)
                 compute = functools.partial(inside.run, line.body)
-                self.values |= self.block.unless_zero([self.value_of(gate) for gate in line.gates], compute, instead)
+                self.values |= self.block.unless_zero(
+                    [self.value_of(gate) for gate in line.gates], compute, instead
+                )
             else:
-                self.values[line.result] = self.block.operate(line.operation, list(map(self.value_of, line.arguments)))
+                self.values[line.result] = self.block.operate(
+                    line.operation, list(map(self.value_of, line.arguments))
+                )
         return self.values
 
     def value_of(self, operand: Operand) -> str:

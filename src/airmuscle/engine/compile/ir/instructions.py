@@ -1,4 +1,6 @@
-"""CasADi expressions as a list of instructions; those that depend on parameters only are separated."""
+"""CasADi expressions as a list of instructions; those that depend on parameters only are
+separated.
+"""
 
 import dataclasses
 import enum
@@ -9,28 +11,42 @@ from typing import Any, NamedTuple
 from ....core import TraceError, instructions_of
 
 Operand = tuple[Any, ...]
-"""("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an input."""
+"""("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an
+input.
+"""
 ZERO: Operand = ("c", 0.0)
 ONE: Operand = ("c", 1.0)
 
 
 Operation = enum.IntEnum(
     "Operation",
-    "ASSIGN ADD SUBTRACT MULTIPLY DIVIDE NEGATE SQUARE TWICE INVERSE SQRT ABS SIGN FLOOR POWER CONSTANT_POWER EXP LOG "
-    "LOG1P EXPM1 SIN COS TAN ASIN ACOS ATAN SINH COSH TANH ASINH FMIN FMAX LESS LESS_EQUAL EQUAL NOT_EQUAL NOT AND OR "
-    "MASK SELECT MAXIMUM MINIMUM",
+    "ASSIGN ADD SUBTRACT MULTIPLY DIVIDE NEGATE SQUARE TWICE INVERSE SQRT ABS SIGN FLOOR POWER"
+    " CONSTANT_POWER EXP LOG LOG1P EXPM1 SIN COS TAN ASIN ACOS ATAN SINH COSH TANH ASINH FMIN FMAX"
+    " LESS LESS_EQUAL EQUAL NOT_EQUAL NOT AND OR MASK SELECT MAXIMUM MINIMUM",
 )
-"""Operations of an instruction list; all but the last three have the meaning that CasADi gives them.
+"""Operations of an instruction list; all but the last three have the meaning that CasADi gives
+them.
 
-MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where the condition is not
-zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine instruction does.
+MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where
+the condition is not zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine
+instruction does.
 """
 _CASADI_NAMES = {
-    Operation.SUBTRACT: "SUB", Operation.MULTIPLY: "MUL", Operation.DIVIDE: "DIV", Operation.NEGATE: "NEG",
-    Operation.SQUARE: "SQ", Operation.INVERSE: "INV", Operation.ABS: "FABS", Operation.POWER: "POW",
-    Operation.CONSTANT_POWER: "CONSTPOW", Operation.LESS: "LT", Operation.LESS_EQUAL: "LE", Operation.EQUAL: "EQ",
-    Operation.NOT_EQUAL: "NE", Operation.MASK: "IF_ELSE_ZERO",
-}  # fmt: skip
+    Operation.SUBTRACT: "SUB",
+    Operation.MULTIPLY: "MUL",
+    Operation.DIVIDE: "DIV",
+    Operation.NEGATE: "NEG",
+    Operation.SQUARE: "SQ",
+    Operation.INVERSE: "INV",
+    Operation.ABS: "FABS",
+    Operation.POWER: "POW",
+    Operation.CONSTANT_POWER: "CONSTPOW",
+    Operation.LESS: "LT",
+    Operation.LESS_EQUAL: "LE",
+    Operation.EQUAL: "EQ",
+    Operation.NOT_EQUAL: "NE",
+    Operation.MASK: "IF_ELSE_ZERO",
+}
 """Names in CasADi that differ, without their prefix OP_."""
 _OWN = (Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM)
 _COMPARE = (Operation.LESS_EQUAL, Operation.LESS)
@@ -51,7 +67,9 @@ class Instruction(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Code:
-    """Instructions in execution order, and the destinations of results: (output number, index, operand)."""
+    """Instructions in execution order, and the destinations of results: (output number, index,
+    operand).
+    """
 
     body: tuple[Instruction, ...]
     outputs: tuple[tuple[int, int, Operand], ...]
@@ -68,7 +86,9 @@ def _casadi_operations() -> dict[int, Operation]:
     import casadi
 
     named = {
-        operation: _CASADI_NAMES.get(operation, operation.name) for operation in Operation if operation not in _OWN
+        operation: _CASADI_NAMES.get(operation, operation.name)
+        for operation in Operation
+        if operation not in _OWN
     }
     return {getattr(casadi, f"OP_{name}"): operation for operation, name in named.items()}
 
@@ -79,7 +99,9 @@ def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
 
 
 def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
-    """The instructions as recorded by CasADi; maxima and minima are still selections, which can be differentiated."""
+    """The instructions as recorded by CasADi; maxima and minima are still selections, which can be
+    differentiated.
+    """
     import casadi
 
     operations = _casadi_operations()
@@ -97,14 +119,19 @@ def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
         else:
             name = ("t", len(body))
             if code not in operations:
-                raise TraceError(f"CasADi operation {code} is not supported; write the law over airmuscle.core.ops.")
+                raise TraceError(
+                    f"CasADi operation {code} is not supported; write the law over"
+                    " airmuscle.core.ops."
+                )
             body.append(Instruction(operations[code], name, tuple(current[i] for i in source)))
             current[target[0]] = name
     return Code(tuple(_selects(body)), tuple(results))
 
 
 def finished(code: Code) -> Code:
-    """Code ready for printing: maxima and minima are recognised, unused instructions are removed."""
+    """Code ready for printing: maxima and minima are recognised, unused instructions are
+    removed.
+    """
     body = _selects(code.body)
     by_result = {line.result: line for line in body}
     chosen: list[Instruction] = []
@@ -117,7 +144,9 @@ def finished(code: Code) -> Code:
 
 
 def _selects(body: Sequence[Instruction]) -> list[Instruction]:
-    """The instructions with each sum of a mask and its complementary mask as one Operation.SELECT."""
+    """The instructions with each sum of a mask and its complementary mask as one
+    Operation.SELECT.
+    """
     by_result = {line.result: line for line in body}
 
     def mask(operand: Operand) -> Instruction | None:
@@ -130,22 +159,29 @@ def _selects(body: Sequence[Instruction]) -> list[Instruction]:
 
     chosen = []
     for line in body:
-        masks = [found for a in line.arguments if line.operation == Operation.ADD and (found := mask(a))]
+        masks = [
+            found for a in line.arguments if line.operation == Operation.ADD and (found := mask(a))
+        ]
         for one, other in (masks, masks[::-1]) if len(masks) == 2 else ():
             if line.operation == Operation.ADD and negated(other.arguments[0]) == one.arguments[0]:
-                line = Instruction(Operation.SELECT, line.result, (*one.arguments, other.arguments[1]))
+                line = Instruction(
+                    Operation.SELECT, line.result, (*one.arguments, other.arguments[1])
+                )
         chosen.append(line)
     return chosen
 
 
-def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]) -> list[Instruction]:
-    """A mask of the positive or negative part of a value as a maximum or minimum with zero; also within a product,
-    which can then be fused with a sum.
+def _extreme_of_zero(
+    line: Instruction, by_result: Mapping[Operand, Instruction]
+) -> list[Instruction]:
+    """A mask of the positive or negative part of a value as a maximum or minimum with zero; also
+    within a product, which can then be fused with a sum.
 
     NaN is treated as by the mask: if the comparison is false, the second operand is selected.
     """
     condition, masked = line.arguments
-    test, product = by_result.get(condition), by_result.get(masked)
+    test = by_result.get(condition)
+    product = by_result.get(masked)
     opposite = test is not None and test.operation == Operation.NOT
     if test is not None and opposite:
         test = by_result.get(test.arguments[0])
@@ -157,7 +193,11 @@ def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]
     extreme = Instruction(Operation.MAXIMUM if larger else Operation.MINIMUM, line.result, pair)
     if number == masked:
         return [extreme]
-    if product is None or product.operation != Operation.MULTIPLY or number not in product.arguments:
+    if (
+        product is None
+        or product.operation != Operation.MULTIPLY
+        or number not in product.arguments
+    ):
         return [line]
     other = product.arguments[product.arguments[0] == number]
     extreme = Instruction(extreme.operation, ("t", "extreme of", line.result), pair)
@@ -165,7 +205,9 @@ def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]
 
 
 def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
-    """An Operation.SELECT of the greater or smaller of two compared values as Operation.MAXIMUM or MINIMUM."""
+    """An Operation.SELECT of the greater or smaller of two compared values as Operation.MAXIMUM or
+    MINIMUM.
+    """
     condition, a, b = line.arguments
     test = by_result.get(condition)
     if test is not None and test.operation in _COMPARE:
@@ -186,11 +228,14 @@ def _without_unused(body: list[Instruction], outputs: tuple[tuple[int, int, Oper
     return Code(tuple(reversed(kept)), outputs)
 
 
-def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, ...], tuple[Operand, ...]]:
-    """Loop-invariant code motion: the remaining code, the instructions that depend on parameters only, their results.
+def hoisted(
+    code: Code, parameter_input: int
+) -> tuple[Code, tuple[Instruction, ...], tuple[Operand, ...]]:
+    """Loop-invariant code motion: the remaining code, the instructions that depend on parameters
+    only, their results.
 
-    The results are the operands that the remaining code uses, in order. A division by such an operand becomes a product
-    with its precomputed inverse.
+    The results are the operands that the remaining code uses, in order. A division by such an
+    operand becomes a product with its precomputed inverse.
     """
     varies: dict[Operand, bool] = {}
 
@@ -202,14 +247,22 @@ def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, 
     once: list[Instruction] = []
     always: list[Instruction] = []
     for line in code.body:
-        if line.operation == Operation.DIVIDE and depends(line.arguments[0]) and not depends(line.arguments[1]):
-            inverse = Instruction(Operation.INVERSE, ("t", "inverse of", line.arguments[1]), line.arguments[1:])
+        if (
+            line.operation == Operation.DIVIDE
+            and depends(line.arguments[0])
+            and not depends(line.arguments[1])
+        ):
+            inverse = Instruction(
+                Operation.INVERSE, ("t", "inverse of", line.arguments[1]), line.arguments[1:]
+            )
             if inverse.result not in varies:
                 once.append(inverse)
                 varies[inverse.result] = False
             line = Instruction(Operation.MULTIPLY, line.result, (line.arguments[0], inverse.result))
         varies[line.result] = any(depends(a) for a in line.arguments)
         (always if varies[line.result] else once).append(line)
-    used = [a for line in always for a in line.arguments] + [operand for _, _, operand in code.outputs]
+    used = [a for line in always for a in line.arguments] + [
+        operand for _, _, operand in code.outputs
+    ]
     handed = tuple(dict.fromkeys(a for a in used if a[0] != "c" and not depends(a)))
     return Code(tuple(always), code.outputs), tuple(once), handed

@@ -1,7 +1,8 @@
-"""Interpreter of instructions in IEEE 754 double or single precision, operation by operation as they are printed.
+"""Interpreter of instructions in IEEE 754 double or single precision, operation by operation as
+they are printed.
 
-The numbers are those of printed C that is compiled without fused operations, bit by bit, with the functions of the C
-library that Python uses.
+The numbers are those of printed C that is compiled without fused operations, bit by bit, with the
+functions of the C library that Python uses.
 """
 
 import math
@@ -22,13 +23,21 @@ def _divided(x: float, y: float) -> float:
 
 
 _OPERATORS: dict[str, Callable[[float, float], float]] = {
-    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": _divided, "<": operator.lt, "<=": operator.le,
-    ">": operator.gt, "==": operator.eq, "!=": operator.ne,
-}  # fmt: skip
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": _divided,
+    "<": operator.lt,
+    "<=": operator.le,
+    ">": operator.gt,
+    "==": operator.eq,
+    "!=": operator.ne,
+}
 
 
 class InterpretedBody(FunctionBlock):
-    """A function that is evaluated while it is emitted; its arrays are `arrays`, its results stand in `stored`.
+    """A function that is evaluated while it is emitted; its arrays are `arrays`, its results stand
+    in `stored`.
 
     single  every number is rounded to single precision
     """
@@ -67,13 +76,18 @@ class InterpretedBody(FunctionBlock):
     def call(self, function: str, x: Sequence[str]) -> str:
         values = [self._values[name] for name in x]
         try:
-            return self._result(float(getattr(math, "fabs" if function == "abs" else function)(*values)))
+            return self._result(
+                float(getattr(math, "fabs" if function == "abs" else function)(*values))
+            )
         except (ValueError, OverflowError):  # of Python; the C library gives infinity or NaN
             with np.errstate(all="ignore"):
                 return self._result(float(getattr(np, function)(*map(np.float64, values))))
 
     def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+        self,
+        gates: Sequence[str],
+        compute: Callable[[], dict[Operand, str]],
+        instead: Mapping[Operand, str],
     ) -> dict[Operand, str]:
         if any(self._values[gate] != 0.0 for gate in gates):
             inside = compute()

@@ -1,8 +1,9 @@
 """Exact derivatives of a list of instructions, by elimination on its graph.
 
-Every instruction is a vertex, every dependence an edge with a local partial derivative. A vertex v between p and s is
-eliminated by c_sp += c_sv c_vp; finally, all edges lead from inputs to results. The next vertex is always one with the
-fewest products (Markowitz criterion), which requires fewer operations than the forward or reverse mode.
+Every instruction is a vertex, every dependence an edge with a local partial derivative. A vertex v
+between p and s is eliminated by c_sp += c_sv c_vp; finally, all edges lead from inputs to results.
+The next vertex is always one with the fewest products (Markowitz criterion), which requires fewer
+operations than the forward or reverse mode.
 
 Reference: Griewank, A., Walther, A., Evaluating Derivatives, 2nd ed., SIAM 2008, chapters 9 and 10.
 """
@@ -18,13 +19,20 @@ Row = dict[Operand, Operand]
 LESS, TWO, HALF = (("c", value) for value in (-1.0, 2.0, 0.5))
 _COMMUTE = (Operation.ADD, Operation.MULTIPLY)
 _CONDITIONS = (
-    Operation.LESS_EQUAL, Operation.LESS, Operation.EQUAL, Operation.NOT_EQUAL, Operation.NOT, Operation.AND,
+    Operation.LESS_EQUAL,
+    Operation.LESS,
+    Operation.EQUAL,
+    Operation.NOT_EQUAL,
+    Operation.NOT,
+    Operation.AND,
     Operation.OR,
-)  # fmt: skip
+)
 
 
 class Tape:
-    """Instruction list under construction, with elimination of common subexpressions and trivial products."""
+    """Instruction list under construction, with elimination of common subexpressions and trivial
+    products.
+    """
 
     def __init__(self, body: Iterable[Instruction]) -> None:
         self.body = list(body)
@@ -58,7 +66,9 @@ class Tape:
         return ("c", -a[1]) if a[0] == "c" else self.put(Operation.NEGATE, a)
 
     def times(self, a: Operand, b: Operand) -> Operand:
-        """a b; a product with a condition is a mask, so that an infinite slope in an unselected branch is masked."""
+        """a b; a product with a condition is a mask, so that an infinite slope in an unselected
+        branch is masked.
+        """
         if b[0] == "c" or (a[0] != "c" and b in self._masks):
             a, b = b, a
         if a[0] == b[0] == "c":
@@ -124,30 +134,41 @@ _RULES: dict[Operation, Rule] = {
     Operation.MASK: lambda t, x, r: (ZERO, x[0]),
     Operation.SELECT: lambda t, x, r: (ZERO, x[0], t.put(Operation.NOT, x[0])),
     Operation.ASSIGN: lambda t, x, r: (ONE,),
-    **{operation: lambda t, x, r: (ZERO,) * len(x) for operation in (*_CONDITIONS, Operation.SIGN, Operation.FLOOR)},
-}  # fmt: skip
+    **{
+        operation: lambda t, x, r: (ZERO,) * len(x)
+        for operation in (*_CONDITIONS, Operation.SIGN, Operation.FLOOR)
+    },
+}
 
 
 def derivatives(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]) -> list[Row]:
-    """The derivatives of results with respect to inputs, whose instructions are appended to the tape.
+    """The derivatives of results with respect to inputs, whose instructions are appended to the
+    tape.
 
-    Vertices of equal cost are eliminated in the order of the instructions or in reverse order, whichever requires fewer
-    operations. Raises TraceError for an operation without a differentiation rule.
+    Vertices of equal cost are eliminated in the order of the instructions or in reverse order,
+    whichever requires fewer operations. Raises TraceError for an operation without a
+    differentiation rule.
     """
     tries = [Tape(tape.body), Tape(tape.body)]
-    candidates = [_eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)]
+    candidates = [
+        _eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)
+    ]
     best = min((0, 1), key=lambda i: len(tries[i].body))
     vars(tape).update(vars(tries[best]))
     return candidates[best]
 
 
-def nonzeros(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]) -> dict[tuple[int, int], Operand]:
+def nonzeros(
+    tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]
+) -> dict[tuple[int, int], Operand]:
     """The derivatives of results with respect to inputs that are not zero, by row and column."""
     rows = derivatives(tape, results, inputs)
     return {(i, j): row[x] for i, row in enumerate(rows) for j, x in enumerate(inputs) if x in row}
 
 
-def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand], sign: int) -> list[Row]:
+def _eliminated(
+    tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand], sign: int
+) -> list[Row]:
     into, out = _graph(tape, set(results), set(inputs))
     ends = {("end", i): r for i, r in enumerate(results)}
     for end, result in ends.items():
@@ -165,13 +186,16 @@ def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
         current = heapq.heappop(queue)
         vertex = current[2]
         if vertex in into and current == entry(vertex):
-            row, targets = into.pop(vertex), sorted(out.pop(vertex, ()), key=str)
+            row = into.pop(vertex)
+            targets = sorted(out.pop(vertex, ()), key=str)
             for source in row:
                 out[source].discard(vertex)
             for target in targets:
                 factor = into[target].pop(vertex)
                 for source, partial in row.items():
-                    into[target][source] = tape.add(into[target].get(source, ZERO), tape.times(factor, partial))
+                    into[target][source] = tape.add(
+                        into[target].get(source, ZERO), tape.times(factor, partial)
+                    )
                     out[source].add(target)
             for changed in {*row, *targets}:
                 if changed in order and changed in into:
@@ -182,8 +206,11 @@ def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
 def _graph(
     tape: Tape, results: set[Operand], inputs: set[Operand]
 ) -> tuple[dict[Operand, Row], dict[Operand, set[Operand]]]:
-    """Incoming edges of every vertex that depends on an input and affects a result, and the successors of each."""
-    moved, needed = set(inputs), set(results)
+    """Incoming edges of every vertex that depends on an input and affects a result, and the
+    successors of each.
+    """
+    moved = set(inputs)
+    needed = set(results)
     lines = list(tape.body)
     for line in lines:
         if any(a in moved for a in line.arguments):
@@ -196,7 +223,8 @@ def _graph(
         needed.update(line.arguments)
         if line.operation not in _RULES:
             raise TraceError(
-                f"operation {line.operation.name} has no derivative; write the law over airmuscle.core.ops."
+                f"operation {line.operation.name} has no derivative; write the law over"
+                " airmuscle.core.ops."
             )
         row: Row = {}
         partials = _RULES[line.operation](tape, line.arguments, line.result)

@@ -1,4 +1,6 @@
-"""Scheduling of instructions and conditional blocks: each after its operands and as late as possible."""
+"""Scheduling of instructions and conditional blocks: each after its operands and as late as
+possible.
+"""
 
 import dataclasses
 import heapq
@@ -12,7 +14,9 @@ Gates = tuple[Operand, ...]
 
 @dataclasses.dataclass(frozen=True)
 class ConditionalBlock:
-    """Instructions that are skipped if all gates are zero, and the values of their results in that case."""
+    """Instructions that are skipped if all gates are zero, and the values of their results in that
+    case.
+    """
 
     gates: Gates
     body: tuple[Instruction, ...]
@@ -25,17 +29,20 @@ _Piece = tuple[Gates, bool]
 
 @dataclasses.dataclass(frozen=True)
 class IndependentGroup:
-    """Results that need not be computed if their gates are zero, and their known values in that case."""
+    """Results that need not be computed if their gates are zero, and their known values in that
+    case.
+    """
 
     gates: dict[Operand, Gates]
     instead: dict[Operand, Operand]
 
 
 def in_order(code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> list[Item]:
-    """All instructions in their original order as far as operands permit; a block directly precedes its first use.
+    """All instructions in their original order as far as operands permit; a block directly precedes
+    its first use.
 
-    A value that is computed long before its use would be spilled to memory. Instructions in `early` do not share a
-    block with others.
+    A value that is computed long before its use would be spilled to memory. Instructions in `early`
+    do not share a block with others.
     """
     items = _Pieces(code, apart, early).items()
     owner = {result: k for k, item in enumerate(items) for result in _results(item)}
@@ -66,12 +73,17 @@ def _results(item: Item) -> list[Operand]:
 def _needs(item: Item) -> Iterable[Operand]:
     if isinstance(item, Instruction):
         return item.arguments
-    return [*item.gates, *(v for _, v in item.instead), *(a for line in item.body for a in line.arguments)]
+    return [
+        *item.gates,
+        *(v for _, v in item.instead),
+        *(a for line in item.body for a in line.arguments),
+    ]
 
 
 def _turns(code: Code, items: Sequence[Item]) -> list[float]:
-    """Priority of each item: the original position of an instruction, the position before the first use of a block;
-    calls of the C library come first, because values in registers do not survive them."""
+    """Priority of each item: the original position of an instruction, the position before the first
+    use of a block; calls of the C library come first, because values in registers do not survive
+    them."""
     place = {line.result: k for k, line in enumerate(code.body)}
     first: dict[Operand, int] = {}
     for k, line in enumerate(code.body):
@@ -83,7 +95,9 @@ def _turns(code: Code, items: Sequence[Item]) -> list[float]:
             turns.append(-1.0 if item.operation in CALLED else float(place[item.result]))
         else:
             last = place[item.body[-1].result]
-            turns.append(min((first.get(result, last) for result, _ in item.instead), default=last) - 0.5)
+            turns.append(
+                min((first.get(result, last) for result, _ in item.instead), default=last) - 0.5
+            )
     return turns
 
 
@@ -91,7 +105,9 @@ class _Pieces:
     """Partition of the conditional results into as few blocks as their dependences allow."""
 
     def __init__(self, code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> None:
-        self._code, self._apart, self._early = code, apart, early
+        self._code = code
+        self._apart = apart
+        self._early = early
         self._wanted = {operand for _, _, operand in code.outputs} | set(apart.instead.values())
         self._wanted.update(gate for gates in apart.gates.values() for gate in gates)
         self._users: dict[Operand, list[Operand]] = {}
@@ -123,10 +139,12 @@ class _Pieces:
                     self._pending.discard(line.result)
                 else:
                     waiting.append(line)
-            straight, ready = waiting, self._ready(pieces)
+            straight = waiting
+            ready = self._ready(pieces)
             if not ready and (straight or pieces):
                 raise TraceError(
-                    "the instructions have a cyclic dependence; this is an error in airmuscle, please report it."
+                    "the instructions have a cyclic dependence; this is an error in airmuscle,"
+                    " please report it."
                 )
             for piece, body in ready:
                 items.append(ConditionalBlock(piece[0], tuple(body), self._seen(body)))
@@ -135,10 +153,18 @@ class _Pieces:
             pieces = {piece: lines for piece, lines in pieces.items() if lines}
         return items
 
-    def _ready(self, pieces: dict[_Piece, list[Instruction]]) -> list[tuple[_Piece, list[Instruction]]]:
-        """The pieces that are executable completely; if there are none, the executable part of the first one."""
-        whole = [(piece, lines) for piece, lines in pieces.items() if self._is_executable(piece, lines)]
-        parts = whole or [(piece, part) for piece, lines in pieces.items() if (part := self._part(piece, lines))]
+    def _ready(
+        self, pieces: dict[_Piece, list[Instruction]]
+    ) -> list[tuple[_Piece, list[Instruction]]]:
+        """The pieces that are executable completely; if there are none, the executable part of the
+        first one.
+        """
+        whole = [
+            (piece, lines) for piece, lines in pieces.items() if self._is_executable(piece, lines)
+        ]
+        parts = whole or [
+            (piece, part) for piece, lines in pieces.items() if (part := self._part(piece, lines))
+        ]
         parts.sort(key=lambda entry: self._place[entry[1][0].result])
         return whole or parts[:1]
 
@@ -148,7 +174,11 @@ class _Pieces:
             return False
         own: set[Operand] = set()
         for line in lines:
-            for operand in (*piece[0], self._instead(line), *(a for a in line.arguments if a not in own)):
+            for operand in (
+                *piece[0],
+                self._instead(line),
+                *(a for a in line.arguments if a not in own),
+            ):
                 if operand in self._pending:
                     self._blockers[piece] = operand
                     return False
@@ -160,7 +190,9 @@ class _Pieces:
         own: set[Operand] = set()
         part = []
         for line in lines:
-            if self._pending.isdisjoint((*piece[0], self._instead(line), *(a for a in line.arguments if a not in own))):
+            if self._pending.isdisjoint(
+                (*piece[0], self._instead(line), *(a for a in line.arguments if a not in own))
+            ):
                 own.add(line.result)
                 part.append(line)
         return part
@@ -170,7 +202,9 @@ class _Pieces:
         return self._apart.instead.get(line.result, ZERO)
 
     def _seen(self, body: Sequence[Instruction]) -> tuple[tuple[Operand, Operand], ...]:
-        """The results of a block that other instructions use, with their values if the block is skipped."""
+        """The results of a block that other instructions use, with their values if the block is
+        skipped.
+        """
         own = {line.result for line in body}
         return tuple(
             (line.result, self._apart.instead.get(line.result, ZERO))

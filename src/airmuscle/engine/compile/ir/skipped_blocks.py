@@ -1,12 +1,13 @@
 """Sparsity from zero factors: conditional evaluation of instructions that are multiplied by zero.
 
-A *gate* is such a factor: a value that depends on the commands only, the distance of a value from its clamping
-interval, or the condition of a selection. If the gate is zero (a clamped value then equals the unclamped value, and the
-related comparisons have known results), some results are known without evaluation, and the instructions that only they
-use are redundant. These instructions are collected in blocks that a branch skips.
+A *gate* is such a factor: a value that depends on the commands only, the distance of a value from
+its clamping interval, or the condition of a selection. If the gate is zero (a clamped value then
+equals the unclamped value, and the related comparisons have known results), some results are known
+without evaluation, and the instructions that only they use are redundant. These instructions are
+collected in blocks that a branch skips.
 
-Evaluation with and without the branch gives the same values, except where a skipped value is not finite: its product
-with zero would be NaN and is zero here.
+Evaluation with and without the branch gives the same values, except where a skipped value is not
+finite: its product with zero would be NaN and is zero here.
 """
 
 import dataclasses
@@ -17,34 +18,67 @@ from .scheduling import Gates, IndependentGroup, Item, in_order
 
 STEADY, COMMANDED, VARYING = range(3)
 """Dependence of a value: on parameters only, on commands (and parameters) only, or on states."""
-WORTH, WORTH_OF_CHOICES = 8, 30
-"""Least cost of the skipped operations for which a branch saves time; greater for conditions on states (measured)."""
+WORTH = 8
+WORTH_OF_CHOICES = 30
+"""Least cost of the skipped operations for which a branch saves time; greater for conditions on
+states (measured).
+"""
 _SLOW = {Operation.DIVIDE, Operation.INVERSE, Operation.SQRT}
 _SIMPLE = {
-    Operation.ADD, Operation.SUBTRACT, Operation.MULTIPLY, Operation.NEGATE, Operation.SQUARE, Operation.TWICE,
-    Operation.ABS, Operation.LESS_EQUAL, Operation.LESS, Operation.EQUAL, Operation.NOT_EQUAL, Operation.NOT,
-    Operation.AND, Operation.OR, Operation.MASK, Operation.ASSIGN, Operation.FMIN, Operation.FMAX, Operation.SELECT,
-    Operation.MAXIMUM, Operation.MINIMUM,
-}  # fmt: skip
-_KEEP_ZERO = (Operation.NEGATE, Operation.SQUARE, Operation.TWICE, Operation.ABS, Operation.SQRT, Operation.ASSIGN)
+    Operation.ADD,
+    Operation.SUBTRACT,
+    Operation.MULTIPLY,
+    Operation.NEGATE,
+    Operation.SQUARE,
+    Operation.TWICE,
+    Operation.ABS,
+    Operation.LESS_EQUAL,
+    Operation.LESS,
+    Operation.EQUAL,
+    Operation.NOT_EQUAL,
+    Operation.NOT,
+    Operation.AND,
+    Operation.OR,
+    Operation.MASK,
+    Operation.ASSIGN,
+    Operation.FMIN,
+    Operation.FMAX,
+    Operation.SELECT,
+    Operation.MAXIMUM,
+    Operation.MINIMUM,
+}
+_KEEP_ZERO = (
+    Operation.NEGATE,
+    Operation.SQUARE,
+    Operation.TWICE,
+    Operation.ABS,
+    Operation.SQRT,
+    Operation.ASSIGN,
+)
 _CHOICES = (Operation.MASK, Operation.SELECT)
 _EXTREMES = (Operation.MAXIMUM, Operation.MINIMUM)
 
 
 @dataclasses.dataclass(frozen=True)
 class _Case:
-    """Gates, the results that are known if all of them are zero, and the least cost of skipped operations."""
+    """Gates, the results that are known if all of them are zero, and the least cost of skipped
+    operations.
+    """
 
     gates: Gates
     facts: Mapping[Operand, Operand] = dataclasses.field(default_factory=dict)
     worth: int = dataclasses.field(default_factory=lambda: WORTH)
 
 
-def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Operand] = frozenset()) -> list[Item]:
-    """The instructions of `code` in an executable order, with those that a zero gate makes redundant in blocks.
+def skipping(
+    code: Code, level: Callable[[Operand], int], early: frozenset[Operand] = frozenset()
+) -> list[Item]:
+    """The instructions of `code` in an executable order, with those that a zero gate makes
+    redundant in blocks.
 
-    `level` classifies an input: STEADY, COMMANDED or VARYING. A result that depends on commands and on no varying
-    input may be a gate. Instructions in `early` do not share a block with others, so that they can be executed first.
+    `level` classifies an input: STEADY, COMMANDED or VARYING. A result that depends on commands and
+    on no varying input may be a gate. Instructions in `early` do not share a block with others, so
+    that they can be executed first.
     """
     search = _Search(code, early)
     for case in _cases(code.body, _Comparisons(code.body), level):
@@ -59,7 +93,13 @@ def _cases(
     levels: dict[Operand, int] = {}
 
     def of(operand: Operand) -> int:
-        return levels[operand] if operand in levels else STEADY if operand[0] == "c" else level(operand)
+        return (
+            levels[operand]
+            if operand in levels
+            else STEADY
+            if operand[0] == "c"
+            else level(operand)
+        )
 
     commands: dict[Operand, None] = {}
     clamps: list[_Case] = []
@@ -83,14 +123,19 @@ class _Comparisons:
 
     def __init__(self, body: Sequence[Instruction]) -> None:
         self._line = {line.result: line for line in body}
-        self._not_above = {line.arguments: line.result for line in body if line.operation == Operation.LESS_EQUAL}
-        self._below = {line.arguments: line.result for line in body if line.operation == Operation.LESS}
+        self._not_above = {
+            line.arguments: line.result for line in body if line.operation == Operation.LESS_EQUAL
+        }
+        self._below = {
+            line.arguments: line.result for line in body if line.operation == Operation.LESS
+        }
 
     def inside(self, difference: Instruction) -> list[_Case]:
-        """The case of a value within its clamping interval, if `difference` is a value minus its clamped value.
+        """The case of a value within its clamping interval, if `difference` is a value minus its
+        clamped value.
 
-        Then low <= high for each of some pairs; high <= low remains undetermined, because both may be equal: such a
-        comparison becomes a further gate.
+        Then low <= high for each of some pairs; high <= low remains undetermined, because both may
+        be equal: such a comparison becomes a further gate.
         """
         for number, clamped in (difference.arguments, difference.arguments[::-1]):
             facts: dict[Operand, Operand] = {}
@@ -99,13 +144,20 @@ class _Comparisons:
                 line = self._line.get(clamped)
                 if line is None or line.operation not in _EXTREMES:
                     break
-                near = [number] if number in line.arguments else [a for a in line.arguments if a in self._line]
+                near = (
+                    [number]
+                    if number in line.arguments
+                    else [a for a in line.arguments if a in self._line]
+                )
                 if not near:
                     break
                 inner = near[0]
                 bound = line.arguments[line.arguments[0] == inner]
-                ordered.append((bound, inner) if line.operation == Operation.MAXIMUM else (inner, bound))
-                facts[clamped], clamped = number, inner
+                ordered.append(
+                    (bound, inner) if line.operation == Operation.MAXIMUM else (inner, bound)
+                )
+                facts[clamped] = number
+                clamped = inner
             if facts and clamped == number:
                 further: dict[Operand, Operand] = {}
                 for low, high in ordered:
@@ -140,8 +192,13 @@ class _Search:
         """
         if any(gate in self.apart.gates for gate in case.gates):
             return
-        needed = {*case.gates, *(operand for operand, value in case.facts.items() if value[0] != "c")}
-        ahead = frozenset() if self._early.issuperset(case.gates) else self._early  # they cannot wait for a gate
+        needed = {
+            *case.gates,
+            *(operand for operand, value in case.facts.items() if value[0] != "c"),
+        }
+        ahead = (
+            frozenset() if self._early.issuperset(case.gates) else self._early
+        )  # they cannot wait for a gate
         superfluous, instead = self._superfluous(self._known(case), self._kept | needed | ahead)
         if sum(_cost(self._line[operand]) for operand in superfluous) >= case.worth:
             self._kept |= needed
@@ -164,13 +221,19 @@ class _Search:
     def _superfluous(
         self, known: Mapping[Operand, Operand], kept: set[Operand]
     ) -> tuple[set[Operand], dict[Operand, Operand]]:
-        """Redundant results, none of `kept`, given the known ones; the known values of those that others use."""
+        """Redundant results, none of `kept`, given the known ones; the known values of those that
+        others use.
+        """
         times: dict[Operand, int] = {}
 
         def asked(operand: Operand, more: int = 0) -> int:
             """Number of uses of a result by instructions that are not redundant."""
             if operand not in times:
-                times[operand] = len(self._users.get(operand, ())) + (operand in kept) + (operand in self._outputs)
+                times[operand] = (
+                    len(self._users.get(operand, ()))
+                    + (operand in kept)
+                    + (operand in self._outputs)
+                )
             times[operand] += more
             return times[operand]
 
@@ -192,7 +255,9 @@ class _Search:
         return superfluous, {o: v for o, v in named.items() if asked(o)}
 
     def _worth_naming(self, operand: Operand, value: Operand) -> bool:
-        """Whether a known result is useful: a sum that equals one of its terms is cheaper to compute."""
+        """Whether a known result is useful: a sum that equals one of its terms is cheaper to
+        compute.
+        """
         if operand not in self._line or operand in self.apart.gates:
             return False
         return value[0] == "c" or self._line[operand].operation == Operation.SELECT
@@ -203,8 +268,11 @@ def _cost(line: Instruction) -> int:
 
 
 def _value(operation: Operation, x: Sequence[Operand]) -> Operand | None:
-    """The result of an operation if it is a constant or an operand for any value of the others; else None."""
-    zero, one = ZERO in x, ONE in x
+    """The result of an operation if it is a constant or an operand for any value of the others;
+    else None.
+    """
+    zero = ZERO in x
+    one = ONE in x
     if operation in (Operation.MULTIPLY, Operation.AND):
         return ZERO if zero else x[x[0] == ONE] if one else None
     if operation == Operation.ADD:

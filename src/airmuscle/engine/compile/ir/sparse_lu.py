@@ -1,7 +1,8 @@
 """Symbolic sparse factorisation L D U of d I - J without pivoting; L and U have unit diagonals.
 
-With unit diagonals, the two substitutions are separated by one multiplication by 1/D, which is independent for all
-states: the latency of a solution is determined by the longest chain of dependent operations, not by their number.
+With unit diagonals, the two substitutions are separated by one multiplication by 1/D, which is
+independent for all states: the latency of a solution is determined by the longest chain of
+dependent operations, not by their number.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,20 +14,25 @@ Place = tuple[int, int]
 def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
     """The distinct expressions as one vector, and the index of each given expression in it.
 
-    A system with its sensitivities has equal diagonal blocks: they are computed and factorised once.
+    A system with its sensitivities has equal diagonal blocks: they are computed and factorised
+    once.
     """
     import casadi
 
     merged = casadi.cse(casadi.vertcat(*expressions)) if expressions else casadi.SX(0, 1)
     first: dict[int, int] = {}
-    slots = tuple(first.setdefault(merged[i].element_hash(), len(first)) for i in range(len(expressions)))
+    slots = tuple(
+        first.setdefault(merged[i].element_hash(), len(first)) for i in range(len(expressions))
+    )
     return casadi.vertcat(*(merged[slots.index(k)] for k in range(len(first)))), slots
 
 
 class Factors:
-    """The factors of d I - J; `places` are the non-zero elements of J, `slots` the indices of their distinct values.
+    """The factors of d I - J; `places` are the non-zero elements of J, `slots` the indices of their
+    distinct values.
 
-    `values` are the distinct factors as expressions of `d` and of the symbols `j` of the distinct values of J.
+    `values` are the distinct factors as expressions of `d` and of the symbols `j` of the distinct
+    values of J.
     """
 
     def __init__(self, places: Sequence[Place], slots: Sequence[int], size: int) -> None:
@@ -44,7 +50,8 @@ class Factors:
     def solved(self, factors: Any, right: Sequence[Any]) -> list[Any]:
         """x with (d I - J) x = right; `factors[k]` is the k-th of the distinct factors."""
         at = {place: factors[slot] for place, slot in self._slots.items()}
-        x, order = list(right), self.order
+        x = list(right)
+        order = self.order
         for n, i in enumerate(order):
             for k in order[:n]:
                 if (i, k) in at:
@@ -58,7 +65,9 @@ class Factors:
 
 
 def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
-    """Replace the matrix by L below the diagonal (in the given order), U above it, and the inverse of D on it."""
+    """Replace the matrix by L below the diagonal (in the given order), U above it, and the inverse
+    of D on it.
+    """
     import casadi
 
     for n, k in enumerate(order):
@@ -76,8 +85,9 @@ def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
 
 
 def _order(places: Iterable[Place], size: int) -> tuple[int, ...]:
-    """The order of elimination: the state with the smallest possible fill-in (Markowitz criterion), then with the
-    shortest chain of eliminations before it, so that independent ones run in parallel."""
+    """The order of elimination: the state with the smallest possible fill-in (Markowitz criterion),
+    then with the shortest chain of eliminations before it, so that independent ones run in
+    parallel."""
     rows = [{j for i, j in places if i == k and j != k} for k in range(size)]
     columns = [{i for i, j in places if j == k and i != k} for k in range(size)]
     depth, left, order = [0] * size, set(range(size)), []

@@ -1,4 +1,6 @@
-"""Kernels in languages of braces, C99 (C++ too) and JavaScript; variables are declared at their first assignment."""
+"""Kernels in languages of braces, C99 (C++ too) and JavaScript; variables are declared at their
+first assignment.
+"""
 
 import abc
 import ast
@@ -11,16 +13,25 @@ from .types import ElementType, TypedKernel, pairs, stored_names
 _JAVASCRIPT_KEYWORDS = """
 arguments await break case catch class const continue debugger default delete do else enum eval export extends
 finally for function if implements import in instanceof interface let new null package private protected public
-return static super switch this throw try typeof undefined var void while with yield"""
+return static super switch this throw try typeof undefined var void while with yield"""  # noqa: E501
 _C_KEYWORDS = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register
 restrict return short signed sizeof static struct switch typedef union unsigned void volatile while new delete class
-this template typename private public protected operator namespace using try catch throw virtual friend"""
-_NAMES = {"abs": "fabs", "np.ceil": "ceil", "np.floor": "floor", "np.sqrt": "sqrt", "np.exp": "exp", "np.log": "log"}
+this template typename private public protected operator namespace using try catch throw virtual friend"""  # noqa: E501
+_NAMES = {
+    "abs": "fabs",
+    "np.ceil": "ceil",
+    "np.floor": "floor",
+    "np.sqrt": "sqrt",
+    "np.exp": "exp",
+    "np.log": "log",
+}
 
 
 class BraceKernels(KernelPrinter):
-    """Kernels in a language of braces; a subclass states how it declares variables and passes results."""
+    """Kernels in a language of braces; a subclass states how it declares variables and passes
+    results.
+    """
 
     counter: str
     """How the counter of a loop is declared."""
@@ -29,14 +40,24 @@ class BraceKernels(KernelPrinter):
 
     @abc.abstractmethod
     def declaration(self, name: str, constant: bool) -> str:
-        """What stands before the first assignment of a variable, which is the only one of a constant."""
+        """What stands before the first assignment of a variable, which is the only one of a
+        constant.
+        """
 
     def begin(self) -> None:
-        """Find where local variables are declared: at the first assignment, if its block contains every use."""
+        """Find where local variables are declared: at the first assignment, if its block contains
+        every use.
+        """
         source = self.source
         stored = list(stored_names(source.body))
-        loops = {ast.unparse(node.target) for node in ast.walk(source.node) if isinstance(node, ast.For)}
-        local = [name for name in dict.fromkeys(stored) if name not in source.arguments and name not in loops]
+        loops = {
+            ast.unparse(node.target) for node in ast.walk(source.node) if isinstance(node, ast.For)
+        }
+        local = [
+            name
+            for name in dict.fromkeys(stored)
+            if name not in source.arguments and name not in loops
+        ]
         self._places = {name: _place(name, source.body) for name in local}
         self.early = [name for name, node in self._places.items() if node is None]
         """The variables that are declared at the beginning of the function."""
@@ -52,7 +73,10 @@ class BraceKernels(KernelPrinter):
         return self.name(array.id) + "".join(f"[{self.expression(index)}]" for index in at)
 
     def conditional(self, node: ast.IfExp) -> str:
-        return f"{self.expression(node.test, 1)} ? {self.expression(node.body, 1)} : {self.expression(node.orelse)}"
+        return (
+            f"{self.expression(node.test, 1)} ? {self.expression(node.body, 1)} :"
+            f" {self.expression(node.orelse)}"
+        )
 
     def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
         left = self.expression(target)
@@ -64,8 +88,15 @@ class BraceKernels(KernelPrinter):
     def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
         [line] = super().call_lines(call, targets, node)
         early = targets if self.joins_results and len(targets) > 1 else targets[1:]
-        before = [f"{text}{self.expression(t)};" for t in early if (text := self.declared(t, node, constant=False))]
-        return [*before, "".join(self.declared(t, node) for t in targets[: len(targets) - len(early)]) + line]
+        before = [
+            f"{text}{self.expression(t)};"
+            for t in early
+            if (text := self.declared(t, node, constant=False))
+        ]
+        return [
+            *before,
+            "".join(self.declared(t, node) for t in targets[: len(targets) - len(early)]) + line,
+        ]
 
     def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
         return f"{self.prefix}{name}({self.joined(given)});"
@@ -80,14 +111,18 @@ def _mentions(name: str, node: ast.AST) -> bool:
 
 
 def _place(name: str, block: Sequence[ast.stmt]) -> ast.stmt | None:
-    """The statement of a block, or of a block within it, that declares a variable; None if there is none."""
+    """The statement of a block, or of a block within it, that declares a variable; None if there is
+    none.
+    """
     first, *others = [node for node in block if _mentions(name, node)]
     if isinstance(first, ast.Assign):
         targets = [target.id for target, _ in pairs(first) if isinstance(target, ast.Name)]
         return first if name in targets and not _mentions(name, first.value) else None
     if others or not isinstance(first, ast.If | ast.While | ast.For):
         return None
-    inner = [part for part in (first.body, first.orelse) if any(_mentions(name, node) for node in part)]
+    inner = [
+        part for part in (first.body, first.orelse) if any(_mentions(name, node) for node in part)
+    ]
     head = first.iter if isinstance(first, ast.For) else first.test
     return None if _mentions(name, head) or len(inner) > 1 else _place(name, inner[0])
 
@@ -95,18 +130,24 @@ def _place(name: str, block: Sequence[ast.stmt]) -> ast.stmt | None:
 class CKernels(BraceKernels):
     """Kernels in C; the first result is that of the function, the others are written to pointers.
 
-    shapes  sizes of the arrays of several dimensions, by the names of the arguments: ("", "CAPACITY")
-    prefix  beginning of the names of the functions of the system
-    number  type of all numbers, double or float
+    shapes  sizes of the arrays of several dimensions, by the names of the arguments: ("",
+    "CAPACITY") prefix  beginning of the names of the functions of the system number  type of all
+    numbers, double or float
     """
 
     reserved = frozenset(_C_KEYWORDS.split())
     spelling: dict[type, str] = {}  # noqa: RUF012
-    remark, counter = "/* {} */", "int"
-    infinity, flags = "HUGE_VAL", ("0", "1")
+    remark = "/* {} */"
+    counter = "int"
+    infinity = "HUGE_VAL"
+    flags = ("0", "1")
 
-    def __init__(self, shapes: Mapping[str, Sequence[str]], prefix: str = "", number: str = "double") -> None:
-        self.shapes, self.prefix, self.type = shapes, prefix, number
+    def __init__(
+        self, shapes: Mapping[str, Sequence[str]], prefix: str = "", number: str = "double"
+    ) -> None:
+        self.shapes = shapes
+        self.prefix = prefix
+        self.type = number
         self.suffix = "f" if number == "float" else ""
 
     def declaration(self, name: str, constant: bool) -> str:
@@ -117,21 +158,36 @@ class CKernels(BraceKernels):
         return f"static const {kind} {name} = {self.number(value) if kind == self.type else value};"
 
     def comment(self, lines: Sequence[str]) -> list[str]:
-        return ["/* " + "\n   ".join(lines).rstrip().replace("\n   \n", "\n\n") + " */"] if lines else []
+        return (
+            ["/* " + "\n   ".join(lines).rstrip().replace("\n   \n", "\n\n") + " */"]
+            if lines
+            else []
+        )
 
     def head(self) -> list[str]:
-        kernel, returned = self.kernel, self.kernel.returns
+        kernel = self.kernel
+        returned = self.kernel.returns
         given = [self._argument(name) for name in kernel.arguments]
         given += [f"{self._type(kind)} *{self._out(i)}" for i, kind in enumerate(returned) if i]
-        text = f"static {self._type(returned[0]) if returned else 'void'} {kernel.source.name}({', '.join(given)})"
-        return [text, "{", *(f"  {self.declaration(name, False)}{self.name(name)};" for name in self.early)]
+        text = (
+            f"static {self._type(returned[0]) if returned else 'void'}"
+            f" {kernel.source.name}({', '.join(given)})"
+        )
+        return [
+            text,
+            "{",
+            *(f"  {self.declaration(name, False)}{self.name(name)};" for name in self.early),
+        ]
 
     def _argument(self, name: str) -> str:
         kind = self.kernel.kinds[name]
         if not kind.rank:
             return f"{self._type(kind.scalar)} {self.name(name)}"
         if kind.rank == 1:
-            return f"{'' if name in self.kernel.written else 'const '}{self._type(kind.scalar)} *{self.name(name)}"
+            return (
+                f"{'' if name in self.kernel.written else 'const '}{self._type(kind.scalar)}"
+                f" *{self.name(name)}"
+            )
         if len(self.shapes.get(name, ())) != kind.rank:
             raise self.source.unprintable(self.source.node, f"the array '{name}' without a shape")
         widths = "".join(f"[{width}]" for width in self.shapes[name][1:])
@@ -151,7 +207,9 @@ class CKernels(BraceKernels):
         try:
             return self.shapes[array][dimension] or self.shapes[array][-1]
         except (KeyError, IndexError):
-            raise self.source.unprintable(self.source.node, f"the size of '{array}' without a shape") from None
+            raise self.source.unprintable(
+                self.source.node, f"the size of '{array}' without a shape"
+            ) from None
 
     def call(self, name: str, arguments: Sequence[ast.expr]) -> str:
         if name == "int":
@@ -160,7 +218,7 @@ class CKernels(BraceKernels):
         if name in {"min", "max"}:
             return self._extreme(name, arguments, numbers)
         own = "" if name in self.kernel.calls or (name == "abs" and not numbers) else self.suffix
-        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}{own}({self.joined(arguments)})"
+        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}{own}({self.joined(arguments)})"  # noqa: E501
 
     def _extreme(self, name: str, arguments: Sequence[ast.expr], numbers: bool) -> str:
         first, *others = arguments
@@ -174,8 +232,12 @@ class CKernels(BraceKernels):
         a, b = (self.expression(each, 5) for each in arguments)
         return f"({a} {'<' if name == 'min' else '>'} {b} ? {a} : {b})"
 
-    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
-        values = [given.get(name, name) for name in kernel.arguments] + [f"&{name}" for name in results[1:]]
+    def called_with(
+        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+    ) -> str:
+        values = [given.get(name, name) for name in kernel.arguments] + [
+            f"&{name}" for name in results[1:]
+        ]
         return f"{f'{results[0]} = ' if results else ''}{kernel.source.name}({', '.join(values)});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
@@ -183,16 +245,22 @@ class CKernels(BraceKernels):
         return self.lines(f"{self.type} {', '.join(texts)};") if texts else ""
 
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
-        lines = [f"*{self._out(i)} = {self.expression(value)};" for i, value in enumerate(values) if i]
+        lines = [
+            f"*{self._out(i)} = {self.expression(value)};" for i, value in enumerate(values) if i
+        ]
         return [*lines, f"return {self.expression(values[0])};"] if values else ["return;"]
 
 
 class JavaScriptKernels(BraceKernels):
-    """Kernels in JavaScript; several results are an array, and an array of two dimensions is an array of rows."""
+    """Kernels in JavaScript; several results are an array, and an array of two dimensions is an
+    array of rows.
+    """
 
     reserved = frozenset(_JAVASCRIPT_KEYWORDS.split())
     spelling: dict[type, str] = {ast.Eq: "===", ast.NotEq: "!=="}  # noqa: RUF012
-    infinity, counter, joins_results = "Infinity", "let", True
+    infinity = "Infinity"
+    counter = "let"
+    joins_results = True
 
     def declaration(self, name: str, constant: bool) -> str:
         return "const " if constant else "let "
@@ -207,7 +275,10 @@ class JavaScriptKernels(BraceKernels):
 
     def head(self) -> list[str]:
         early = [f"  let {', '.join(map(self.name, self.early))};"] if self.early else []
-        return [f"function {self.source.name}({', '.join(map(self.name, self.kernel.arguments))}) {{", *early]
+        return [
+            f"function {self.source.name}({', '.join(map(self.name, self.kernel.arguments))}) {{",
+            *early,
+        ]
 
     def size(self, array: str, dimension: int) -> str:
         return f"{self.name(array)}{'[0]' * dimension}.length"
@@ -216,9 +287,15 @@ class JavaScriptKernels(BraceKernels):
         usual = "Math.trunc" if name == "int" else f"Math.{name.removeprefix('np.')}"
         return f"{name if name in self.kernel.calls else usual}({self.joined(arguments)})"
 
-    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+    def called_with(
+        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+    ) -> str:
         values = ", ".join(given.get(name, name) for name in kernel.arguments)
-        left = f"[{', '.join(results)}] = " if len(results) > 1 else "".join(f"{result} = " for result in results)
+        left = (
+            f"[{', '.join(results)}] = "
+            if len(results) > 1
+            else "".join(f"{result} = " for result in results)
+        )
         return f"{left}{kernel.source.name}({values});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
@@ -231,4 +308,8 @@ class JavaScriptKernels(BraceKernels):
 
 
 def _zeros(size: str, *inner: str) -> str:
-    return f"Array.from({{length: {size}}}, () => {_zeros(*inner)})" if inner else f"new Float64Array({size})"
+    return (
+        f"Array.from({{length: {size}}}, () => {_zeros(*inner)})"
+        if inner
+        else f"new Float64Array({size})"
+    )

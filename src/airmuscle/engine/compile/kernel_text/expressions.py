@@ -9,18 +9,31 @@ from .source import KernelSource
 from .types import ElementType, TypedKernel, indices
 
 OPERATORS: dict[type, tuple[str, int]] = {
-    ast.Or: ("||", 1), ast.And: ("&&", 2), ast.Eq: ("==", 4), ast.NotEq: ("!=", 4), ast.Lt: ("<", 4),
-    ast.LtE: ("<=", 4), ast.Gt: (">", 4), ast.GtE: (">=", 4), ast.Add: ("+", 5), ast.Sub: ("-", 5), ast.Mult: ("*", 6),
+    ast.Or: ("||", 1),
+    ast.And: ("&&", 2),
+    ast.Eq: ("==", 4),
+    ast.NotEq: ("!=", 4),
+    ast.Lt: ("<", 4),
+    ast.LtE: ("<=", 4),
+    ast.Gt: (">", 4),
+    ast.GtE: (">=", 4),
+    ast.Add: ("+", 5),
+    ast.Sub: ("-", 5),
+    ast.Mult: ("*", 6),
     ast.Div: ("/", 6),
-}  # fmt: skip
+}
 """Operators with their precedence."""
-CONDITIONAL, NEGATION, ATOM = 0, 7, 9
+CONDITIONAL = 0
+NEGATION = 7
+ATOM = 9
 """Precedence of a conditional value, of signs, and of names, numbers and calls."""
 FUNCTIONS = {"min", "max", "abs", "sqrt", "np.ceil", "np.floor", "np.sqrt", "np.exp", "np.log"}
 
 
 class ExpressionPrinter(abc.ABC):
-    """Text of expressions of the function `kernel` in a language; a subclass states what its language writes."""
+    """Text of expressions of the function `kernel` in a language; a subclass states what its
+    language writes.
+    """
 
     kernel: TypedKernel
     source: KernelSource
@@ -41,7 +54,9 @@ class ExpressionPrinter(abc.ABC):
 
     @abc.abstractmethod
     def call(self, name: str, arguments: Sequence[ast.expr]) -> str:
-        """A call of one of FUNCTIONS, of `int`, or of a printed function with one result and no changed array."""
+        """A call of one of FUNCTIONS, of `int`, or of a printed function with one result and no
+        changed array.
+        """
 
     @abc.abstractmethod
     def conditional(self, node: ast.IfExp) -> str:
@@ -71,13 +86,17 @@ class ExpressionPrinter(abc.ABC):
             case ast.Subscript(value=ast.Name() as array):
                 return self.element(array, indices(node)), ATOM
             case ast.Subscript(
-                value=ast.Attribute(value=ast.Name(id=name), attr="shape"), slice=ast.Constant(value=int(k))
+                value=ast.Attribute(value=ast.Name(id=name), attr="shape"),
+                slice=ast.Constant(value=int(k)),
             ):
                 return self.size(name, k), ATOM
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return f"-{self.expression(operand, NEGATION)}", NEGATION
             case ast.UnaryOp(op=ast.Not(), operand=operand):
-                return f"{self.spelling.get(ast.Not, '!')}{self.expression(operand, NEGATION)}", NEGATION
+                return (
+                    f"{self.spelling.get(ast.Not, '!')}{self.expression(operand, NEGATION)}",
+                    NEGATION,
+                )
             case ast.BinOp() | ast.BoolOp() | ast.Compare():
                 return self._operation(node)
             case ast.IfExp():
@@ -115,7 +134,13 @@ class ExpressionPrinter(abc.ABC):
                 return self.call("pow", [node.left, node.right]), ATOM
             text, level = self._operator(node.op, node)
             text = self.operator(text, node.left, node.right)
-            return f"{self.expression(node.left, level)} {text} {self.expression(node.right, level + 1)}", level
+            return (
+                (
+                    f"{self.expression(node.left, level)} {text}"
+                    f" {self.expression(node.right, level + 1)}"
+                ),
+                level,
+            )
         if isinstance(node, ast.BoolOp):
             text, level = self._operator(node.op, node)
             return f" {text} ".join(self.expression(value, 3) for value in node.values), level
@@ -123,7 +148,9 @@ class ExpressionPrinter(abc.ABC):
         parts = []
         for operator, left, right in zip(node.ops, operands, operands[1:], strict=False):
             text, level = self._operator(operator, node)
-            if (self.kernel.of(left) == ElementType.FLAG) != (self.kernel.of(right) == ElementType.FLAG):
+            if (self.kernel.of(left) == ElementType.FLAG) != (
+                self.kernel.of(right) == ElementType.FLAG
+            ):
                 raise self.source.unprintable(node, "a comparison of a flag with a number")
             parts.append(f"{self.expression(left, 5)} {text} {self.expression(right, 5)}")
         return " && ".join(parts), 4 if len(parts) == 1 else 2
@@ -132,7 +159,9 @@ class ExpressionPrinter(abc.ABC):
         name = ast.unparse(node.func)
         called = self.kernel.calls.get(name)
         if called is not None and (called.written or len(called.returns) != 1):
-            raise self.source.unprintable(node, "a function with several results within an expression")
+            raise self.source.unprintable(
+                node, "a function with several results within an expression"
+            )
         if called is None and name not in FUNCTIONS and name != "int":
             raise self.source.unprintable(node, f"the function {name}")
         return self.call(name, node.args)

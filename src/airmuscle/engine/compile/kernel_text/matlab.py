@@ -1,4 +1,6 @@
-"""MATLAB text of kernels, which GNU Octave runs as well: functions that return the arrays that they change."""
+"""MATLAB text of kernels, which GNU Octave runs as well: functions that return the arrays that they
+change.
+"""
 
 import ast
 from collections.abc import Mapping, Sequence
@@ -8,26 +10,36 @@ from .types import TypedKernel, indices
 
 _KEYWORDS = """break case catch classdef continue do else elseif end end_try_catch end_unwind_protect endfor endfunction
 endif endswitch endwhile for function global if otherwise parfor persistent return spmd switch try until unwind_protect
-while"""
+while"""  # noqa: E501
 
 
 class MatlabKernels(KernelPrinter):
-    """Kernels in MATLAB; indices begin with 1, and an array of three dimensions is a row (cell array) of tables.
+    """Kernels in MATLAB; indices begin with 1, and an array of three dimensions is a row (cell
+    array) of tables.
 
-    shapes  sizes of arrays, by the names of the arguments: a loop over all elements of arrays of one size, which are
+    shapes  sizes of arrays, by the names of the arguments: a loop over all elements of arrays of
+    one size, which are
             columns, is printed as operations on whole arrays
     """
 
     reserved = frozenset(_KEYWORDS.split())
     spelling: dict[type, str] = {ast.NotEq: "~=", ast.Not: "~"}  # noqa: RUF012
-    branch, otherwise, close = "{} {}", "else", "end"
-    remark, end, continuation, infinity = "% {}", "", " ...", "Inf"
+    branch = "{} {}"
+    otherwise = "else"
+    close = "end"
+    remark = "% {}"
+    end = ""
+    continuation = " ..."
+    infinity = "Inf"
 
     def __init__(self, shapes: Mapping[str, Sequence[str]] | None = None) -> None:
         self.shapes = shapes or {}
 
     def begin(self) -> None:
-        self._counter, self._columns = "", set[str]()  # of a loop that is printed as operations on whole arrays
+        self._counter, self._columns = (
+            "",
+            set[str](),
+        )  # of a loop that is printed as operations on whole arrays
 
     def constants(self, kernels: dict[str, TypedKernel]) -> list[str]:
         return []  # a constant is a variable of the functions that use it
@@ -42,8 +54,13 @@ class MatlabKernels(KernelPrinter):
         results = self._results(self.kernel)
         names = results[0] if len(results) == 1 else f"[{', '.join(results)}]"
         given = ", ".join(map(self.name, self.kernel.arguments))
-        constants = [f"  {self.constant(name, value)}" for name, value in used_constants(self.kernel).items()]
-        return [f"function {f'{names} = ' if results else ''}{self.source.name}({given})", *constants]
+        constants = [
+            f"  {self.constant(name, value)}" for name, value in used_constants(self.kernel).items()
+        ]
+        return [
+            f"function {f'{names} = ' if results else ''}{self.source.name}({given})",
+            *constants,
+        ]
 
     def _results(self, kernel: TypedKernel) -> list[str]:
         """Names of the results of a function, and of the arrays that it changes."""
@@ -53,7 +70,11 @@ class MatlabKernels(KernelPrinter):
     def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
         rank = self.kernel.kinds[array.id].rank
         if self._counter and ast.unparse(at[-1]) == self._counter:
-            return self.name(array.id) if rank == 1 else f"{self.name(array.id)}({self._place(at[0])}, :)'"
+            return (
+                self.name(array.id)
+                if rank == 1
+                else f"{self.name(array.id)}({self._place(at[0])}, :)'"
+            )
         places = [self._place(index) for index in at]
         if rank == 3:
             rest = f"({', '.join([*places[1:], ':'][:2])})" if len(places) > 1 else ""
@@ -65,7 +86,9 @@ class MatlabKernels(KernelPrinter):
         match index:
             case ast.Constant(value=int(value)):
                 return str(value + shift)
-            case ast.BinOp(left=left, op=ast.Add() | ast.Sub() as sign, right=ast.Constant(value=int(value))):
+            case ast.BinOp(
+                left=left, op=ast.Add() | ast.Sub() as sign, right=ast.Constant(value=int(value))
+            ):
                 shift += value if isinstance(sign, ast.Add) else -value
                 index = left
         text = self.expression(index, 5)
@@ -74,8 +97,16 @@ class MatlabKernels(KernelPrinter):
     def size(self, array: str, dimension: int) -> str:
         rank = self.kernel.kinds[array].rank
         if rank == 3:
-            return f"size({self.name(array)}{{1}}, {dimension})" if dimension else f"numel({self.name(array)})"
-        return f"size({self.name(array)}, {dimension + 1})" if rank == 2 else f"numel({self.name(array)})"
+            return (
+                f"size({self.name(array)}{{1}}, {dimension})"
+                if dimension
+                else f"numel({self.name(array)})"
+            )
+        return (
+            f"size({self.name(array)}, {dimension + 1})"
+            if rank == 2
+            else f"numel({self.name(array)})"
+        )
 
     def call(self, name: str, arguments: Sequence[ast.expr]) -> str:
         if name in {"min", "max"} and len(arguments) > 2:
@@ -84,14 +115,19 @@ class MatlabKernels(KernelPrinter):
         return f"{name if name in self.kernel.calls else usual}({self.joined(arguments)})"
 
     def conditional(self, node: ast.IfExp) -> str:
-        raise self.source.unprintable(node, "a conditional value that does not stand alone in an assignment")
+        raise self.source.unprintable(
+            node, "a conditional value that does not stand alone in an assignment"
+        )
 
     def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
         if self._counter:
             return [self._assigned_columns(target, value, node)]
         if not isinstance(value, ast.IfExp):
             return [f"{self.expression(target)} = {self.expression(value)};"]
-        branches = [["  " + line for line in self.assign(target, v, node)] for v in (value.body, value.orelse)]
+        branches = [
+            ["  " + line for line in self.assign(target, v, node)]
+            for v in (value.body, value.orelse)
+        ]
         return [f"if {self.expression(value.test)}", *branches[0], "else", *branches[1], "end"]
 
     def _assigned_columns(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> str:
@@ -110,7 +146,7 @@ class MatlabKernels(KernelPrinter):
         return (names[0] if len(names) == 1 else f"[{', '.join(names)}]") + " = " if names else ""
 
     def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
-        return f"{self._left(list(map(self.expression, given[-results:])))}{name}({self.joined(given[:-results])});"
+        return f"{self._left(list(map(self.expression, given[-results:])))}{name}({self.joined(given[:-results])});"  # noqa: E501
 
     # Operations on whole arrays
 
@@ -123,8 +159,11 @@ class MatlabKernels(KernelPrinter):
         return lines
 
     def _is_elementwise(self, node: ast.For) -> bool:
-        """Whether a loop computes every element of columns of one size from the same elements of others."""
-        counter, sizes = ast.unparse(node.target), set()
+        """Whether a loop computes every element of columns of one size from the same elements of
+        others.
+        """
+        counter = ast.unparse(node.target)
+        sizes = set()
         for statement in node.body:
             if not isinstance(statement, ast.Assign | ast.AugAssign):
                 return False
@@ -145,9 +184,13 @@ class MatlabKernels(KernelPrinter):
 
     def operator(self, text: str, left: ast.expr, right: ast.expr) -> str:
         columns = self._is_column(left), self._is_column(right)
-        return f".{text}" if (text == "*" and all(columns)) or (text == "/" and columns[1]) else text
+        return (
+            f".{text}" if (text == "*" and all(columns)) or (text == "/" and columns[1]) else text
+        )
 
-    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+    def called_with(
+        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+    ) -> str:
         values = ", ".join(given.get(name, name) for name in kernel.arguments)
         changed = [given.get(name, name) for name in kernel.changed]
         return f"{self._left([*results, *changed])}{kernel.source.name}({values});"
@@ -163,7 +206,10 @@ class MatlabKernels(KernelPrinter):
 
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
         names = [] if self.kernel.returned_names else self._results(self.kernel)
-        lines = [f"{name} = {self.expression(value)};" for name, value in zip(names, values, strict=False)]
+        lines = [
+            f"{name} = {self.expression(value)};"
+            for name, value in zip(names, values, strict=False)
+        ]
         return lines if last else [*lines, "return"]
 
     def loop(self, variable: str, first: str, limit: ast.expr) -> str:

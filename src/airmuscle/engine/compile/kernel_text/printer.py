@@ -19,17 +19,21 @@ class KernelPrinter(ExpressionPrinter):
     The functions that a printed function calls are printed before it.
     """
 
-    branch, otherwise, close = "{} ({}) {{", "} else {", "}"
+    branch = "{} ({}) {{"
+    otherwise = "} else {"
+    close = "}"
     """Begin, middle and end of a branch, if or while."""
     remark = "// {}"
     """A comment at the end of a line."""
-    end, continuation = ";", ""
+    end = ";"
+    continuation = ""
     """What ends a statement of one word, and a line that goes on in the next."""
     prefix = ""
     """Beginning of the names of the functions of the system that kernels call."""
 
     def text(self, module: str, names: Sequence[str]) -> str:
-        """The functions of a module of `compile/kernels/` with these names, and the constants that they use.
+        """The functions of a module of `compile/kernels/` with these names, and the constants that
+        they use.
 
         Raises TraceError, with file and line, for a construct that has no printed form.
         """
@@ -43,7 +47,9 @@ class KernelPrinter(ExpressionPrinter):
         return self.kernels
 
     def printed(self, kernels: dict[str, TypedKernel]) -> str:
-        """Text of typed functions, each after those that it calls, and the constants that they use."""
+        """Text of typed functions, each after those that it calls, and the constants that they
+        use.
+        """
         bodies = [self.function(kernel) for kernel in kernels.values()]
         return "\n".join([*self.constants(kernels), *bodies])
 
@@ -52,21 +58,32 @@ class KernelPrinter(ExpressionPrinter):
             return
         source = sources[name]
         for node in ast.walk(source.node):
-            called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+            called = (
+                node.func.id
+                if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+                else ""
+            )
             if (module := source.imported.get(called, "calls")) != "calls":
-                self._add(read_kernels(module) if f"{module}.py" != source.file else sources, called)
+                self._add(
+                    read_kernels(module) if f"{module}.py" != source.file else sources, called
+                )
         self.kernels[name] = typed(source, self.kernels)
 
     def constants(self, kernels: dict[str, TypedKernel]) -> list[str]:
         """Lines that define the finite constants of the functions."""
-        used = {name: value for kernel in kernels.values() for name, value in used_constants(kernel).items()}
+        used = {
+            name: value
+            for kernel in kernels.values()
+            for name, value in used_constants(kernel).items()
+        }
         known = [name for kernel in kernels.values() for name in kernel.source.constants]
         used = {name: used[name] for name in dict.fromkeys(known) if name in used}
         return [*(self.constant(name, value) for name, value in used.items()), ""] if used else []
 
     def function(self, kernel: TypedKernel) -> str:
         """The text of one function."""
-        self.kernel, self.source = kernel, kernel.source
+        self.kernel = kernel
+        self.source = kernel.source
         self.begin()
         first, *rest = self.head()
         lines = [*self.comment(self.source.description), *self._wrapped(first), *rest]
@@ -75,10 +92,18 @@ class KernelPrinter(ExpressionPrinter):
     def _wrapped(self, line: str) -> list[str]:
         """A line, divided after arguments where it is too long."""
         at = line.rfind(", ", 0, WIDTH) + 1 if len(line) > WIDTH else 0
-        return [line[:at] + self.continuation, *self._wrapped("    " + line[at + 1 :])] if at > 5 else [line]
+        return (
+            [line[:at] + self.continuation, *self._wrapped("    " + line[at + 1 :])]
+            if at > 5
+            else [line]
+        )
 
-    def bound_call(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
-        """A call from a template: its arguments are texts, or variables of the same name; `results` are variables."""
+    def bound_call(
+        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+    ) -> str:
+        """A call from a template: its arguments are texts, or variables of the same name; `results`
+        are variables.
+        """
         return self.lines(self.called_with(kernel, given, results))
 
     def lines(self, line: str) -> str:
@@ -88,7 +113,9 @@ class KernelPrinter(ExpressionPrinter):
     # What a language writes
 
     @abc.abstractmethod
-    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+    def called_with(
+        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+    ) -> str:
         """The statement of a call; arguments and results as of `bound_call`."""
 
     @abc.abstractmethod
@@ -113,7 +140,9 @@ class KernelPrinter(ExpressionPrinter):
 
     @abc.abstractmethod
     def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
-        """The line of a call of a function of the system, of whose arguments the last ones are `results`."""
+        """The line of a call of a function of the system, of whose arguments the last ones are
+        `results`.
+        """
 
     @abc.abstractmethod
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
@@ -147,17 +176,25 @@ class KernelPrinter(ExpressionPrinter):
             case ast.Assign(targets=[ast.Tuple(elts=elements)], value=ast.Call() as call):
                 return self.call_lines(call, elements, node)
             case ast.Assign(targets=[_]):
-                return [line for pair in self._checked_pairs(node) for line in self._assigned(*pair, node)]
+                return [
+                    line
+                    for pair in self._checked_pairs(node)
+                    for line in self._assigned(*pair, node)
+                ]
             case ast.AugAssign(target=target, op=operator, value=value):
                 loaded = ast.parse(ast.unparse(target), mode="eval").body
-                return self.assign(target, ast.copy_location(ast.BinOp(loaded, operator, value), node), node)
+                return self.assign(
+                    target, ast.copy_location(ast.BinOp(loaded, operator, value), node), node
+                )
             case ast.Expr(value=ast.Call() as call) if system := invoked(call):
                 return [self.invoke(*system)]
             case ast.Expr(value=ast.Call() as call):
                 return self.call_lines(call, [], node)
             case ast.Return(value=value):
                 last = node is self.source.node.body[-1]
-                values = [] if value is None else value.elts if isinstance(value, ast.Tuple) else [value]
+                values = (
+                    [] if value is None else value.elts if isinstance(value, ast.Tuple) else [value]
+                )
                 return self.finish(values, last)
             case ast.If() | ast.While(orelse=[]) | ast.For(orelse=[]):
                 return self.compound(node)
@@ -166,11 +203,16 @@ class KernelPrinter(ExpressionPrinter):
         raise self.source.unprintable(node, f"the statement {type(node).__name__}")
 
     def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
-        """The lines of a call of a printed function as a statement, with the targets of its results."""
+        """The lines of a call of a printed function as a statement, with the targets of its
+        results.
+        """
         called = self.kernel.calls.get(ast.unparse(call.func))
         if called is None:
             raise self.source.unprintable(call, f"the function {ast.unparse(call.func)}")
-        if any(self.kernel.of(target) != kind for target, kind in zip(targets, called.returns, strict=False)):
+        if any(
+            self.kernel.of(target) != kind
+            for target, kind in zip(targets, called.returns, strict=False)
+        ):
             raise self.source.unprintable(call, "a result of another type than its variable")
         given = {name: self.expression(value) for name, value in called.given(call).items()}
         return [self.called_with(called, given, list(map(self.expression, targets)))]
@@ -181,40 +223,68 @@ class KernelPrinter(ExpressionPrinter):
         for target, value in pairs(node):
             assert value is not None
             if before & {n.id for n in ast.walk(value) if isinstance(n, ast.Name)}:
-                raise self.source.unprintable(node, "an assignment that reads a variable which it changes")
+                raise self.source.unprintable(
+                    node, "an assignment that reads a variable which it changes"
+                )
             before |= set(stored_names([ast.Assign([target], value)]))
             yield target, value
 
     def _assigned(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
-        called = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id in self.kernel.calls
-        return self.call_lines(value, [target], node) if called else self.assign(target, value, node)  # type: ignore[arg-type]
+        if (
+            isinstance(value, ast.Call)
+            and isinstance(value.func, ast.Name)
+            and value.func.id in self.kernel.calls
+        ):
+            return self.call_lines(value, [target], node)
+        return self.assign(target, value, node)
 
     def compound(self, node: ast.If | ast.While | ast.For) -> list[str]:
         """The lines of a branch or a loop."""
         if isinstance(node, ast.For):
             lines = [self._for(node)]
         else:
-            lines = [self.branch.format("if" if isinstance(node, ast.If) else "while", self.expression(node.test))]
+            lines = [
+                self.branch.format(
+                    "if" if isinstance(node, ast.If) else "while", self.expression(node.test)
+                )
+            ]
         lines += indented(self.block(node.body))
         if node.orelse:
             lines += [self.otherwise, *indented(self.block(node.orelse))]
         return [*lines, self.close]
 
     def _for(self, node: ast.For) -> str:
-        if not isinstance(node.target, ast.Name) or ast.unparse(node.iter).partition("(")[0] != "range":
+        if (
+            not isinstance(node.target, ast.Name)
+            or ast.unparse(node.iter).partition("(")[0] != "range"
+        ):
             raise self.source.unprintable(node.iter, "a loop over something else than a range")
         assert isinstance(node.iter, ast.Call)
         if len(node.iter.args) > 2:
             raise self.source.unprintable(node.iter, "a range with a step")
-        sizes = {n.value for n in ast.walk(node.iter) if isinstance(n, ast.Attribute) and n.attr == "shape"}
+        sizes = {
+            n.value
+            for n in ast.walk(node.iter)
+            if isinstance(n, ast.Attribute) and n.attr == "shape"
+        }
         bounds = [n.id for n in ast.walk(node.iter) if isinstance(n, ast.Name) and n not in sizes]
         if {node.target.id, *bounds} & {*stored_names(node.body)}:
-            raise self.source.unprintable(node.iter, "a loop that changes its variable or its range")
-        mentions = [n for n in ast.walk(self.source.node) if isinstance(n, ast.Name) and n.id == node.target.id]
-        loops = [
-            n for n in ast.walk(self.source.node) if isinstance(n, ast.For) and ast.unparse(n.target) == node.target.id
+            raise self.source.unprintable(
+                node.iter, "a loop that changes its variable or its range"
+            )
+        mentions = [
+            n
+            for n in ast.walk(self.source.node)
+            if isinstance(n, ast.Name) and n.id == node.target.id
         ]
-        if len(mentions) != sum(n.id == node.target.id for f in loops for n in ast.walk(f) if isinstance(n, ast.Name)):
+        loops = [
+            n
+            for n in ast.walk(self.source.node)
+            if isinstance(n, ast.For) and ast.unparse(n.target) == node.target.id
+        ]
+        if len(mentions) != sum(
+            n.id == node.target.id for f in loops for n in ast.walk(f) if isinstance(n, ast.Name)
+        ):
             raise self.source.unprintable(node.target, "the variable of a loop outside it")
         first = self.expression(node.iter.args[0]) if len(node.iter.args) > 1 else "0"
         return self.loop(self.name(node.target.id), first, node.iter.args[-1])
@@ -222,8 +292,14 @@ class KernelPrinter(ExpressionPrinter):
 
 def used_constants(kernel: TypedKernel) -> dict[str, float]:
     """The finite constants that a function uses."""
-    names = {n.id for n in ast.walk(kernel.source.node) if isinstance(n, ast.Name)} - {*kernel.kinds}
-    return {name: value for name, value in kernel.source.constants.items() if name in names and math.isfinite(value)}
+    names = {n.id for n in ast.walk(kernel.source.node) if isinstance(n, ast.Name)} - {
+        *kernel.kinds
+    }
+    return {
+        name: value
+        for name, value in kernel.source.constants.items()
+        if name in names and math.isfinite(value)
+    }
 
 
 def indented(lines: Sequence[str]) -> list[str]:

@@ -59,7 +59,9 @@ class KernelSource:
         """The error of a construct that has no printed form."""
         line = getattr(node, "lineno", self.node.lineno)
         text = f": `{ast.unparse(node)}`" if isinstance(node, ast.expr) else ""
-        return TraceError(f"{self.file}, line {line}, {self.name}: {what} has no printed form{text}.")
+        return TraceError(
+            f"{self.file}, line {line}, {self.name}: {what} has no printed form{text}."
+        )
 
 
 def read_kernels(module: str) -> dict[str, KernelSource]:
@@ -78,19 +80,34 @@ def read_text(text: str, file: str) -> dict[str, KernelSource]:
         if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module:
             imported |= {alias.name: node.module for alias in node.names}
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT and t.start[1]}
-    comments = {line: text for line, text in comments.items() if not text.startswith(("fmt:", "type:", "noqa"))}
-    return {node.name: KernelSource(file, node, _constants(nodes), imported, comments) for node in defined}
+    comments = {
+        t.start[0]: t.string.lstrip("# ")
+        for t in tokens
+        if t.type == tokenize.COMMENT and t.start[1]
+    }
+    comments = {
+        line: text
+        for line, text in comments.items()
+        if not text.startswith(("fmt:", "type:", "noqa"))
+    }
+    return {
+        node.name: KernelSource(file, node, _constants(nodes), imported, comments)
+        for node in defined
+    }
 
 
 @functools.cache
 def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
-    """The functions of a module of `compile/kernels/` in plain Python, by name: for few numbers, without numba.
+    """The functions of a module of `compile/kernels/` in plain Python, by name: for few numbers,
+    without numba.
 
     A table is a sequence of rows, which may be mappings from the column."""
-    path, defined = resources.files(_PACKAGE).joinpath(f"{module}.py"), read_kernels(module)
+    path = resources.files(_PACKAGE).joinpath(f"{module}.py")
+    defined = read_kernels(module)
     nodes = ast.parse(path.read_text(encoding="utf-8")).body
-    tree = ast.Module([_Plain().visit(node) for node in nodes if isinstance(node, ast.FunctionDef)], [])
+    tree = ast.Module(
+        [_Plain().visit(node) for node in nodes if isinstance(node, ast.FunctionDef)], []
+    )
     names: dict[str, Any] = {"np": math, "sqrt": math.sqrt}
     for source in defined.values():
         names |= source.constants
@@ -118,10 +135,16 @@ class _Plain(ast.NodeTransformer):
 
 
 def _constants(nodes: list[ast.stmt]) -> dict[str, float]:
-    """The values of the constants of a module, except those of values that another module computes."""
+    """The values of the constants of a module, except those of values that another module
+    computes.
+    """
     values: dict[str, Any] = {"np": np, "Status": Status, **vars(kernel_layout)}
     for node in nodes:
         if isinstance(node, ast.Assign):
             with contextlib.suppress(NameError):
                 exec(compile(ast.Module([node], []), "constants", "exec"), values)
-    return {name: value for name, value in values.items() if name.isupper() and isinstance(value, int | float)}
+    return {
+        name: value
+        for name, value in values.items()
+        if name.isupper() and isinstance(value, int | float)
+    }

@@ -1,4 +1,6 @@
-"""Types of the variables of a kernel: numbers, integers, flags, and arrays of them, inferred from their use."""
+"""Types of the variables of a kernel: numbers, integers, flags, and arrays of them, inferred from
+their use.
+"""
 
 import ast
 import dataclasses
@@ -63,7 +65,9 @@ class TypedKernel:
         """The names of the results, if every return statement returns the same variables."""
         found = [ast.unparse(n.value) for n in returns_of(self.source) if n.value]
         names = found[0].strip("()").split(", ") if found else []
-        return names if len(set(found)) <= 1 and all(name.isidentifier() for name in names) else None
+        return (
+            names if len(set(found)) <= 1 and all(name.isidentifier() for name in names) else None
+        )
 
 
 SAME_TYPE = ("min", "max", "abs")
@@ -71,7 +75,9 @@ SAME_TYPE = ("min", "max", "abs")
 
 
 def invoked(call: ast.expr) -> tuple[str, list[ast.expr], int] | None:
-    """The function of a system that `invoke` calls, its arguments, and how many of them, the last ones, it writes."""
+    """The function of a system that `invoke` calls, its arguments, and how many of them, the last
+    ones, it writes.
+    """
     match call:
         case ast.Call(func=ast.Name(id="invoke"), args=[ast.Name(id=name), ast.Tuple(elts=given)]):
             arrays = [each.args[0] if isinstance(each, ast.Call) else each for each in given]
@@ -100,14 +106,23 @@ def indices(node: ast.Subscript) -> list[ast.expr]:
 
 
 class _Inference:
-    """Types of one function, by the rules: what is an index is an integer, another argument is a number, and a local
-    variable has the type of what is assigned to it."""
+    """Types of one function, by the rules: what is an index is an integer, another argument is a
+    number, and a local variable has the type of what is assigned to it."""
 
     def __init__(self, source: KernelSource, calls: Mapping[str, TypedKernel]) -> None:
-        self.source, self.calls = source, calls
-        self.ranks, self.integers, self.written = dict.fromkeys(source.arguments, 0), set[str](), set[str]()
+        self.source = source
+        self.calls = calls
+        self.ranks, self.integers, self.written = (
+            dict.fromkeys(source.arguments, 0),
+            set[str](),
+            set[str](),
+        )
         self.flags, self.called = set[str](), set[str]()
-        names = {n.id for n in ast.walk(source.node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        names = {
+            n.id
+            for n in ast.walk(source.node)
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        }
         self.locals = dict.fromkeys(names - {*source.arguments}, ElementType.FLAG)
 
     def typed(self) -> TypedKernel:
@@ -126,19 +141,32 @@ class _Inference:
         for name in self.source.arguments:
             given = self._name(name) if name not in self.locals else ElementType.FLAG
             kinds[name] = VariableType(max(given, self.locals.get(name, given)), self.ranks[name])
-        return TypedKernel(self.source, kinds, self._returns(), frozenset(self.written), self.calls, self.of,
-                           frozenset(self.called))  # fmt: skip
+        return TypedKernel(
+            self.source,
+            kinds,
+            self._returns(),
+            frozenset(self.written),
+            self.calls,
+            self.of,
+            frozenset(self.called),
+        )
 
     def _returns(self) -> tuple[ElementType, ...]:
         found = [
-            n.value.elts if isinstance(n.value, ast.Tuple) else [n.value] for n in returns_of(self.source) if n.value
+            n.value.elts if isinstance(n.value, ast.Tuple) else [n.value]
+            for n in returns_of(self.source)
+            if n.value
         ]
         if len({len(values) for values in found}) > 1:
-            raise self.source.unprintable(self.source.node, "a function with different numbers of results")
+            raise self.source.unprintable(
+                self.source.node, "a function with different numbers of results"
+            )
         return tuple(max(map(self.of, values)) for values in zip(*found, strict=True))
 
     def _use(self, node: ast.AST) -> None:
-        """Learn from an element, a range or a call which arguments are arrays and integers, and which are changed."""
+        """Learn from an element, a range or a call which arguments are arrays and integers, and
+        which are changed.
+        """
         if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
             self._rank(node.value.id, len(indices(node)))
             for index in indices(node):
@@ -152,7 +180,11 @@ class _Inference:
         elif isinstance(node, ast.For) and isinstance(node.iter, ast.Call):
             for bound in node.iter.args:
                 self._index(bound)
-        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in self.calls:
+        elif (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id in self.calls
+        ):
             called = self.calls[node.func.id]
             for name, given in zip(called.source.arguments, node.args, strict=True):
                 if name in called.called:
@@ -164,14 +196,18 @@ class _Inference:
             self.called.add(name)
             for i, array in enumerate(arrays):
                 if isinstance(array, ast.Name | ast.Subscript):
-                    self._given(array, VariableType(ElementType.NUMBER, 1), i >= len(arrays) - results)
+                    self._given(
+                        array, VariableType(ElementType.NUMBER, 1), i >= len(arrays) - results
+                    )
         elif isinstance(node, ast.If | ast.While) and isinstance(node.test, ast.Name):
             self.flags.add(node.test.id)
 
     def _given(self, node: ast.expr, kind: VariableType, written: bool) -> None:
         inner = node.value if isinstance(node, ast.Subscript) else node
         if isinstance(inner, ast.Name) and kind.rank:
-            self._rank(inner.id, kind.rank + (len(indices(node)) if isinstance(node, ast.Subscript) else 0))
+            self._rank(
+                inner.id, kind.rank + (len(indices(node)) if isinstance(node, ast.Subscript) else 0)
+            )
             if written:
                 self.written.add(inner.id)
         if kind.scalar == ElementType.INTEGER:
@@ -207,14 +243,23 @@ class _Inference:
         self.locals[name] = max(scalar, self.locals.get(name, scalar))
 
     def _result(self, call: ast.expr, i: int) -> ElementType:
-        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in self.calls:
+        if (
+            isinstance(call, ast.Call)
+            and isinstance(call.func, ast.Name)
+            and call.func.id in self.calls
+        ):
             return self.calls[call.func.id].returns[i]
         raise self.source.unprintable(call, "an assignment to several variables")
 
     def of(self, node: ast.expr) -> ElementType:
         """The type of an expression."""
         match node:
-            case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()) | ast.Constant(value=bool()):
+            case (
+                ast.Compare()
+                | ast.BoolOp()
+                | ast.UnaryOp(op=ast.Not())
+                | ast.Constant(value=bool())
+            ):
                 return ElementType.FLAG
             case ast.Constant(value=int()):
                 return ElementType.INTEGER
@@ -229,7 +274,9 @@ class _Inference:
                 return ElementType.NUMBER if number else max(self.of(left), self.of(right))
             case ast.IfExp(body=first, orelse=second):
                 return max(self.of(first), self.of(second))
-            case ast.Subscript(value=ast.Attribute(attr="shape")) | ast.Call(func=ast.Name(id="int")):
+            case (
+                ast.Subscript(value=ast.Attribute(attr="shape")) | ast.Call(func=ast.Name(id="int"))
+            ):
                 return ElementType.INTEGER
             case ast.Call(func=ast.Name(id=name), args=given) if name in SAME_TYPE:
                 return max(self.of(each) for each in given)
@@ -250,7 +297,11 @@ def stored_names(nodes: list[ast.stmt]) -> Iterator[str]:
     for node in (inner for each in nodes for inner in ast.walk(each)):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             yield node.id
-        elif isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store) and isinstance(node.value, ast.Name):
+        elif (
+            isinstance(node, ast.Subscript)
+            and isinstance(node.ctx, ast.Store)
+            and isinstance(node.value, ast.Name)
+        ):
             yield node.value.id
 
 

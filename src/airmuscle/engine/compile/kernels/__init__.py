@@ -1,1 +1,3 @@
-"""Fixed kernels: compiled once per machine, they take the functions of a program as addresses. No physics here."""
+"""Fixed kernels: compiled once per machine, they take the functions of a program as addresses. No
+physics here.
+"""

@@ -1,4 +1,5 @@
-"""Best sequence of the modes of a plant, such as the states of on-off inputs: the one with the least predicted cost.
+"""Best sequence of the modes of a plant, such as the states of on-off inputs: the one with the
+least predicted cost.
 
 By enumeration with bounds, the search of predictive control with a finite control set.
 """
@@ -9,26 +10,48 @@ from ....core import Status
 from .calls import invoke, pointer
 from .matrices import exponential_step
 
-DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
+DONE = Status.DONE.value
+NOT_FINITE = Status.NOT_FINITE.value
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def choose_mode(
-    rates, measured, c, sizes, h, modes, changes, wanted, weights, states, costs, sequence, best, count, f, a, work, y,
+    rates,
+    measured,
+    c,
+    sizes,
+    h,
+    modes,
+    changes,
+    wanted,
+    weights,
+    states,
+    costs,
+    sequence,
+    best,
+    count,
+    f,
+    a,
+    work,
+    y,
     slopes,
-):  # fmt: skip
-    """The sequence of modes with the least sum of weights (y - wanted)^2 and of the costs of changes of mode.
+):
+    """The sequence of modes with the least sum of weights (y - wanted)^2 and of the costs of
+    changes of mode.
 
     rates, measured  addresses of the functions of AugmentedRates
     modes            (M, m) inputs; changes (M, M) cost of the change from one mode to another
     states           (K + 1, N): the first row is the state now; costs (K + 1,)
-    sequence         (K + 1,): the first is the mode before now; best (K + 1,): the cost in [0], the modes after it
-    count            (2,): steps that were computed, and sequences that were complete
+    sequence         (K + 1,): the first is the mode before now; best (K + 1,): the cost in [0], the
+    modes after it count            (2,): steps that were computed, and sequences that were complete
     y, slopes        (p,), (p, N); f, a, work as in `predict_extended`: workspace
 
-    A sequence whose cost exceeds the best one so far is not continued. Of equal sequences the first one is kept.
+    A sequence whose cost exceeds the best one so far is not continued. Of equal sequences the first
+    one is kept.
     """
-    n, total, horizon = f.shape[0], states.shape[1], costs.shape[0] - 1
+    n = f.shape[0]
+    total = states.shape[1]
+    horizon = costs.shape[0] - 1
     e = work[3]
     best[0] = 1e300
     count[0] = count[1] = 0
@@ -44,9 +67,14 @@ def choose_mode(
         cost = costs[depth] + changes[sequence[depth], mode]
         if not cost < best[0]:
             continue
-        x, later, u = states[depth], states[depth + 1], modes[mode]
+        x = states[depth]
+        later = states[depth + 1]
+        u = modes[mode]
         count[0] += 1
-        if exponential_step(rates, c, sizes, x, u, h, f, a, work[0], work[1], work[2], e, work[4]) != DONE:
+        if (
+            exponential_step(rates, c, sizes, x, u, h, f, a, work[0], work[1], work[2], e, work[4])
+            != DONE
+        ):
             return NOT_FINITE
         for i in range(total):
             later[i] = x[i] + sizes[i] * e[i, total] if i < n else x[i]

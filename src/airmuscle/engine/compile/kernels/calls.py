@@ -1,6 +1,7 @@
 """Calls of compiled functions by address from kernels, and the decorators of the parts of kernels.
 
-numba copies a part into the kernel that calls it, which so remains one function, whose machine code can be stored.
+numba copies a part into the kernel that calls it, which so remains one function, whose machine code
+can be stored.
 """
 
 import numba
@@ -45,7 +46,9 @@ def as_vector(typing_context, table):
     def generate(context, builder, sig, values):
         given = context.make_array(sig.args[0])(context, builder, values[0])
         flat = context.make_array(vector)(context, builder)
-        shape, strides = (cgutils.pack_array(builder, [each]) for each in (given.nitems, given.itemsize))
+        shape, strides = (
+            cgutils.pack_array(builder, [each]) for each in (given.nitems, given.itemsize)
+        )
         arrayobj.populate_array(flat, given.data, shape, strides, given.itemsize, given.meminfo)
         return arrayobj.impl_ret_borrowed(context, builder, vector, flat._getvalue())
 
@@ -54,18 +57,26 @@ def as_vector(typing_context, table):
 
 @intrinsic
 def call_kernel(typing_context, address, slots):
-    """Call the entry point of a compiled kernel at `address` with the address of its slots; its status."""
+    """Call the entry point of a compiled kernel at `address` with the address of its slots; its
+    status.
+    """
     signature = types.int64(types.intp, types.intp)
 
     def generate(context, builder, sig, values):
         word = ir.IntType(64)
-        return builder.call(builder.inttoptr(values[0], ir.FunctionType(word, [word]).as_pointer()), [values[1]])
+        return builder.call(
+            builder.inttoptr(values[0], ir.FunctionType(word, [word]).as_pointer()), [values[1]]
+        )
 
     return signature, generate
 
 
 PART = numba.njit(error_model="numpy", nogil=True, inline="always")
-"""Decorator of a part of a kernel, with floating-point operations in the order in which they are written."""
+"""Decorator of a part of a kernel, with floating-point operations in the order in which they are
+written.
+"""
 
-CONTRACTED_PART = numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True, inline="always")
+CONTRACTED_PART = numba.njit(
+    error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True, inline="always"
+)
 """Decorator of a part whose sums may be reordered and whose products and sums may be fused."""

@@ -1,7 +1,8 @@
 """Drivers of an input inside a kernel: pulse width modulation, and a switch with delays and ramps.
 
-`PWM` and `SolenoidDriver` of `engine.loop` call them as plain Python, and exported programs print them. A
-signal is an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
+`PWM` and `SolenoidDriver` of `engine.loop` call them as plain Python, and exported programs print
+them. A signal is an array (3, capacity): end, value at the start, and slope of each segment;
+`count` of them are used.
 """
 
 import numpy as np
@@ -17,7 +18,9 @@ ARRIVED = 1e-12
 
 @PART
 def end_of_pulse(time, duty, period, smallest):
-    """The end of the pulse of a period that begins at `time`: -infinity without a pulse, infinity without a gap."""
+    """The end of the pulse of a period that begins at `time`: -infinity without a pulse, infinity
+    without a gap.
+    """
     width = period * min(max(duty, 0.0), 1.0)
     end = time + width
     if period - width < smallest:
@@ -40,23 +43,30 @@ def pulse_width_modulation(settings, state, later, signal, count, start, ulp, re
     """Modulate a signal from `start`; the number of segments of the result.
 
     settings  frequency, smallest pulse
-    state     origin of the carrier, periods begun, end of the last pulse; `later` receives it at the end of the signal
-    ulp       distance from the end of the signal to the next floating-point number
+    state     origin of the carrier, periods begun, end of the last pulse; `later` receives it at
+    the end of the signal ulp       distance from the end of the signal to the next floating-point
+    number
     """
     end = signal[0, count - 1]
     frequency = settings[0]
     period = 1.0 / frequency
     smallest = max(settings[1], 1e-9 * period, 4.0 * ulp)
-    origin, begun, pulse_end = state[0], state[1], state[2]
+    origin = state[0]
+    begun = state[1]
+    pulse_end = state[2]
     on = pulse_end > start  # pulses so far: instants in row 0 of the result, levels in row 1
-    result[0, 0], result[1, 0] = start, 1.0 if on else 0.0
+    result[0, 0] = start
+    result[1, 0] = 1.0 if on else 0.0
     levels = 1
     if on and pulse_end < end:
-        result[0, 1], result[1, 1] = pulse_end, 0.0
+        result[0, 1] = pulse_end
+        result[1, 1] = 0.0
         levels = 2
     last = end - 4.0 * ulp
     total = int(np.ceil((end - origin) * frequency - begun)) + 1
-    k, begin, periods = 0, start, 0
+    k = 0
+    begin = start
+    periods = 0
     for i in range(total):
         time = origin + (begun + i) / frequency
         if time < last:
@@ -64,34 +74,46 @@ def pulse_width_modulation(settings, state, later, signal, count, start, ulp, re
             while k < count - 1 and signal[0, k] <= time:
                 begin = signal[0, k]
                 k += 1
-            pulse_end = end_of_pulse(time, signal[1, k] + (time - begin) * signal[2, k], period, smallest)
+            pulse_end = end_of_pulse(
+                time, signal[1, k] + (time - begin) * signal[2, k], period, smallest
+            )
             if periods == 0 and time == start:
                 levels = 0
             on = pulse_end > time
             level = 1.0 if on else 0.0
             if levels == 0 or level != result[1, levels - 1]:
-                result[0, levels], result[1, levels] = time, level
+                result[0, levels] = time
+                result[1, levels] = level
                 levels += 1
             if on and pulse_end < end:
-                result[0, levels], result[1, levels] = pulse_end, 0.0
+                result[0, levels] = pulse_end
+                result[1, levels] = 0.0
                 levels += 1
             periods += 1
     hold_levels(result, levels, end)
-    later[0], later[1], later[2] = origin, begun + periods, pulse_end
+    later[0] = origin
+    later[1] = begun + periods
+    later[2] = pulse_end
     return levels
 
 
 @PART
 def find_switchings(signal, count, start, coil, events):
-    """Write the instants at which a signal passes the threshold, and the new coil states; how many there are."""
-    switchings, present, begin = 0, coil, start
+    """Write the instants at which a signal passes the threshold, and the new coil states; how many
+    there are.
+    """
+    switchings = 0
+    present = coil
+    begin = start
     for k in range(count):
-        value, slope = signal[1, k], signal[2, k]
+        value = signal[1, k]
+        slope = signal[2, k]
         first = value >= THRESHOLD
         last = value + slope * (signal[0, k] - begin) >= THRESHOLD
         if first != (present > 0.0):
             present = 1.0 if first else 0.0
-            events[0, switchings], events[1, switchings] = begin, present
+            events[0, switchings] = begin
+            events[1, switchings] = present
             switchings += 1
         if last != first:
             present = 1.0 if last else 0.0
@@ -104,8 +126,11 @@ def find_switchings(signal, count, start, coil, events):
 
 @PART
 def move_towards(target, opening, edge, stop, settings, result, segments):
-    """Write the motion of the opening from `edge` to `stop`, and the rest after it; the opening, and the segments."""
-    after, arrival = target, edge
+    """Write the motion of the opening from `edge` to `stop`, and the rest after it; the opening,
+    and the segments.
+    """
+    after = target
+    arrival = edge
     if target != opening:
         ramp = settings[2] if target > opening else settings[3]
         distance = abs(target - opening)
@@ -116,11 +141,14 @@ def move_towards(target, opening, edge, stop, settings, result, segments):
         arrival = edge + ramp * distance if after == target else stop
         arrival = min(arrival, stop)
     if arrival > edge:
-        result[0, segments], result[1, segments] = arrival, opening
+        result[0, segments] = arrival
+        result[1, segments] = opening
         result[2, segments] = (after - opening) / (arrival - edge)
         segments += 1
     if stop > arrival:
-        result[0, segments], result[1, segments], result[2, segments] = stop, after, 0.0
+        result[0, segments] = stop
+        result[1, segments] = after
+        result[2, segments] = 0.0
         segments += 1
     return after, segments
 
@@ -133,20 +161,31 @@ def delayed_switch(settings, state, later, signal, count, start, events, result)
     state     coil, pending instant, target, opening; `later` receives it at the end of the signal
     events    (3, capacity): workspace
     """
-    end, coil, pending, target, opening = signal[0, count - 1], state[0], state[1], state[2], state[3]
+    end = signal[0, count - 1]
+    coil = state[0]
+    pending = state[1]
+    target = state[2]
+    opening = state[3]
     switchings = find_switchings(signal, count, start, coil, events)
-    edge, segments = start, 0
+    edge = start
+    segments = 0
     for k in range(switchings + 1):
         instant = events[0, k] if k < switchings else INFINITY
         if coil != target and pending < instant and pending < end:
             if pending > edge:
-                opening, segments = move_towards(target, opening, edge, pending, settings, result, segments)
-            edge, target = pending, coil
+                opening, segments = move_towards(
+                    target, opening, edge, pending, settings, result, segments
+                )
+            edge = pending
+            target = coil
         if k < switchings:
             coil = events[1, k]
             delay = settings[0] if coil > 0.0 else settings[1]
             pending = instant + delay
     if end > edge:
         opening, segments = move_towards(target, opening, edge, end, settings, result, segments)
-    later[0], later[1], later[2], later[3] = coil, pending if pending >= end else INFINITY, target, opening
+    later[0] = coil
+    later[1] = pending if pending >= end else INFINITY
+    later[2] = target
+    later[3] = opening
     return segments

@@ -1,8 +1,10 @@
-"""Fixed steps of a one-step method; the last step of a segment is shortened so that its end is met exactly.
+"""Fixed steps of a one-step method; the last step of a segment is shortened so that its end is met
+exactly.
 
-A row between two steps is reached by a separate step from which the run does not continue, so that the solution does
-not depend on the output times. The run calls a step that is printed whole; `single_step` and `state_between` call the
-rates stage by stage, because exported programs print them.
+A row between two steps is reached by a separate step from which the run does not continue, so that
+the solution does not depend on the output times. The run calls a step that is printed whole;
+`single_step` and `state_between` call the rates stage by stage, because exported programs print
+them.
 """
 
 import numba
@@ -12,7 +14,9 @@ from ....core import Status
 from .calls import CONTRACTED_PART, invoke, pointer
 from .evaluate import set_inputs, write_present
 
-DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
+DONE = Status.DONE.value
+PAUSED = Status.PAUSED.value
+NOT_FINITE = Status.NOT_FINITE.value
 
 
 @CONTRACTED_PART
@@ -23,7 +27,9 @@ def count_steps(start, end, length):
 
 @CONTRACTED_PART
 def plan_step(start, end, t, length, done, total):
-    """The end and the length of the step from `t` after `done` of the steps of a segment; the last one meets `end`."""
+    """The end and the length of the step from `t` after `done` of the steps of a segment; the last
+    one meets `end`.
+    """
     last = done + 1 >= total
     reached = end if last else start + (done + 1) * length
     h = end - t if last else length
@@ -32,7 +38,8 @@ def plan_step(start, end, t, length, done, total):
 
 @CONTRACTED_PART
 def explicit_step(rhs, c, nodes, table, weights, y, base, w, elapsed, h, u, x, k, yn):
-    """A step of an explicit Runge-Kutta method with rates that are called stage by stage, from `y` to `yn`.
+    """A step of an explicit Runge-Kutta method with rates that are called stage by stage, from `y`
+    to `yn`.
 
     nodes (s,), table (s, s), weights (s,)  the tableau of the method
     base, w, elapsed  inputs at the start of the segment, their slopes, and the time since then
@@ -91,7 +98,9 @@ def state_between(rhs, c, nodes, table, weights, y, base, w, start, t, time, u, 
 
 @CONTRACTED_PART
 def write_between(step, y, u, c, w, new, times, row, limit, t, rows):
-    """Write the states at the output times before `limit`, each reached by a step of its own; the next row."""
+    """Write the states at the output times before `limit`, each reached by a step of its own; the
+    next row.
+    """
     while row < times.shape[0] and times[row] < limit:
         invoke(step, (pointer(y), pointer(u), pointer(c), pointer(w), times[row] - t, pointer(new)))
         for i in range(new.shape[0]):
@@ -102,23 +111,31 @@ def write_between(step, y, u, c, w, new, times, row, limit, t, rows):
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def fixed_step(step, c, y, ends, values, slopes, times, rows, length, clock, count, budget, work):
-    """Advance `y` (n,) through the segments by steps of `length`, and write the states at `times` into `rows`.
+    """Advance `y` (n,) through the segments by steps of `length`, and write the states at `times`
+    into `rows`.
 
     step(x, u, c, w, h, y)  address of the printed step; `c` what it needs of the parameters
-    ends, values, slopes, clock, count, budget  as in `rodas4`; clock[1] counts the steps of the current segment
-    work  (n + m,): the caller owns it, because an array that a kernel makes and then knows by address alone is
+    ends, values, slopes, clock, count, budget  as in `rodas4`; clock[1] counts the steps of the
+    current segment work  (n + m,): the caller owns it, because an array that a kernel makes and
+    then knows by address alone is
           freed before its last use
     """
     n = y.shape[0]
-    new, u = work[:n], work[n : n + values.shape[1]]
-    t, start = clock[0], clock[2]
-    segment, row = count[0], count[1]
+    new = work[:n]
+    u = work[n : n + values.shape[1]]
+    t = clock[0]
+    start = clock[2]
+    segment = count[0]
+    row = count[1]
     taken = 0
     status = DONE
     row = write_present(times, row, t, y, rows)
     while segment < ends.shape[0]:
-        end, base, w = ends[segment], values[segment], slopes[segment]
-        total, done = count_steps(start, end, length), int(clock[1])
+        end = ends[segment]
+        base = values[segment]
+        w = slopes[segment]
+        total = count_steps(start, end, length)
+        done = int(clock[1])
         while done < total:
             if taken >= budget:
                 status = PAUSED
@@ -140,7 +157,9 @@ def fixed_step(step, c, y, ends, values, slopes, times, rows, length, clock, cou
         segment += 1
         start = t
         clock[1] = 0.0
-    clock[0], clock[2] = t, start
-    count[0], count[1] = segment, row
+    clock[0] = t
+    clock[2] = start
+    count[0] = segment
+    count[1] = row
     count[2] += taken
     return status

@@ -1,4 +1,6 @@
-"""Extended and unscented Kalman filters: prediction of the state with its covariance, correction by measurements."""
+"""Extended and unscented Kalman filters: prediction of the state with its covariance, correction by
+measurements.
+"""
 
 from math import sqrt
 
@@ -8,7 +10,9 @@ from ....core import Status
 from .calls import PART, invoke, pointer
 from .matrices import cholesky, exponential_step, multiply, solve_factor
 
-DONE, SINGULAR, NOT_FINITE = Status.DONE.value, Status.SINGULAR.value, Status.NOT_FINITE.value
+DONE = Status.DONE.value
+SINGULAR = Status.SINGULAR.value
+NOT_FINITE = Status.NOT_FINITE.value
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
@@ -19,9 +23,13 @@ def predict_extended(rates, c, sizes, h, noise, x, u, covariance, transition, f,
     noise   (N, N) covariance of the process noise of a sample
     f, a    (n,), (n, N); work (5, n, N + 1), product (N, N): workspace
     """
-    n, total = f.shape[0], x.shape[0]
+    n = f.shape[0]
+    total = x.shape[0]
     e = work[3]
-    if exponential_step(rates, c, sizes, x, u, h, f, a, work[0], work[1], work[2], e, work[4]) != DONE:
+    if (
+        exponential_step(rates, c, sizes, x, u, h, f, a, work[0], work[1], work[2], e, work[4])
+        != DONE
+    ):
         return NOT_FINITE
     for i in range(total):
         for j in range(total):
@@ -52,8 +60,21 @@ def apply_gain(gain, difference, x):
 
 @numba.njit(error_model="numpy", nogil=True)
 def correct_extended(
-    measured, constants, noise, x, u, covariance, values, difference, s, factor, c, gain, rest, product,
-):  # fmt: skip
+    measured,
+    constants,
+    noise,
+    x,
+    u,
+    covariance,
+    values,
+    difference,
+    s,
+    factor,
+    c,
+    gain,
+    rest,
+    product,
+):
     """Mean `x` (N,) and `covariance` (N, N) after a measurement `values` (p,), in place.
 
     measured(x, u, c, y, C)  its address
@@ -61,7 +82,8 @@ def correct_extended(
     difference, s            (p,), (p, p): the innovation and its covariance
     factor (p, p), c (p, N), gain (N, p), rest and product (N, N): workspace
     """
-    total, p = x.shape[0], values.shape[0]
+    total = x.shape[0]
+    p = values.shape[0]
     invoke(measured, (pointer(x), pointer(u), pointer(constants), pointer(difference), pointer(c)))
     for i in range(p):
         difference[i] = values[i] - difference[i]
@@ -95,7 +117,8 @@ def correct_extended(
 
 @PART
 def sigma_points(x, covariance, spread, points, root):
-    """`points` (2 N + 1, N): x, then x +- spread times the columns of a Cholesky factor of the covariance.
+    """`points` (2 N + 1, N): x, then x +- spread times the columns of a Cholesky factor of the
+    covariance.
 
     A state without variance gets a column of zeros; root (N, N) is workspace.
     """
@@ -130,19 +153,28 @@ def weighted_mean(points, weights, mean):
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
-def predict_unscented(rates, c, sizes, h, spread, weights, noise, x, u, covariance, points, root, f, a, work):
+def predict_unscented(
+    rates, c, sizes, h, spread, weights, noise, x, u, covariance, points, root, f, a, work
+):
     """Mean `x` (N,) and `covariance` (N, N) one sample later, in place.
 
     sizes    (N,) magnitudes of the states
     weights  (3,): of the mean of the central point, of its covariance, of all other points
-    points   (2 N + 1, N): the sigma points; root (N, N), f (n,), a (n, N), work (5, n, N + 1): workspace
+    points   (2 N + 1, N): the sigma points; root (N, N), f (n,), a (n, N), work (5, n, N + 1):
+    workspace
     """
-    n, total = f.shape[0], x.shape[0]
+    n = f.shape[0]
+    total = x.shape[0]
     sigma_points(x, covariance, spread, points, root)
     e = work[3]
     for q in range(points.shape[0]):
         point = points[q]
-        if exponential_step(rates, c, sizes, point, u, h, f, a, work[0], work[1], work[2], e, work[4]) != DONE:
+        if (
+            exponential_step(
+                rates, c, sizes, point, u, h, f, a, work[0], work[1], work[2], e, work[4]
+            )
+            != DONE
+        ):
             return NOT_FINITE
         for i in range(n):
             point[i] += sizes[i] * e[i, total]
@@ -159,19 +191,40 @@ def predict_unscented(rates, c, sizes, h, spread, weights, noise, x, u, covarian
 
 @numba.njit(error_model="numpy", nogil=True)
 def correct_unscented(
-    measured, constants, spread, weights, noise, x, u, covariance, values, difference, s, factor, points, root, y, c,
-    gain, cross,
-):  # fmt: skip
+    measured,
+    constants,
+    spread,
+    weights,
+    noise,
+    x,
+    u,
+    covariance,
+    values,
+    difference,
+    s,
+    factor,
+    points,
+    root,
+    y,
+    c,
+    gain,
+    cross,
+):
     """Mean `x` (N,) and `covariance` (N, N) after a measurement `values` (p,), in place.
 
     noise                    (p,) variances of the measurement
     difference, s            (p,), (p, p): the innovation and its covariance
-    points (2 N + 1, N), y (2 N + 1, p), factor (p, p), root (N, N), c (p, N), gain and cross (N, p): workspace
+    points (2 N + 1, N), y (2 N + 1, p), factor (p, p), root (N, N), c (p, N), gain and cross (N,
+    p): workspace
     """
-    total, p = x.shape[0], values.shape[0]
+    total = x.shape[0]
+    p = values.shape[0]
     sigma_points(x, covariance, spread, points, root)
     for q in range(points.shape[0]):
-        invoke(measured, (pointer(points[q]), pointer(u), pointer(constants), pointer(y[q]), pointer(c)))
+        invoke(
+            measured,
+            (pointer(points[q]), pointer(u), pointer(constants), pointer(y[q]), pointer(c)),
+        )
     weighted_mean(y, weights, difference)
     for j in range(p):
         for i in range(p):

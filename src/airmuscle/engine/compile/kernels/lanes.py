@@ -1,9 +1,11 @@
-"""Fixed steps of a printed one-step method for many systems at once, one a lane, each on its own clock.
+"""Fixed steps of a printed one-step method for many systems at once, one a lane, each on its own
+clock.
 
-Every lane takes exactly the steps that `fixed_step` would take for it alone: its own segments, the last step of each
-shortened so that its end is met, and rows between two steps reached by a step of their own. Where lanes differ, each
-has its own length of step, and one that waits has the length zero; where all may go on with full steps, they do so
-without a look at the clock. So the result of a lane does not depend on its neighbours.
+Every lane takes exactly the steps that `fixed_step` would take for it alone: its own segments, the
+last step of each shortened so that its end is met, and rows between two steps reached by a step of
+their own. Where lanes differ, each has its own length of step, and one that waits has the length
+zero; where all may go on with full steps, they do so without a look at the clock. So the result of
+a lane does not depend on its neighbours.
 """
 
 import numba
@@ -12,14 +14,20 @@ import numpy as np
 from ....core import Status
 from .calls import PART, invoke, pointer
 
-DONE, NOT_FINITE, INTERRUPTED = Status.DONE.value, Status.NOT_FINITE.value, Status.INTERRUPTED.value
+DONE = Status.DONE.value
+NOT_FINITE = Status.NOT_FINITE.value
+INTERRUPTED = Status.INTERRUPTED.value
 MAX_UNINTERRUPTED = 10_000
 """Steps between two checks whether the caller wants to stop."""
 
 
 @PART
-def begin_segments(segment, first, last, ended, total, start, begin, length, ends, values, slopes, base, w, u):
-    """Set steps and inputs of the present segment of each lane; whether an input changes within one."""
+def begin_segments(
+    segment, first, last, ended, total, start, begin, length, ends, values, slopes, base, w, u
+):
+    """Set steps and inputs of the present segment of each lane; whether an input changes within
+    one.
+    """
     moving = False
     for lane in range(segment.shape[0]):
         s = segment[lane]
@@ -30,7 +38,9 @@ def begin_segments(segment, first, last, ended, total, start, begin, length, end
             base[i, lane] = values[s, i]
             w[i, lane] = slopes[s, i]
             if ended[lane] != 0:
-                base[i, lane] += (ends[s] - (begin if s == first[lane] else ends[s - 1])) * slopes[s, i]
+                base[i, lane] += (ends[s] - (begin if s == first[lane] else ends[s - 1])) * slopes[
+                    s, i
+                ]
                 w[i, lane] = 0.0
             moving = moving or w[i, lane] != 0.0
             u[i, lane] = base[i, lane]
@@ -112,12 +122,35 @@ def finish_single_steps(h, other, y, done, total, start, ends, segment):
 
 @PART
 def advance_lanes(
-    step, at, instant, moving, entered, stop, segment, first, last, ended, total, done, start, begin, length, ends,
-    values, slopes, base, w, u, h, y, other,
-):  # fmt: skip
+    step,
+    at,
+    instant,
+    moving,
+    entered,
+    stop,
+    segment,
+    first,
+    last,
+    ended,
+    total,
+    done,
+    start,
+    begin,
+    length,
+    ends,
+    values,
+    slopes,
+    base,
+    w,
+    u,
+    h,
+    y,
+    other,
+):
     """Take the steps of all lanes that end before an instant.
 
-    Returns DONE or INTERRUPTED, whether an input changes within a segment, and whether a lane begins another segment.
+    Returns DONE or INTERRUPTED, whether an input changes within a segment, and whether a lane
+    begins another segment.
     """
     status = DONE
     while True:
@@ -126,7 +159,20 @@ def advance_lanes(
             break
         if entered:
             moving = begin_segments(
-                segment, first, last, ended, total, start, begin, length, ends, values, slopes, base, w, u
+                segment,
+                first,
+                last,
+                ended,
+                total,
+                start,
+                begin,
+                length,
+                ends,
+                values,
+                slopes,
+                base,
+                w,
+                u,
             )
             entered = False
         common = count_common_steps(ended, total, done, start, instant, length)
@@ -175,7 +221,8 @@ def set_inputs_at(instant, base, w, start, u):
 @PART
 def write_columns(chosen, row, states, o, u, rows):
     """Write the chosen states, outputs and inputs of all lanes to a row."""
-    n, k = states.shape[0], o.shape[0]
+    n = states.shape[0]
+    k = o.shape[0]
     for j in range(chosen.shape[0]):
         i = chosen[j]
         for lane in range(states.shape[1]):
@@ -189,25 +236,60 @@ def write_columns(chosen, row, states, o, u, rows):
 
 @numba.njit(error_model="numpy", nogil=True)
 def lanes(
-    prepare, step, outputs, p, c, y, other, u, base, w, h, o, ends, values, slopes, first, last, begin, length, times,
-    chosen, rows, final, status, stop, segment, ended, done, total, start,
-):  # fmt: skip
-    """Integrate the states `y` (n, W) of W systems from `begin` through their segments; DONE or INTERRUPTED.
+    prepare,
+    step,
+    outputs,
+    p,
+    c,
+    y,
+    other,
+    u,
+    base,
+    w,
+    h,
+    o,
+    ends,
+    values,
+    slopes,
+    first,
+    last,
+    begin,
+    length,
+    times,
+    chosen,
+    rows,
+    final,
+    status,
+    stop,
+    segment,
+    ended,
+    done,
+    total,
+    start,
+):
+    """Integrate the states `y` (n, W) of W systems from `begin` through their segments; DONE or
+    INTERRUPTED.
 
-    prepare(p, c), step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each
-    p, c, y, other, u, base, w, h, o  (k, W) arrays of the printed numbers, each beginning at a multiple of 64 bytes;
+    prepare(p, c), step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions,
+    W lanes each p, c, y, other, u, base, w, h, o  (k, W) arrays of the printed numbers, each
+    beginning at a multiple of 64 bytes;
                           p and y are given, the rest is room
     ends, values, slopes  (S,), (S, m), (S, m): segments of all systems, one after the other
     first, last           (W,): the segments of each lane are first .. last - 1
-    times, chosen         (T,) instants in rising order, (C,) columns: states, then outputs, then inputs
-    rows, final, status   (C, W, T), (W, n), (W,): what is found
-    stop                  (1,): the caller sets it to something else than 0 to end this early
-    segment .. start      (W,): workspace
+    times, chosen         (T,) instants in rising order, (C,) columns: states, then outputs, then
+    inputs rows, final, status   (C, W, T), (W, n), (W,): what is found stop                  (1,):
+    the caller sets it to something else than 0 to end this early segment .. start      (W,):
+    workspace
     """
     n, width = y.shape
-    moving, entered, needs_outputs = False, True, False
+    moving = False
+    entered = True
+    needs_outputs = False
     for lane in range(width):
-        segment[lane], ended[lane], done[lane], start[lane] = first[lane], 0, 0.0, begin
+        segment[lane] = first[lane]
+        ended[lane] = 0
+        done[lane] = 0.0
+        start[lane] = begin
     invoke(prepare, (pointer(p), pointer(c)))
     at = (pointer(y), pointer(u), pointer(c), pointer(w), pointer(h), pointer(other))
     for j in range(chosen.shape[0]):
@@ -216,9 +298,31 @@ def lanes(
         end_of_all = row == times.shape[0]
         instant = np.inf if end_of_all else times[row]
         status_of_all, moving, entered = advance_lanes(
-            step, at, instant, moving, entered, stop, segment, first, last, ended, total, done, start, begin, length,
-            ends, values, slopes, base, w, u, h, y, other,
-        )  # fmt: skip
+            step,
+            at,
+            instant,
+            moving,
+            entered,
+            stop,
+            segment,
+            first,
+            last,
+            ended,
+            total,
+            done,
+            start,
+            begin,
+            length,
+            ends,
+            values,
+            slopes,
+            base,
+            w,
+            u,
+            h,
+            y,
+            other,
+        )
         if status_of_all != DONE:
             return status_of_all
         if end_of_all:
@@ -251,13 +355,19 @@ def lane_blocks(step, outputs, x, u, c, w, h, other, o, span, steps):
     """Advance the blocks span[0] .. span[1] - 1 by steps[0] steps, then compute their outputs.
 
     step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each
-    x, u, c, o  (B, n, W), (B, m, W), (B, C, W), (B, k, W): states, inputs, what `prepare` left, outputs of each block
-    w, h, other  (m, W), (1, W), (n, W): zeros, the length of a step, and workspace
+    x, u, c, o  (B, n, W), (B, m, W), (B, C, W), (B, k, W): states, inputs, what `prepare` left,
+    outputs of each block w, h, other  (m, W), (1, W), (n, W): zeros, the length of a step, and
+    workspace
     """
-    at_w, at_h, at_other = pointer(w), pointer(h), pointer(other)
+    at_w = pointer(w)
+    at_h = pointer(h)
+    at_other = pointer(other)
     for block in range(span[0], span[1]):
-        at_x, at_u, at_c = pointer(x[block]), pointer(u[block]), pointer(c[block])
-        at, beside = at_x, at_other
+        at_x = pointer(x[block])
+        at_u = pointer(u[block])
+        at_c = pointer(c[block])
+        at = at_x
+        beside = at_other
         for _ in range(steps[0]):
             invoke(step, (at, at_u, at_c, at_w, at_h, beside))
             at, beside = beside, at

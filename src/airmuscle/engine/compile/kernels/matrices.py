@@ -1,19 +1,27 @@
-"""Small matrices as parts of kernels: products, factors, exponential Euler step with the Jacobian and the rates."""
+"""Small matrices as parts of kernels: products, factors, exponential Euler step with the Jacobian
+and the rates.
+"""
 
 from math import sqrt
 
 from ....core import Status
 from .calls import PART, invoke, pointer
 
-DONE, NOT_FINITE, SINGULAR = Status.DONE.value, Status.NOT_FINITE.value, Status.SINGULAR.value
+DONE = Status.DONE.value
+NOT_FINITE = Status.NOT_FINITE.value
+SINGULAR = Status.SINGULAR.value
 MAX_NORM = 0.125
 """Norm of the matrix to which the Taylor polynomial is applied."""
 
 
 @PART
 def scaled_rates(f, a, sizes, h, m):
-    """Write h (A, f) of the scaled states to `m` (n, N + 1); its 1-norm, infinite if it is not finite."""
-    n, total, norm = f.shape[0], sizes.shape[0], 0.0
+    """Write h (A, f) of the scaled states to `m` (n, N + 1); its 1-norm, infinite if it is not
+    finite.
+    """
+    n = f.shape[0]
+    total = sizes.shape[0]
+    norm = 0.0
     for j in range(total + 1):
         size = sizes[j] if j < total else 1.0
         column = 0.0
@@ -29,7 +37,9 @@ def scaled_rates(f, a, sizes, h, m):
 
 @PART
 def taylor_polynomial(m, share, square, cube, other, e):
-    """The Taylor polynomial of order 8 of exp(share m) in `e`, by Paterson and Stockmeyer's scheme."""
+    """The Taylor polynomial of order 8 of exp(share m) in `e`, by Paterson and Stockmeyer's
+    scheme.
+    """
     n, columns = m.shape
     for i in range(n):
         for j in range(columns):
@@ -57,7 +67,9 @@ def taylor_polynomial(m, share, square, cube, other, e):
 
 @PART
 def square_repeatedly(e, times, other):
-    """Square the matrix whose first n rows are `e` (n, N + 1); the rows below are those of the identity."""
+    """Square the matrix whose first n rows are `e` (n, N + 1); the rows below are those of the
+    identity.
+    """
     n, columns = e.shape
     for _ in range(times):
         for i in range(n):
@@ -71,16 +83,20 @@ def square_repeatedly(e, times, other):
 
 @PART
 def exponential_step(rates, c, sizes, x, u, h, f, a, m, square, cube, e, other):
-    """Row k < n of `e` (n, N + 1): exp(A h) of the scaled states, and in its last column the increment of state k.
+    """Row k < n of `e` (n, N + 1): exp(A h) of the scaled states, and in its last column the
+    increment of state k.
 
-    rates(x, u, c, f, a)   its address: f (n,), a = df/dx (n, N); the N - n states at the end have no rates
-    m, square, cube, other (n, N + 1): workspace
+    rates(x, u, c, f, a)   its address: f (n,), a = df/dx (n, N); the N - n states at the end have
+    no rates m, square, cube, other (n, N + 1): workspace
 
-    exp of the matrix ((h A, h f), (0, 0)), scaled by the magnitudes `sizes` (N,) of the states: a Taylor polynomial of
-    a matrix whose norm was halved to less than 1/8, then squared.
+    exp of the matrix ((h A, h f), (0, 0)), scaled by the magnitudes `sizes` (N,) of the states: a
+    Taylor polynomial of a matrix whose norm was halved to less than 1/8, then squared.
     """
     invoke(rates, (pointer(x), pointer(u), pointer(c), pointer(f), pointer(a)))
-    norm, halvings, share, status = scaled_rates(f, a, sizes, h, m), 0, 1.0, NOT_FINITE
+    norm = scaled_rates(f, a, sizes, h, m)
+    halvings = 0
+    share = 1.0
+    status = NOT_FINITE
     if norm < 1e300:
         while norm * share > MAX_NORM:
             share *= 0.5
@@ -104,7 +120,9 @@ def multiply(a, b, result):
 
 @PART
 def add_product(a, b, result):
-    """Add the product of the first n columns of `a` and of `b` (n, m) to `result` (n, m); zeros of `a` are skipped."""
+    """Add the product of the first n columns of `a` and of `b` (n, m) to `result` (n, m); zeros of
+    `a` are skipped.
+    """
     n = result.shape[0]
     for i in range(n):
         for k in range(n):

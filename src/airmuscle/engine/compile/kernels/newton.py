@@ -1,19 +1,27 @@
-"""Newton's method on printed functions: g(x, p) = target of many unknowns, and of pairs of functions."""
+"""Newton's method on printed functions: g(x, p) = target of many unknowns, and of pairs of
+functions.
+"""
 
 import numba
 
 from ....core import Status
 from .calls import PART, invoke, pointer
 
-DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value
-NOT_FINITE, NOT_CONVERGED = Status.NOT_FINITE.value, Status.NOT_CONVERGED.value
-MAX_ITERATIONS, MAX_STEP, TOLERANCE = 50, 10.0, 1e-11
+DONE = Status.DONE.value
+SINGULAR = Status.SINGULAR.value
+NOT_FINITE = Status.NOT_FINITE.value
+NOT_CONVERGED = Status.NOT_CONVERGED.value
+MAX_ITERATIONS = 50
+MAX_STEP = 10.0
+TOLERANCE = 1e-11
 """Iterations; the longest step and the step that ends the search, both in sizes of the unknowns."""
 
 
 @PART
 def scale_equations(by_x, values, target, sizes, a, b):
-    """Write the linear equations a s = b of the step s in sizes, each divided by its largest coefficient."""
+    """Write the linear equations a s = b of the step s in sizes, each divided by its largest
+    coefficient.
+    """
     n = b.shape[0]
     for i in range(n):
         largest = 0.0
@@ -28,8 +36,11 @@ def scale_equations(by_x, values, target, sizes, a, b):
 
 @PART
 def eliminate(a, b):
-    """Reduce the equations to an upper triangle, with row pivoting; whether the matrix is regular."""
-    n, regular = b.shape[0], True
+    """Reduce the equations to an upper triangle, with row pivoting; whether the matrix is
+    regular.
+    """
+    n = b.shape[0]
+    regular = True
     for column in range(n):
         pivot = column
         for i in range(column + 1, n):
@@ -52,7 +63,8 @@ def eliminate(a, b):
 @PART
 def substitute_back(a, b):
     """Solve the upper triangle in place of `b`; the largest step in sizes."""
-    n, step = b.shape[0], 0.0
+    n = b.shape[0]
+    step = 0.0
     for i in range(n - 1, -1, -1):
         for k in range(i + 1, n):
             b[i] -= a[i, k] * b[k]
@@ -63,7 +75,8 @@ def substitute_back(a, b):
 
 @numba.njit(nogil=True, error_model="numpy")
 def newton(function, p, target, sizes, x, values, by_x, by_p, a, b):
-    """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold the last results of the function.
+    """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold the last
+    results of the function.
 
     function(x, p, values, by_x, by_p)  its address
     a, b  (n, n), (n,): workspace
@@ -92,10 +105,15 @@ def newton(function, p, target, sizes, x, values, by_x, by_p, a, b):
     return status
 
 
-LANES, ITERATIONS = 8, 30
+LANES = 8
+ITERATIONS = 30
 """Points of one call of a function, as in `function.LANES`; iterations of Newton's method."""
-RESIDUAL, MARGIN, WIDENED = 1e-11, 1e-12, 0.5
-"""Relative residual of a solution; part of the range by which rounding may exceed it; widening of a cell's range."""
+RESIDUAL = 1e-11
+MARGIN = 1e-12
+WIDENED = 0.5
+"""Relative residual of a solution; part of the range by which rounding may exceed it; widening of a
+cell's range.
+"""
 
 
 @PART
@@ -122,7 +140,8 @@ def widen_ranges(side, ends):
     for i in range(ends.shape[3]):
         possible = max(ends[side, 2, 0, i], ends[side, 2, 1, i]) > 0.0
         for kind in range(2):
-            a, b = ends[side, kind, 0, i], ends[side, kind, 1, i]
+            a = ends[side, kind, 0, i]
+            b = ends[side, kind, 1, i]
             margin = WIDENED * abs(b - a)
             ends[side, kind, 0, i] = min(a, b) - margin if possible else 1e300
             ends[side, kind, 1, i] = max(a, b) + margin if possible else -1e300
@@ -131,10 +150,13 @@ def widen_ranges(side, ends):
 @PART
 def find_cells(q, k, ends, cells):
     """Write the pairs of cells in whose ranges a solution is possible; how many there are."""
-    size, count = ends.shape[3], 0
+    size = ends.shape[3]
+    count = 0
     for i in range(size):
-        q_low, q_high = q - ends[0, 0, 1, i], q - ends[0, 0, 0, i]
-        k_low, k_high = k - ends[0, 1, 1, i], k - ends[0, 1, 0, i]
+        q_low = q - ends[0, 0, 1, i]
+        q_high = q - ends[0, 0, 0, i]
+        k_low = k - ends[0, 1, 1, i]
+        k_high = k - ends[0, 1, 0, i]
         for j in range(size):
             cells[count] = i * size + j
             count += (
@@ -148,13 +170,18 @@ def find_cells(q, k, ends, cells):
 
 @PART
 def newton_steps(q, k, low, high, x, y, values, other_values):
-    """One step of Newton's method of each lane, limited to a fifth of the range; the largest step."""
-    largest, span = 0.0, high - low
+    """One step of Newton's method of each lane, limited to a fifth of the range; the largest
+    step.
+    """
+    largest = 0.0
+    span = high - low
     for lane in range(LANES):
         residual = values[0, lane] + other_values[0, lane] - q
         other = values[1, lane] + other_values[1, lane] - k
-        a, c = values[2, lane], values[3, lane]
-        b, d = other_values[2, lane], other_values[3, lane]
+        a = values[2, lane]
+        c = values[3, lane]
+        b = other_values[2, lane]
+        d = other_values[3, lane]
         determinant = a * d - b * c
         step = (b * other - d * residual) / determinant
         y_step = (c * residual - a * other) / determinant
@@ -181,27 +208,47 @@ def is_solution(q, k, lane, values, other_values):
 
 @numba.njit(error_model="numpy", nogil=True)
 def pair_solutions(
-    first, second, low, high, point, wanted_q, wanted_k, levels, solutions, counts, arguments, values, other_values,
-    ends, cells,
-):  # fmt: skip
-    """Write up to R solutions of every point (N,) into `solutions` (N, R, 2), and their numbers into `counts` (N,).
+    first,
+    second,
+    low,
+    high,
+    point,
+    wanted_q,
+    wanted_k,
+    levels,
+    solutions,
+    counts,
+    arguments,
+    values,
+    other_values,
+    ends,
+    cells,
+):
+    """Write up to R solutions of every point (N,) into `solutions` (N, R, 2), and their numbers
+    into `counts` (N,).
 
-    first, second  addresses of functions in lanes, (t, x) -> (q, k, dq/dx, dk/dx, s); s > 0 at a solution
-    levels         (G, LANES): boundaries of the cells in x and in y, in ascending order; after the last one repeated
-    arguments (3, LANES), values and other_values (5, LANES): aligned workspace; ends (2, 3, 2, C), cells (C^2 + LANES,)
-    A count above R says that there were more solutions; equal ones are not removed.
+    first, second  addresses of functions in lanes, (t, x) -> (q, k, dq/dx, dk/dx, s); s > 0 at a
+    solution levels         (G, LANES): boundaries of the cells in x and in y, in ascending order;
+    after the last one repeated arguments (3, LANES), values and other_values (5, LANES): aligned
+    workspace; ends (2, 3, 2, C), cells (C^2 + LANES,) A count above R says that there were more
+    solutions; equal ones are not removed.
     """
     size = ends.shape[3]
-    t, x, y, span = arguments[0], arguments[1], arguments[2], high - low
+    t = arguments[0]
+    x = arguments[1]
+    y = arguments[2]
+    span = high - low
     for n in range(point.shape[0]):
-        q, k = wanted_q[n], wanted_k[n]
+        q = wanted_q[n]
+        k = wanted_k[n]
         for lane in range(LANES):
             t[lane] = point[n]
         evaluate_boundaries(first, 0, levels, t, x, values, ends)
         evaluate_boundaries(second, 1, levels, t, x, other_values, ends)
         widen_ranges(0, ends)
         widen_ranges(1, ends)
-        count, stored = find_cells(q, k, ends, cells), 0
+        count = find_cells(q, k, ends, cells)
+        stored = 0
         for start in range(0, count, LANES):
             used = min(LANES, count - start)
             for lane in range(LANES):
@@ -220,10 +267,14 @@ def pair_solutions(
                 if is_solution(q, k, lane, values, other_values):
                     known = False
                     for each in range(min(stored, solutions.shape[1])):
-                        near = max(abs(solutions[n, each, 0] - x[lane]), abs(solutions[n, each, 1] - y[lane]))
+                        near = max(
+                            abs(solutions[n, each, 0] - x[lane]),
+                            abs(solutions[n, each, 1] - y[lane]),
+                        )
                         known = known or near <= 1e-7 * span
                     if not known:
                         if stored < solutions.shape[1]:
-                            solutions[n, stored, 0], solutions[n, stored, 1] = x[lane], y[lane]
+                            solutions[n, stored, 0] = x[lane]
+                            solutions[n, stored, 1] = y[lane]
                         stored += 1
         counts[n] = stored

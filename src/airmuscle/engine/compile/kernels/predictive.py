@@ -1,4 +1,6 @@
-"""A sample of linear predictive control: observer, limits, and the quadratic program by a dual active-set method."""
+"""A sample of linear predictive control: observer, limits, and the quadratic program by a dual
+active-set method.
+"""
 
 from math import sqrt
 
@@ -8,11 +10,18 @@ from ....core import Status
 from .calls import CONTRACTED_PART, PART
 from .matrices import solve_factor
 
-DONE, SINGULAR, NOT_CONVERGED = Status.DONE.value, Status.SINGULAR.value, Status.NOT_CONVERGED.value
-ITERATIONS, FEASIBLE, ACCURATE, DEPENDENT, POSITIVE = 10, 0, 1, 2, 3
-"""Iterations for each row (chosen), and places of the tolerances: permitted violation of a limit of a row of length 1;
-permitted error of an active limit before the refinement; square of the distance of a row from the space of the active
-ones up to which it depends on them; what a slope of multipliers must exceed."""
+DONE = Status.DONE.value
+SINGULAR = Status.SINGULAR.value
+NOT_CONVERGED = Status.NOT_CONVERGED.value
+ITERATIONS = 10
+FEASIBLE = 0
+ACCURATE = 1
+DEPENDENT = 2
+POSITIVE = 3
+"""Iterations for each row (chosen), and places of the tolerances: permitted violation of a limit of
+a row of length 1; permitted error of an active limit before the refinement; square of the distance
+of a row from the space of the active ones up to which it depends on them; what a slope of
+multipliers must exceed."""
 
 
 @CONTRACTED_PART
@@ -26,7 +35,9 @@ def add_product(row, x, count, value):
 
 @PART
 def extend_factor(m, order, count, row, factor, tolerances):
-    """Write row `count` of the Cholesky factor of the products of the active rows; whether `row` is independent."""
+    """Write row `count` of the Cholesky factor of the products of the active rows; whether `row` is
+    independent.
+    """
     square = add_product(m[row], m[row], m.shape[1], 0.0)
     for j in range(count):
         value = add_product(m[row], m[order[j]], m.shape[1], 0.0)
@@ -51,9 +62,11 @@ def release(order, count, place, factor, multipliers, active):
             factor[k, j] = factor[k + 1, j]
     for k in range(place, count - 1):
         length = sqrt(factor[k, k] ** 2 + factor[k, k + 1] ** 2)
-        along, across = factor[k, k] / length, factor[k, k + 1] / length
+        along = factor[k, k] / length
+        across = factor[k, k + 1] / length
         for i in range(k, count - 1):
-            near, far = factor[i, k], factor[i, k + 1]
+            near = factor[i, k]
+            far = factor[i, k + 1]
             factor[i, k] = along * near + across * far
             factor[i, k + 1] = along * far - across * near
 
@@ -70,7 +83,9 @@ def vector_of(m, order, count, multipliers, w):
 
 @PART
 def solve_active(m, lower, upper, active, order, count, factor, passes, wanted, rest, w):
-    """The multipliers with which the active rows have their limits, in one or two passes; the error before the last."""
+    """The multipliers with which the active rows have their limits, in one or two passes; the error
+    before the last.
+    """
     error = 0.0
     for k in range(count):
         wanted[k] = 0.0
@@ -90,8 +105,11 @@ def solve_active(m, lower, upper, active, order, count, factor, passes, wanted, 
 
 @PART
 def blocking_place(order, count, active, multipliers, change):
-    """Where a multiplier would first change its sign, on the way to multipliers + change (-1: nowhere)."""
-    place, least = -1, 1.0
+    """Where a multiplier would first change its sign, on the way to multipliers + change (-1:
+    nowhere).
+    """
+    place = -1
+    least = 1.0
     for k in range(count):
         side = active[order[k]]
         if side * (multipliers[k] + change[k]) < 0.0:
@@ -110,7 +128,9 @@ def worst_row(m, lower, upper, active, w, tolerances):
     for i in range(m.shape[0]):
         if active[i] == 0.0:
             value = add_product(m[i], w, m.shape[1], 0.0)
-            excess = max(value - upper[i], lower[i] - value) / (1.0 + min(abs(upper[i]), abs(lower[i])))
+            excess = max(value - upper[i], lower[i] - value) / (
+                1.0 + min(abs(upper[i]), abs(lower[i]))
+            )
             if excess > largest:
                 worst = i
                 largest = excess
@@ -119,12 +139,15 @@ def worst_row(m, lower, upper, active, w, tolerances):
 
 @PART
 def exchange(m, row, order, count, active, factor, multipliers, change, tolerances):
-    """Make a row active that depends on the active ones, in place of one of them; whether a point keeps the limits."""
+    """Make a row active that depends on the active ones, in place of one of them; whether a point
+    keeps the limits.
+    """
     side = active[row]
     for k in range(count):
         change[k] = add_product(m[row], m[order[k]], m.shape[1], 0.0)
     solve_factor(factor, count, change)
-    place, least = -1, 0.0
+    place = -1
+    least = 0.0
     for k in range(count):
         slope = side * active[order[k]] * change[k]
         if slope > tolerances[POSITIVE]:
@@ -170,16 +193,20 @@ def begin_active(m, active, order, factor, multipliers, tolerances):
 
 
 @PART
-def shortest_vector(m, lower, upper, tolerances, active, order, factor, multipliers, change, rest, w):
-    """The shortest `w` (n,) with lower <= m w <= upper, for rows of `m` (r, n) of length 1; a status.
+def shortest_vector(
+    m, lower, upper, tolerances, active, order, factor, multipliers, change, rest, w
+):
+    """The shortest `w` (n,) with lower <= m w <= upper, for rows of `m` (r, n) of length 1; a
+    status.
 
     tolerances  (4,) by FEASIBLE, ACCURATE, DEPENDENT, POSITIVE
-    active   (r,): 1.0 at the upper limit, -1 at the lower, 0 at none: the first guess, and the result
-    order, multipliers, change, rest (n,), factor (n, n): workspace
+    active   (r,): 1.0 at the upper limit, -1 at the lower, 0 at none: the first guess, and the
+    result order, multipliers, change, rest (n,), factor (n, n): workspace
 
-    Dual active-set method: w = -m^T multipliers fulfils the limits of the active rows; the row that is violated most
-    becomes active, and one whose multiplier changes its sign is released. Every step lengthens w, so that no set of
-    active rows returns. SINGULAR: there is no such w. Reference: Goldfarb and Idnani (1983).
+    Dual active-set method: w = -m^T multipliers fulfils the limits of the active rows; the row that
+    is violated most becomes active, and one whose multiplier changes its sign is released. Every
+    step lengthens w, so that no set of active rows returns. SINGULAR: there is no such w.
+    Reference: Goldfarb and Idnani (1983).
     """
     count = begin_active(m, active, order, factor, multipliers, tolerances)
     status = NOT_CONVERGED
@@ -210,7 +237,9 @@ def shortest_vector(m, lower, upper, tolerances, active, order, factor, multipli
         if possible:
             count += 1
         else:
-            possible = exchange(m, row, order, count, active, factor, multipliers, change, tolerances)
+            possible = exchange(
+                m, row, order, count, active, factor, multipliers, change, tolerances
+            )
         if not possible:
             status = SINGULAR
             break
@@ -219,8 +248,11 @@ def shortest_vector(m, lower, upper, tolerances, active, order, factor, multipli
 
 @PART
 def find_point(y, r, by_output, gain, predicted, inputs, innovation, point):
-    """The point (N + q + m,): corrected states and disturbances, set points, inputs of the last sample."""
-    states, points = predicted.shape[0], r.shape[0]
+    """The point (N + q + m,): corrected states and disturbances, set points, inputs of the last
+    sample.
+    """
+    states = predicted.shape[0]
+    points = r.shape[0]
     for i in range(y.shape[0]):
         innovation[i] = y[i] - add_product(by_output[i], predicted, states, 0.0)
     for k in range(states):
@@ -245,24 +277,57 @@ def find_limits(low, high, of_input, scale, fixed_low, fixed_high, by_point, poi
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def predictive_sample(
-    y, r, low, high, by_output, gain, transition, by_input, rest, m, of_input, scale, fixed_low, fixed_high, by_point,
-    plan_by_w, plan_by_point, tolerances, predicted, plan, inputs, active, counts, innovation, point, lower, upper,
-    order, factor, multipliers, change, spare, w,
-):  # fmt: skip
-    """One sample: the inputs in `inputs` (m,), and the memory of the next sample in place; the status of the program.
+    y,
+    r,
+    low,
+    high,
+    by_output,
+    gain,
+    transition,
+    by_input,
+    rest,
+    m,
+    of_input,
+    scale,
+    fixed_low,
+    fixed_high,
+    by_point,
+    plan_by_w,
+    plan_by_point,
+    tolerances,
+    predicted,
+    plan,
+    inputs,
+    active,
+    counts,
+    innovation,
+    point,
+    lower,
+    upper,
+    order,
+    factor,
+    multipliers,
+    change,
+    spare,
+    w,
+):
+    """One sample: the inputs in `inputs` (m,), and the memory of the next sample in place; the
+    status of the program.
 
-    y, r              measured columns (p,) and set points (q,); low, high: limits of the inputs (m,)
-    by_output, gain, transition, by_input   (p, N), (N, p), (N, N), (N, m) of the observer
-    rest              (m, N + q + m) the inputs of the target by the point
-    m, of_input, scale, fixed_low, fixed_high, by_point   rows (r, n) of length 1, input or -1, scale, limits
-    plan_by_w, plan_by_point    (N_h m, n), (N_h m, N + q + m); tolerances those of `shortest_vector`
-    predicted, plan, active    (N,), (N_h m,), (r,); inputs (m,) those of the last sample
-    counts            (2,): samples since the plan was found, -1 without one; failures so far
-    Without a solution the next input of the last plan is applied, after its end that of the target.
+    y, r              measured columns (p,) and set points (q,); low, high: limits of the inputs
+    (m,) by_output, gain, transition, by_input   (p, N), (N, p), (N, N), (N, m) of the observer rest
+    (m, N + q + m) the inputs of the target by the point m, of_input, scale, fixed_low, fixed_high,
+    by_point   rows (r, n) of length 1, input or -1, scale, limits plan_by_w, plan_by_point    (N_h
+    m, n), (N_h m, N + q + m); tolerances those of `shortest_vector` predicted, plan, active
+    (N,), (N_h m,), (r,); inputs (m,) those of the last sample counts            (2,): samples since
+    the plan was found, -1 without one; failures so far Without a solution the next input of the
+    last plan is applied, after its end that of the target.
     """
     find_point(y, r, by_output, gain, predicted, inputs, innovation, point)
     find_limits(low, high, of_input, scale, fixed_low, fixed_high, by_point, point, lower, upper)
-    status = shortest_vector(m, lower, upper, tolerances, active, order, factor, multipliers, change, spare, w)
+    status = shortest_vector(
+        m, lower, upper, tolerances, active, order, factor, multipliers, change, spare, w
+    )
     number = inputs.shape[0]
     if status == DONE:
         counts[0] = 0

@@ -1,8 +1,10 @@
-"""Rodas4, a Rosenbrock method of order four for stiff systems: its step, and the kernel of an adaptive run.
+"""Rodas4, a Rosenbrock method of order four for stiff systems: its step, and the kernel of an
+adaptive run.
 
-Hairer and Wanner, Solving Ordinary Differential Equations II (1996), section VI.4, method RODAS. Stiffly accurate,
-L-stable, six stages with one factorisation, dense output of order three. It carries the slope of inputs that are linear
-within a segment, and meets its end exactly. Exported programs print `single_step` and `state_between`.
+Hairer and Wanner, Solving Ordinary Differential Equations II (1996), section VI.4, method RODAS.
+Stiffly accurate, L-stable, six stages with one factorisation, dense output of order three. It
+carries the slope of inputs that are linear within a segment, and meets its end exactly. Exported
+programs print `single_step` and `state_between`.
 """
 
 from math import sqrt
@@ -13,27 +15,57 @@ from ....core import Status
 from .calls import CONTRACTED_PART, invoke, pointer
 from .evaluate import set_inputs, write_present
 
-DONE, PAUSED = Status.DONE.value, Status.PAUSED.value
-STEP_TOO_SMALL, NOT_FINITE = Status.STEP_TOO_SMALL.value, Status.NOT_FINITE.value
+DONE = Status.DONE.value
+PAUSED = Status.PAUSED.value
+STEP_TOO_SMALL = Status.STEP_TOO_SMALL.value
+NOT_FINITE = Status.NOT_FINITE.value
 
-GAMMA, A21, C21 = 0.25, 1.544, -5.6688
-A31, A32 = 0.9466785280815826, 0.2557011698983284
-A41, A42, A43 = 3.314825187068521, 2.896124015972201, 0.9986419139977817
-A51, A52, A53, A54 = 1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950
-C31, C32 = -2.430093356833875, -0.2063599157091915
-C41, C42, C43 = -0.1073529058151375, -9.594562251023355, -20.47028614809616
-C51, C52, C53, C54 = 7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160
-C61, C62, C63, C64, C65 = (
-    8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054,
-)  # fmt: skip
-D1, D2, D3, D4 = 0.25, -0.1043, 0.1035, -0.03620000000000023
-N2, N3, N4 = 0.386, 0.21, 0.63
-H21, H22, H23, H24, H25 = (
-    10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662,
-)  # fmt: skip
-H31, H32, H33, H34, H35 = (
-    -0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872,
-)  # fmt: skip
+GAMMA = 0.25
+A21 = 1.544
+C21 = -5.6688
+A31 = 0.9466785280815826
+A32 = 0.2557011698983284
+A41 = 3.314825187068521
+A42 = 2.896124015972201
+A43 = 0.9986419139977817
+A51 = 1.221224509226641
+A52 = 6.019134481288629
+A53 = 12.53708332932087
+A54 = -0.6878860361058950
+C31 = -2.430093356833875
+C32 = -0.2063599157091915
+C41 = -0.1073529058151375
+C42 = -9.594562251023355
+C43 = -20.47028614809616
+C51 = 7.496443313967647
+C52 = -10.24680431464352
+C53 = -33.99990352819905
+C54 = 11.70890893206160
+
+C61 = 8.083246795921522
+C62 = -7.981132988064893
+C63 = -31.52159432874371
+C64 = 16.31930543123136
+C65 = -6.058818238834054
+D1 = 0.25
+D2 = -0.1043
+D3 = 0.1035
+D4 = -0.03620000000000023
+N2 = 0.386
+N3 = 0.21
+N4 = 0.63
+
+H21 = 10.12623508344586
+H22 = -7.487995877610167
+H23 = -34.80091861555747
+H24 = -7.992771707568823
+H25 = 1.025137723295662
+
+H31 = -0.6762803392801253
+H32 = 6.087714651680015
+H33 = 16.43084320892478
+H34 = 24.76722511418386
+H35 = -6.594389125716872
 
 
 @CONTRACTED_PART
@@ -52,9 +84,12 @@ def initial_step(y, f0, relative, absolute, left):
 
 
 @CONTRACTED_PART
-def compute_stages(solve, stage, c, factors, y, base, w, moving, t, start, h, f0, ft, u, x, g, k1, k2, k3, k4):
+def compute_stages(
+    solve, stage, c, factors, y, base, w, moving, t, start, h, f0, ft, u, x, g, k1, k2, k3, k4
+):
     """Stages one to four of a step from `t`; afterwards the inputs `u` are those at its end."""
-    n, r = y.shape[0], 1.0 / h
+    n = y.shape[0]
+    r = 1.0 / h
     for i in range(n):
         g[i] = f0[i] + h * D1 * ft[i]
     invoke(solve, (pointer(factors), pointer(g), pointer(k1)))
@@ -83,7 +118,8 @@ def compute_stages(solve, stage, c, factors, y, base, w, moving, t, start, h, f0
 @CONTRACTED_PART
 def compute_last_stages(stage, c, factors, y, u, h, x, g, k1, k2, k3, k4, k5, k6):
     """Stages five and six, at the end of the step."""
-    n, r = y.shape[0], 1.0 / h
+    n = y.shape[0]
+    r = 1.0 / h
     for i in range(n):
         x[i] = y[i] + A51 * k1[i] + A52 * k2[i] + A53 * k3[i] + A54 * k4[i]
         g[i] = r * (C51 * k1[i] + C52 * k2[i] + C53 * k3[i] + C54 * k4[i])
@@ -116,12 +152,42 @@ def step_factor(error):
 
 @CONTRACTED_PART
 def take_step(
-    stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, absolute, f0, ft, u, x, g, k1,
-    k2, k3, k4, k5, k6, yn, jacobian, factors,
-):  # fmt: skip
-    """Try steps from `t`, beginning with `h` (0: to be found), until one is accepted; it leads from `y` to `yn`.
+    stage,
+    jac,
+    factor,
+    solve,
+    df_dt,
+    c,
+    y,
+    base,
+    w,
+    moving,
+    t,
+    start,
+    end,
+    h,
+    relative,
+    absolute,
+    f0,
+    ft,
+    u,
+    x,
+    g,
+    k1,
+    k2,
+    k3,
+    k4,
+    k5,
+    k6,
+    yn,
+    jacobian,
+    factors,
+):
+    """Try steps from `t`, beginning with `h` (0: to be found), until one is accepted; it leads from
+    `y` to `yn`.
 
-    Returns a status, the step, the next step, whether it meets `end`, and the number of rejected steps.
+    Returns a status, the step, the next step, whether it meets `end`, and the number of rejected
+    steps.
     """
     set_inputs(base, t - start, w, u)
     invoke(jac, (pointer(y), pointer(u), pointer(c), pointer(f0), pointer(jacobian)))
@@ -129,14 +195,36 @@ def take_step(
         invoke(df_dt, (pointer(y), pointer(u), pointer(c), pointer(w), pointer(ft)))
     if h <= 0.0:
         h = initial_step(y, f0, relative, absolute, end - t)
-    status, rejections = DONE, 0
+    status = DONE
+    rejections = 0
     while True:
         last = t + 1.000001 * h >= end
         tried = h
         if last:
             h = end - t
         invoke(factor, (pointer(jacobian), (1.0 / h) / GAMMA, pointer(factors)))
-        compute_stages(solve, stage, c, factors, y, base, w, moving, t, start, h, f0, ft, u, x, g, k1, k2, k3, k4)
+        compute_stages(
+            solve,
+            stage,
+            c,
+            factors,
+            y,
+            base,
+            w,
+            moving,
+            t,
+            start,
+            h,
+            f0,
+            ft,
+            u,
+            x,
+            g,
+            k1,
+            k2,
+            k3,
+            k4,
+        )
         compute_last_stages(stage, c, factors, y, u, h, x, g, k1, k2, k3, k4, k5, k6)
         error = finish_step(y, x, k6, relative, absolute, yn)
         ratio = step_factor(error)
@@ -151,7 +239,9 @@ def take_step(
         ratio = min(ratio, 1.0)
     following = h * ratio
     if last:
-        following = max(following, tried)  # a step cut short by the end of a segment does not shorten the next
+        following = max(
+            following, tried
+        )  # a step cut short by the end of a segment does not shorten the next
     return status, h, following, last, rejections
 
 
@@ -173,10 +263,42 @@ def interpolate(y, yn, d2, d3, q, between):
 
 @CONTRACTED_PART
 def single_step(
-    stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, nominal, absolute, f0, ft, u,
-    x, g, k1, k2, k3, k4, k5, k6, yn, jacobian, factors, d2, d3,
-):  # fmt: skip
-    """A step from `y` at `t` to `yn`, with its dense output; the absolute tolerance follows from the nominal states.
+    stage,
+    jac,
+    factor,
+    solve,
+    df_dt,
+    c,
+    y,
+    base,
+    w,
+    moving,
+    t,
+    start,
+    end,
+    h,
+    relative,
+    nominal,
+    absolute,
+    f0,
+    ft,
+    u,
+    x,
+    g,
+    k1,
+    k2,
+    k3,
+    k4,
+    k5,
+    k6,
+    yn,
+    jacobian,
+    factors,
+    d2,
+    d3,
+):
+    """A step from `y` at `t` to `yn`, with its dense output; the absolute tolerance follows from
+    the nominal states.
 
     Returns a status, the time reached, the step, the next step, and the number of rejected steps.
     """
@@ -184,9 +306,37 @@ def single_step(
         absolute[i] = relative * nominal[i]
         ft[i] = 0.0
     status, h, following, last, rejections = take_step(
-        stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, absolute,
-        f0, ft, u, x, g, k1, k2, k3, k4, k5, k6, yn, jacobian, factors,
-    )  # fmt: skip
+        stage,
+        jac,
+        factor,
+        solve,
+        df_dt,
+        c,
+        y,
+        base,
+        w,
+        moving,
+        t,
+        start,
+        end,
+        h,
+        relative,
+        absolute,
+        f0,
+        ft,
+        u,
+        x,
+        g,
+        k1,
+        k2,
+        k3,
+        k4,
+        k5,
+        k6,
+        yn,
+        jacobian,
+        factors,
+    )
     prepare_dense_output(k1, k2, k3, k4, k5, d2, d3)
     reached = end if last else t + h
     return status, reached, h, following, rejections
@@ -200,20 +350,36 @@ def state_between(y, yn, d2, d3, t, h, time, between):
 
 @CONTRACTED_PART
 def workspace(work, n, m, jacobian_size):
-    """The arrays f0, ft, x, yn, g, k1 .. k6 (n,), u, w (m,), Jacobian and factors within the workspace."""
+    """The arrays f0, ft, x, yn, g, k1 .. k6 (n,), u, w (m,), Jacobian and factors within the
+    workspace.
+    """
     rest = 11 * n + 2 * m
     return (
-        work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n], work[4 * n : 5 * n],
-        (work[5 * n : 6 * n], work[6 * n : 7 * n], work[7 * n : 8 * n],
-         work[8 * n : 9 * n], work[9 * n : 10 * n], work[10 * n : 11 * n]),
-        work[11 * n : 11 * n + m], work[11 * n + m : rest],
-        work[rest : rest + jacobian_size], work[rest + jacobian_size :],
-    )  # fmt: skip
+        work[:n],
+        work[n : 2 * n],
+        work[2 * n : 3 * n],
+        work[3 * n : 4 * n],
+        work[4 * n : 5 * n],
+        (
+            work[5 * n : 6 * n],
+            work[6 * n : 7 * n],
+            work[7 * n : 8 * n],
+            work[8 * n : 9 * n],
+            work[9 * n : 10 * n],
+            work[10 * n : 11 * n],
+        ),
+        work[11 * n : 11 * n + m],
+        work[11 * n + m : rest],
+        work[rest : rest + jacobian_size],
+        work[rest + jacobian_size :],
+    )
 
 
 @CONTRACTED_PART
 def begin_segment(slopes, w, ft):
-    """Set the slopes `w` of the inputs and the derivative `ft` with respect to time; whether an input changes."""
+    """Set the slopes `w` of the inputs and the derivative `ft` with respect to time; whether an
+    input changes.
+    """
     moving = False
     for i in range(w.shape[0]):
         w[i] = slopes[i]
@@ -225,7 +391,9 @@ def begin_segment(slopes, w, ft):
 
 @CONTRACTED_PART
 def complete_step(times, row, reached, t, h, y, yn, k1, k2, k3, k4, k5, x, g, rows):
-    """Write the states at the output times up to `reached` by the dense output, then copy `yn` to `y`; the next row."""
+    """Write the states at the output times up to `reached` by the dense output, then copy `yn` to
+    `y`; the next row.
+    """
     if row < times.shape[0] and times[row] <= reached:
         prepare_dense_output(k1, k2, k3, k4, k5, x, g)  # x and g are free by now
     while row < times.shape[0] and times[row] <= reached:
@@ -238,34 +406,88 @@ def complete_step(times, row, reached, t, h, y, yn, k1, k2, k3, k4, k5, x, g, ro
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def rodas4(
-    stage, jac, factor, solve, df_dt, jacobian_size, factor_size, c, y, ends, values, slopes, times, rows, relative,
-    absolute, clock, count, budget, work,
-):  # fmt: skip
-    """Advance `y` (n,) through the segments, and write the states at `times` into `rows`; a status code.
+    stage,
+    jac,
+    factor,
+    solve,
+    df_dt,
+    jacobian_size,
+    factor_size,
+    c,
+    y,
+    ends,
+    values,
+    slopes,
+    times,
+    rows,
+    relative,
+    absolute,
+    clock,
+    count,
+    budget,
+    work,
+):
+    """Advance `y` (n,) through the segments, and write the states at `times` into `rows`; a status
+    code.
 
     stage .. df_dt  addresses of the printed functions; `c` what they need of the parameters
-    ends, values, slopes  (S,), (S, m), (S, m): end of each segment, inputs at its start, their slopes
-    clock  (3,): time, next step (0: to be found), start of the current segment
-    count  (4,): segment, next row, steps, rejected steps
-    budget  steps after which the kernel pauses, so that its caller can be interrupted; call again to go on
-    work  (11 n + 2 m + jacobian_size + factor_size,): of the caller; a kernel's own would be freed before its last use
+    ends, values, slopes  (S,), (S, m), (S, m): end of each segment, inputs at its start, their
+    slopes clock  (3,): time, next step (0: to be found), start of the current segment count  (4,):
+    segment, next row, steps, rejected steps budget  steps after which the kernel pauses, so that
+    its caller can be interrupted; call again to go on work  (11 n + 2 m + jacobian_size +
+    factor_size,): of the caller; a kernel's own would be freed before its last use
     """
-    f0, ft, x, yn, g, k, u, w, jacobian, factors = workspace(work, y.shape[0], values.shape[1], jacobian_size)
+    f0, ft, x, yn, g, k, u, w, jacobian, factors = workspace(
+        work, y.shape[0], values.shape[1], jacobian_size
+    )
     k1, k2, k3, k4, k5, k6 = k
-    t, h, start = clock[0], clock[1], clock[2]
-    segment, taken, status = count[0], 0, DONE
+    t = clock[0]
+    h = clock[1]
+    start = clock[2]
+    segment = count[0]
+    taken = 0
+    status = DONE
     row = write_present(times, count[1], t, y, rows)
     while segment < ends.shape[0]:
-        end, base = ends[segment], values[segment]
+        end = ends[segment]
+        base = values[segment]
         moving = begin_segment(slopes[segment], w, ft)
         while t < end:
             if taken >= budget:
                 status = PAUSED
                 break
             status, h, following, last, rejections = take_step(
-                stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, absolute,
-                f0, ft, u, x, g, k1, k2, k3, k4, k5, k6, yn, jacobian, factors,
-            )  # fmt: skip
+                stage,
+                jac,
+                factor,
+                solve,
+                df_dt,
+                c,
+                y,
+                base,
+                w,
+                moving,
+                t,
+                start,
+                end,
+                h,
+                relative,
+                absolute,
+                f0,
+                ft,
+                u,
+                x,
+                g,
+                k1,
+                k2,
+                k3,
+                k4,
+                k5,
+                k6,
+                yn,
+                jacobian,
+                factors,
+            )
             count[3] += rejections
             if status != DONE:
                 break
@@ -279,6 +501,8 @@ def rodas4(
         segment += 1
         start = t
         h = 0.0
-    clock[0], clock[1], clock[2] = t, h, start
+    clock[0] = t
+    clock[1] = h
+    clock[2] = start
     count[0], count[1], count[2] = segment, row, count[2] + taken
     return status

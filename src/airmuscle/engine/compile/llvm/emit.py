@@ -1,4 +1,6 @@
-"""LLVM text of instructions over numbers or vectors of lanes: straight-line code, and branches around blocks."""
+"""LLVM text of instructions over numbers or vectors of lanes: straight-line code, and branches
+around blocks.
+"""
 
 import dataclasses
 import functools
@@ -9,7 +11,9 @@ from ..ir.emission import FunctionBlock, TargetLanguage, nearest_single
 from ..ir.instructions import CALLED, POWERS, Operand, Operation
 
 FLAGS = "nsz arcp contract reassoc afn"
-"""Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
+"""Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or
+infinity.
+"""
 
 STEADY_POWER = "steadypow"
 """Name of the power with an exponent that depends on parameters alone, in lanes."""
@@ -22,7 +26,9 @@ _COMPARISONS = {"<": "olt", "<=": "ole", ">": "ogt", "==": "oeq", "!=": "une", "
 
 @dataclasses.dataclass(frozen=True)
 class LlvmType:
-    """`lanes` numbers of `bits` each, which LLVM computes together: double, <32 x double>, <32 x float>."""
+    """`lanes` numbers of `bits` each, which LLVM computes together: double, <32 x double>, <32 x
+    float>.
+    """
 
     bits: int = 64
     lanes: int = 1
@@ -57,11 +63,15 @@ class LlvmType:
         return f"llvm.{name}.{f'v{self.lanes}' if self.lanes > 1 else ''}f{self.bits}"
 
     def function(self, name: str) -> str:
-        """Name of the vectorised replacement of a C library function, which `vector_math` defines."""
+        """Name of the vectorised replacement of a C library function, which `vector_math`
+        defines.
+        """
         return f"{name}.v{self.lanes}f{self.bits}"
 
     def literal(self, value: float) -> str:
-        """A number as LLVM text; in single precision it is rounded first, because LLVM requires an exact value."""
+        """A number as LLVM text; in single precision it is rounded first, because LLVM requires an
+        exact value.
+        """
         if self.bits == 32:
             value = nearest_single(value)
         return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
@@ -71,16 +81,22 @@ class LlvmType:
 
 
 DOUBLE = LlvmType()
-_OF_ONE = (*sorted({*CALLED.values()} - {"pow"}), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
-DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
+_OF_ONE = (
+    *sorted({*CALLED.values()} - {"pow"}),
+    *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()),
+)
+DECLARED = (
+    "".join(f"declare double @{name}(double)\n" for name in _OF_ONE)
+    + "declare double @pow(double, double)\n"
+)
 """Declarations of the functions that printed code may call."""
 
 
 class FunctionBody(FunctionBlock):
     """The lines of one LLVM function under construction, with elimination of common subexpressions.
 
-    Every value has the type `number`. In lanes, functions that are not LLVM intrinsics are called by the names in
-    `needed`, whose definitions `vector_math` prints.
+    Every value has the type `number`. In lanes, functions that are not LLVM intrinsics are called
+    by the names in `needed`, whose definitions `vector_math` prints.
     """
 
     language = "LLVM"
@@ -127,15 +143,23 @@ class FunctionBody(FunctionBlock):
     def store(self, array: str, index: int, value: str) -> None:
         """Write a value into an array element."""
         place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
-        self.lines.append(f"  store {self.number.text} {value}, ptr {place}, align {self.number.alignment}")
+        self.lines.append(
+            f"  store {self.number.text} {value}, ptr {place}, align {self.number.alignment}"
+        )
 
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
         number = self.number
         test = self.put(f"fcmp {_COMPARISONS[comparison]} {number.text} {a}, {b}")
-        return self.put(f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}")
+        return self.put(
+            f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}"
+        )
 
     def call(self, function: str, x: Sequence[str]) -> str:
-        return self.intrinsic(_INTRINSICS[function], x) if function in _INTRINSICS else self.call_library(function, x)
+        return (
+            self.intrinsic(_INTRINSICS[function], x)
+            if function in _INTRINSICS
+            else self.call_library(function, x)
+        )
 
     def call_library(self, function: str, x: Sequence[str]) -> str:
         """Call of a function of the C library, or of its vectorised replacement in lanes."""
@@ -149,36 +173,55 @@ class FunctionBody(FunctionBlock):
     def intrinsic(self, name: str, x: Sequence[str], flags: str = FLAGS) -> str:
         """Call of an LLVM intrinsic."""
         arguments = ", ".join(f"{self.number.text} {a}" for a in x)
-        return self.put(f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})")
+        return self.put(
+            f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})"
+        )
 
     def power(self, base: str, exponent: str) -> str:
-        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does for scalars, and
-        other exponents that are constant or depend on parameters alone the shorter form of `steady_power`."""
+        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does
+        for scalars, and other exponents that are constant or depend on parameters alone the shorter
+        form of `steady_power`.
+        """
         value = self._constants.get(exponent)
-        if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
+        if (
+            self.number == DOUBLE
+            or value is None
+            or abs(value) > 16
+            or not (2 * value).is_integer()
+        ):
             return self.power_by_call(base, exponent)
-        result, square, left = self.constant(1.0), base, int(abs(value))
+        result = self.constant(1.0)
+        square = base
+        left = int(abs(value))
         while left:
             if left % 2:
                 result = self.arithmetic("*", result, square)
-            square, left = self.arithmetic("*", square, square), left // 2
+            square = self.arithmetic("*", square, square)
+            left = left // 2
         if abs(value) % 1:
             result = self.arithmetic("*", result, self.intrinsic("sqrt", (base,)))
         return result if value >= 0 else self.arithmetic("/", self.constant(1.0), result)
 
     def power_by_call(self, base: str, exponent: str) -> str:
         """base**exponent by a function."""
-        if self.number == DOUBLE or (exponent not in self._constants and exponent not in self._steady):
+        if self.number == DOUBLE or (
+            exponent not in self._constants and exponent not in self._steady
+        ):
             return self.call_library("pow", (base, exponent))
         self.needed["pow"] = 2  # for arguments beyond the range of the shorter form
         return self.call_library(STEADY_POWER, (base, exponent))
 
     def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+        self,
+        gates: Sequence[str],
+        compute: Callable[[], dict[Operand, str]],
+        instead: Mapping[Operand, str],
     ) -> dict[Operand, str]:
-        """The results that `compute` appends and returns if one of `gates` is not zero, otherwise those of `instead`.
+        """The results that `compute` appends and returns if one of `gates` is not zero, otherwise
+        those of `instead`.
 
-        In lanes, the block is executed if any lane requires it; the other lanes keep the values of `instead`.
+        In lanes, the block is executed if any lane requires it; the other lanes keep the values of
+        `instead`.
         """
         number, here = self.number, self.new_name()[1:]
         self.lines += [f"  br label %{here}.if", f"{here}.if:"]
@@ -188,13 +231,19 @@ class FunctionBody(FunctionBlock):
         if number.lanes > 1:
             bits = self.put(f"bitcast {number.mask} {test} to i{number.lanes}")
             any_lane = self.put(f"icmp ne i{number.lanes} {bits}, 0")
-        self.lines += [f"  br i1 {any_lane}, label %{here}.then, label %{here}.end", f"{here}.then:"]
-        outside, self.known = self.known, dict(self.known)  # values of the block are not available after it
+        self.lines += [
+            f"  br i1 {any_lane}, label %{here}.then, label %{here}.end",
+            f"{here}.then:",
+        ]
+        # values of the block are not available after it
+        outside = self.known
+        self.known = dict(self.known)
         inside = compute()
         if number.lanes > 1:
             for operand, value in instead.items():
                 inside[operand] = self.put(
-                    f"select {number.mask} {test}, {number.text} {inside[operand]}, {number.text} {value}"
+                    f"select {number.mask} {test}, {number.text} {inside[operand]}, {number.text}"
+                    f" {value}"
                 )
         self.known = outside
         self.lines += [f"  br label %{here}.end", f"{here}.end:"]
@@ -227,25 +276,48 @@ class LlvmLanguage(TargetLanguage):
     def body(self, scalars: Sequence[str] = ()) -> FunctionBody:
         return FunctionBody(scalars, self.number)
 
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
-        return function(name, [*inputs, *outputs], body, "nounwind" if self.number.lanes == 1 else ALIGNED)
+    def function(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock
+    ) -> str:
+        return function(
+            name, [*inputs, *outputs], body, "nounwind" if self.number.lanes == 1 else ALIGNED
+        )
 
-    def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
-        """`prepare` runs once for a set of parameters, so it is not worth the time that optimising it would take."""
+    def preparation(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock
+    ) -> str:
+        """`prepare` runs once for a set of parameters, so it is not worth the time that optimising
+        it would take.
+        """
         return function(name, [*inputs, *outputs], body, "nounwind noinline optnone")
 
 
-ALIGNED = "nounwind alignstack(64)"  # else the time of spilled vectors depends on the depth of the stack at the call
+ALIGNED = (  # else the time of spilled vectors depends on the depth of the stack at the call
+    "nounwind alignstack(64)"
+)
 
 
-def function(name: str, arguments: Sequence[str], block: FunctionBlock, attributes: str = "nounwind") -> str:
+def function(
+    name: str, arguments: Sequence[str], block: FunctionBlock, attributes: str = "nounwind"
+) -> str:
     """The LLVM text of a function that returns nothing; arrays are pointers that do not overlap."""
-    signature = ", ".join(f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments)
-    return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
+    signature = ", ".join(
+        f"double %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments
+    )
+    return (
+        f"define void @{name}({signature}) {attributes} {{\n"
+        + "\n".join(block.lines)
+        + "\n  ret void\n}\n"
+    )
 
 
 def function_of_values(
-    name: str, arguments: Sequence[str], block: FunctionBlock, number: LlvmType, value: str, more: str = ""
+    name: str,
+    arguments: Sequence[str],
+    block: FunctionBlock,
+    number: LlvmType,
+    value: str,
+    more: str = "",
 ) -> str:
     """The LLVM text of a function within a module, which takes and returns values."""
     signature = ", ".join(f"{number.text} {a}" for a in arguments)

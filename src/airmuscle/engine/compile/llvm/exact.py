@@ -1,4 +1,6 @@
-"""Arithmetic of scalars and LLVM vectors, exact sums and products, and powers with an exponent common to all lanes."""
+"""Arithmetic of scalars and LLVM vectors, exact sums and products, and powers with an exponent
+common to all lanes.
+"""
 
 import dataclasses
 import functools
@@ -15,10 +17,14 @@ class ExactBody(FunctionBody):
         super().__init__((), LlvmType(bits, lanes))
         self.mantissa, self.least = (52, 2.0**-1074) if bits == 64 else (23, 2.0**-149)
         self.rounder = 1.5 * 2.0**self.mantissa
-        """Added to an integer of moderate size, this leaves the integer in the last bits of the sum."""
+        """Added to an integer of moderate size, this leaves the integer in the last bits of the
+        sum.
+        """
 
     # as with conditions, without flags
-    add, subtract, times, over = (functools.partialmethod(FunctionBody.logical, operator) for operator in "+-*/")
+    add, subtract, times, over = (
+        functools.partialmethod(FunctionBody.logical, operator) for operator in "+-*/"
+    )
 
     def fused(self, a: str, b: str, c: str) -> str:
         """a b + c, rounded once."""
@@ -47,7 +53,9 @@ class ExactBody(FunctionBody):
         return self.put(f"bitcast {self.number.whole} {a} to {self.number.text}")
 
     def on_bits(self, operation: str, a: str, b: float | str) -> str:
-        """An integer operation with a constant, given as the double of the same bits, or with a value."""
+        """An integer operation with a constant, given as the double of the same bits, or with a
+        value.
+        """
         other = self.bits(self.constant(b)) if isinstance(b, float) else b
         return self.put(f"{operation} {self.number.whole} {a}, {other}")
 
@@ -56,7 +64,9 @@ class ExactBody(FunctionBody):
         return self.on_bits(operation, a, self.mantissa * self.least)
 
     def power_of_two(self, n: str) -> str:
-        """2**n for an integer n for which this is an ordinary number, in double precision -1022 to 1023."""
+        """2**n for an integer n for which this is an ordinary number, in double precision -1022 to
+        1023.
+        """
         low = self.shifted("shl", self.bits(self.add(n, self.constant(self.rounder))))
         return self.from_bits(self.on_bits("add", low, 1.0))
 
@@ -82,23 +92,33 @@ class _Accuracy:
     largest_exponent: int
 
 
-_DOUBLE, _SINGLE = _Accuracy(8, 12, 1000.0, 1000), _Accuracy(4, 7, 16.0, 120)
+_DOUBLE = _Accuracy(8, 12, 1000.0, 1000)
+_SINGLE = _Accuracy(4, 7, 16.0, 120)
 
 
 def steady_power(number: LlvmType) -> str:
-    """The LLVM text of the function; it calls `pow` of the same lanes, which must be in the module."""
-    block, accuracy = ExactBody(number.lanes, number.bits), _DOUBLE if number.bits == 64 else _SINGLE
+    """The LLVM text of the function; it calls `pow` of the same lanes, which must be in the
+    module.
+    """
+    block = ExactBody(number.lanes, number.bits)
+    accuracy = _DOUBLE if number.bits == 64 else _SINGLE
     product = block.times("%y", _logarithm(block, "%x", accuracy))
     value = _exponential(block, product, accuracy)
     tests = (
         block.put(f"fcmp oge {number.text} %x, {block.constant(2.0**-accuracy.largest_exponent)}"),
         block.put(f"fcmp ole {number.text} %x, {block.constant(2.0**accuracy.largest_exponent)}"),
-        block.put(f"fcmp ole {number.text} {block.size_of(product)}, {block.constant(accuracy.largest)}"),
+        block.put(
+            f"fcmp ole {number.text} {block.size_of(product)}, {block.constant(accuracy.largest)}"
+        ),
     )
     usual = functools.reduce(lambda a, b: block.put(f"and {number.mask} {a}, {b}"), tests)
     value = _otherwise(block, usual, value)
-    inline = " alwaysinline" if number.bits == 64 else ""  # measured: a gain in double precision only
-    return function_of_values(number.function(STEADY_POWER), ["%x", "%y"], block, number, value, inline)
+    inline = (
+        " alwaysinline" if number.bits == 64 else ""
+    )  # measured: a gain in double precision only
+    return function_of_values(
+        number.function(STEADY_POWER), ["%x", "%y"], block, number, value, inline
+    )
 
 
 def _logarithm(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
@@ -106,11 +126,16 @@ def _logarithm(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
     bits = block.bits(x)
     exponent = block.shifted("ashr", block.on_bits("sub", bits, math.sqrt(0.5)))
     m = block.from_bits(block.on_bits("sub", bits, block.shifted("shl", exponent)))
-    n = block.subtract(block.from_bits(block.on_bits("add", exponent, block.rounder)), block.constant(block.rounder))
+    n = block.subtract(
+        block.from_bits(block.on_bits("add", exponent, block.rounder)),
+        block.constant(block.rounder),
+    )
     one = block.constant(1.0)
     s = block.over(block.subtract(m, one), block.add(m, one))
     scale = 2 / math.log(2)
-    series = _polynomial(block, block.times(s, s), [scale / (2 * i + 1) for i in range(accuracy.logarithm + 1)])
+    series = _polynomial(
+        block, block.times(s, s), [scale / (2 * i + 1) for i in range(accuracy.logarithm + 1)]
+    )
     return block.fused(s, series, n)
 
 
@@ -122,21 +147,28 @@ def _exponential(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
 
 
 def _polynomial(block: ExactBody, x: str, coefficients: Sequence[float]) -> str:
-    """c0 + c1 x + c2 x**2 + ... as the sum of its even and its odd part, which do not wait for each other."""
+    """c0 + c1 x + c2 x**2 + ... as the sum of its even and its odd part, which do not wait for each
+    other.
+    """
     square = block.times(x, x)
     even, odd = (block.polynomial(square, coefficients[i::2]) for i in (0, 1))
     return block.fused(odd, x, even)
 
 
 def _otherwise(block: ExactBody, usual: str, value: str) -> str:
-    """The value in the usual lanes, that of `pow` in the others, which is computed if there are any."""
+    """The value in the usual lanes, that of `pow` in the others, which is computed if there are
+    any.
+    """
     number = block.number
     flipped = f"<i1 true{', i1 true' * (number.lanes - 1)}>"
     other = block.put(f"xor {number.mask} {usual}, {flipped}")
     some = block.put(f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {other})")
     block.lines += [f"  br i1 {some}, label %unusual, label %end", "unusual:"]
     block.lines += [
-        f"  %exact = call {number.text} @{number.function('pow')}({number.text} %x, {number.text} %y)",
+        (
+            f"  %exact = call {number.text} @{number.function('pow')}({number.text} %x,"
+            f" {number.text} %y)"
+        ),
         f"  %mixed = select {number.mask} {usual}, {number.text} {value}, {number.text} %exact",
         "  br label %end",
         "end:",
@@ -168,7 +200,11 @@ class LlvmValue:
         kind = f"<{lanes} x double>"
         first = self.block.put(f"insertelement {kind} poison, double {self.name}, i32 0")
         places = f"<{lanes} x i32> zeroinitializer"
-        return LlvmValue(self.block, self.block.put(f"shufflevector {kind} {first}, {kind} poison, {places}"), lanes)
+        return LlvmValue(
+            self.block,
+            self.block.put(f"shufflevector {kind} {first}, {kind} poison, {places}"),
+            lanes,
+        )
 
     def _with(self, operation: str, other: "LlvmValue") -> "LlvmValue":
         a, b = self.spread(other.lanes), other.spread(self.lanes)

@@ -1,4 +1,6 @@
-"""Machine code: compilation of LLVM text by llvmlite, and of kernels by numba into object code that is stored."""
+"""Machine code: compilation of LLVM text by llvmlite, and of kernels by numba into object code that
+is stored.
+"""
 
 import contextlib
 import functools
@@ -11,9 +13,9 @@ from .emit import DECLARED
 LEVEL = 2
 """Optimisation level of printed modules."""
 STRAIGHT_PASSES = """
-simplify_cfg instruction_combine new_gvn simplify_cfg reassociate instruction_combine new_gvn simplify_cfg"""
-"""Passes for a function without loops, memory of its own, and calls to other printed functions: those of the standard
-pipeline that change it, in half the time of the pipeline (measured)."""
+simplify_cfg instruction_combine new_gvn simplify_cfg reassociate instruction_combine new_gvn simplify_cfg"""  # noqa: E501
+"""Passes for a function without loops, memory of its own, and calls to other printed functions:
+those of the standard pipeline that change it, in half the time of the pipeline (measured)."""
 
 
 def object_code(text: str) -> bytes:
@@ -28,7 +30,9 @@ def object_code(text: str) -> bytes:
 
 
 def _optimise(module: Any, machine: Any) -> None:
-    """Optimise a module: with the standard pipeline if it has functions to inline, else each function by itself."""
+    """Optimise a module: with the standard pipeline if it has functions to inline, else each
+    function by itself.
+    """
     import llvmlite.binding as llvm
 
     options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
@@ -46,7 +50,9 @@ def _optimise(module: Any, machine: Any) -> None:
 
 
 def engine_of(code: bytes) -> Any:
-    """An engine with the code of an object file; it must stay alive as long as its addresses are used."""
+    """An engine with the code of an object file; it must stay alive as long as its addresses are
+    used.
+    """
     import llvmlite.binding as llvm
 
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), native(LEVEL))
@@ -65,11 +71,15 @@ def _target() -> Any:
 
 
 def native(level: int) -> Any:
-    """A code generator for this very processor, with so much optimisation (0 to 3); each engine owns its own."""
+    """A code generator for this very processor, with so much optimisation (0 to 3); each engine
+    owns its own.
+    """
     import llvmlite.binding as llvm
 
     features = llvm.get_host_cpu_features().flatten()
-    return _target().create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=level)
+    return _target().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=level
+    )
 
 
 _C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
@@ -77,10 +87,12 @@ _STANDALONE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": Tr
 
 
 def build(kernel: Any, kinds: Sequence[str]) -> bytes:
-    """Machine code of a numba kernel for arguments of these kinds; empty where the kernel cannot do without numba.
+    """Machine code of a numba kernel for arguments of these kinds; empty where the kernel cannot do
+    without numba.
 
-    That is where it allocates or raises, returns something else than a status, or calls what neither LLVM nor the
-    C library provides; or with a version of numba that passes arrays in another way than `entry_point` knows.
+    That is where it allocates or raises, returns something else than a status, or calls what
+    neither LLVM nor the C library provides; or with a version of numba that passes arrays in
+    another way than `entry_point` knows.
     """
     import llvmlite.binding as llvm
     import numba
@@ -94,14 +106,22 @@ def build(kernel: Any, kinds: Sequence[str]) -> bytes:
             standalone.compile(signature)
     except NumbaError:
         return b""
-    text, returned = standalone.inspect_llvm(signature), {s.return_type for s in standalone.nopython_signatures}
+    text = standalone.inspect_llvm(signature)
+    returned = {s.return_type for s in standalone.nopython_signatures}
     functions = [f for f in llvm.parse_assembly(text).functions if not f.is_declaration]
-    expected = ["retptr", "excinfo", *numba_arguments(kernel.py_func.__code__.co_varnames[: len(kinds)], kinds)]
-    if [[a.name for a in f.arguments] for f in functions] != [expected] or text.count("%excinfo") > 1:
+    expected = [
+        "retptr",
+        "excinfo",
+        *numba_arguments(kernel.py_func.__code__.co_varnames[: len(kinds)], kinds),
+    ]
+    if [[a.name for a in f.arguments] for f in functions] != [expected] or text.count(
+        "%excinfo"
+    ) > 1:
         return b""  # arrays are passed in another way, or it raises
     if not returned <= {numba.int64, numba.none}:
         return b""
-    module, machine = llvm.parse_assembly(f"{text}\n{entry_point(functions[0].name, kinds)}"), native(3)
+    module = llvm.parse_assembly(f"{text}\n{entry_point(functions[0].name, kinds)}")
+    machine = native(3)
     module.get_function(functions[0].name).linkage = "internal"
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
@@ -122,7 +142,9 @@ def _numba_type(kind: str) -> Any:
 
 @contextlib.contextmanager
 def shallow_scope_copies() -> Iterator[None]:
-    """Within the context a copied scope of numba shares its variables, unless this numba has scopes of another form."""
+    """Within the context a copied scope of numba shares its variables, unless this numba has scopes
+    of another form.
+    """
     from numba.core import ir
 
     scope = ir.Scope
@@ -144,7 +166,9 @@ def _shallow_copy(self: Any, memo: dict[int, Any]) -> Any:
     copied = type(self)(self.parent, self.loc)
     copied.localvars._con = dict(self.localvars._con)
     copied.redefined = self.redefined.copy()
-    copied.var_redefinitions = defaultdict(set, {name: set(names) for name, names in self.var_redefinitions.items()})
+    copied.var_redefinitions = defaultdict(
+        set, {name: set(names) for name, names in self.var_redefinitions.items()}
+    )
     memo[id(self)] = copied
     return copied
 
@@ -155,7 +179,9 @@ _ITEM_SIZES = {"q": 8, "d": 8, "f": 4}
 
 @functools.cache
 def slot_count(kind: str) -> int:
-    """Slots of an argument of this kind: "q" whole number, "d" float, "d2" array of doubles, "f1" of singles."""
+    """Slots of an argument of this kind: "q" whole number, "d" float, "d2" array of doubles, "f1"
+    of singles.
+    """
     return 1 + int(kind[1:] or 0)
 
 
@@ -195,9 +221,16 @@ def entry_point(function: str, kinds: Sequence[str]) -> str:
             passed += [f"i64 {x}.shape{k}" for k in range(dimensions)]
             passed += [f"i64 {x}.stride{k}" for k in range(dimensions)]
         slot += slot_count(kind)
-    lines += [f'call i32 @"{function}"({", ".join(passed)})', "%result = load i64, ptr %status", "ret i64 %result"]
+    lines += [
+        f'call i32 @"{function}"({", ".join(passed)})',
+        "%result = load i64, ptr %status",
+        "ret i64 %result",
+    ]
     return "\n".join(["define i64 @entry(ptr %slots) {", *lines, "}\n"])
 
 
 def _load(name: str, kind: str, slot: int) -> list[str]:
-    return [f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}", f"{name} = load {kind}, ptr {name}.at"]
+    return [
+        f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}",
+        f"{name} = load {kind}, ptr {name}.at",
+    ]

@@ -1,4 +1,6 @@
-"""Function body in a language of expressions: each value is named once, choices are conditional expressions."""
+"""Function body in a language of expressions: each value is named once, choices are conditional
+expressions.
+"""
 
 import abc
 import dataclasses
@@ -34,13 +36,18 @@ class TextLanguage(TargetLanguage):
 
     language = ""
     """Name in messages."""
-    equal, unequal, either = "==", "!=", "||"
-    margin, end = "  ", ";"
+    equal = "=="
+    unequal = "!="
+    either = "||"
+    margin = "  "
+    end = ";"
     """What stands before and after every statement."""
-    infinity, not_a_number = "INFINITY", "NAN"
+    infinity = "INFINITY"
+    not_a_number = "NAN"
     remark = "// {}"
     """A comment at the end of a line."""
-    begin_branch, end_branch = "  if ({}) {{", "  }"
+    begin_branch = "  if ({}) {{"
+    end_branch = "  }"
     branches = True
     """Whether functions have branches."""
 
@@ -59,7 +66,9 @@ class TextLanguage(TargetLanguage):
         return f"(-{text})" if math.copysign(1.0, value) < 0 else text
 
     def defines(self) -> tuple[str, str]:
-        """What stands before the name of a value at its definition, and of one that a branch may change."""
+        """What stands before the name of a value at its definition, and of one that a branch may
+        change.
+        """
         return "", ""
 
     def element(self, array: str, index: int) -> str:
@@ -78,13 +87,14 @@ class TextLanguage(TargetLanguage):
 class TextBody(FunctionBlock):
     """The lines of one function in a language `syntax`.
 
-    `read` and `written` are the arrays that the function uses so far, `loaded` and `stored` the places of their values
-    by name, `sizes` the lengths of the arrays that are written.
+    `read` and `written` are the arrays that the function uses so far, `loaded` and `stored` the
+    places of their values by name, `sizes` the lengths of the arrays that are written.
     """
 
     def __init__(self, syntax: TextLanguage, scalars: Sequence[str] = ()) -> None:
         super().__init__(scalars)
-        self.syntax, self.language = syntax, syntax.language
+        self.syntax = syntax
+        self.language = syntax.language
         self.read, self.written = set[str](), set[str]()
         self.loaded, self.stored = dict[str, tuple[str, int]](), dict[str, tuple[str, int]]()
         self.sizes: dict[str, int] = {}
@@ -126,36 +136,59 @@ class TextBody(FunctionBlock):
     def _assigned(self, variable: str, value: str) -> str:
         return f"{self.syntax.margin}{variable} = {value}{self.syntax.end}"
 
-    def name_values(self, labels: Labels, named: Mapping[str, tuple[str, int]], taken: Collection[str]) -> None:
-        """Give the values that stand in arrays with labels the names of these, unless a name is taken.
+    def name_values(
+        self, labels: Labels, named: Mapping[str, tuple[str, int]], taken: Collection[str]
+    ) -> None:
+        """Give the values that stand in arrays with labels the names of these, unless a name is
+        taken.
 
         `named` are the places of further values.
         """
         names: dict[str, Label] = {}
         places = {**named, **self.stored, **self.loaded}
         used = {"", *taken}
-        for value, (array, index) in sorted(places.items(), key=lambda item: item[0] in self.stored):
+        for value, (array, index) in sorted(
+            places.items(), key=lambda item: item[0] in self.stored
+        ):
             label = labels[array][index] if index < len(labels.get(array, ())) else None
-            if label and _NUMBERED.fullmatch(value) and label.name not in used and not _NUMBERED.fullmatch(label.name):
+            if (
+                label
+                and _NUMBERED.fullmatch(value)
+                and label.name not in used
+                and not _NUMBERED.fullmatch(label.name)
+            ):
                 names[value] = label
                 used.add(label.name)
         for number, line in enumerate(self.lines):
             found = _DEFINED.match(line)
             remark = names[found[1]].remark if found and found[1] in names else ""
-            text = _NUMBERED.sub(lambda value: names[value[0]].name if value[0] in names else value[0], line)
+            text = _NUMBERED.sub(
+                lambda value: names[value[0]].name if value[0] in names else value[0], line
+            )
             self.lines[number] = f"{text}  {self.syntax.remark.format(remark)}" if remark else text
 
     def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+        self,
+        gates: Sequence[str],
+        compute: Callable[[], dict[Operand, str]],
+        instead: Mapping[Operand, str],
     ) -> dict[Operand, str]:
         if not self.syntax.branches:
             return super().unless_zero(gates, compute, instead)
-        syntax, joined = self.syntax, {operand: self.new_name() for operand in instead}
-        self.lines += [self._assigned(f"{self._declares}{joined[o]}", value) for o, value in instead.items()]
-        tests = f" {syntax.either} ".join(f"{gate} {syntax.unequal} {self.constant(0.0)}" for gate in gates)
+        syntax = self.syntax
+        joined = {operand: self.new_name() for operand in instead}
+        self.lines += [
+            self._assigned(f"{self._declares}{joined[o]}", value) for o, value in instead.items()
+        ]
+        tests = f" {syntax.either} ".join(
+            f"{gate} {syntax.unequal} {self.constant(0.0)}" for gate in gates
+        )
         self.lines.append(syntax.begin_branch.format(tests))
-        outside, self.known = self.known, dict(self.known)  # values of the block are not available after it
-        begin, inside = len(self.lines), compute()
+        # values of the block are not available after it
+        outside = self.known
+        self.known = dict(self.known)
+        begin = len(self.lines)
+        inside = compute()
         self.known = outside
         self.lines += [self._assigned(name, inside[operand]) for operand, name in joined.items()]
         self.lines[begin:] = [f"  {line}" for line in self.lines[begin:]]

@@ -1,5 +1,5 @@
-"""Text of printed functions: C99 in double or single precision, ECMAScript modules, MATLAB and Octave; for learning
-PyTorch functions of tensors, and Warp kernels, a thread a column."""
+"""Text of printed functions: C99 in double or single precision, ECMAScript modules, MATLAB and
+Octave; for learning PyTorch functions of tensors, and Warp kernels, a thread a column."""
 
 import dataclasses
 import math
@@ -43,19 +43,28 @@ class CLanguage(TextLanguage):
         return f"const {self.number} ", f"{self.number} "
 
     def literal(self, value: float) -> str:
-        """In single precision the nearest number; what is too large for it becomes infinite, as in arithmetic."""
+        """In single precision the nearest number; what is too large for it becomes infinite, as in
+        arithmetic.
+        """
         if self.number == "double":  # INFINITY is a float, which clang would promote
             return "HUGE_VAL" if math.isinf(value) else repr(value)
         text = f"{nearest_single(value):.9g}"
-        return self.infinity if text == "inf" else text + ("" if set(".e") & set(text) else ".0") + "f"
+        return (
+            self.infinity if text == "inf" else text + ("" if set(".e") & set(text) else ".0") + "f"
+        )
 
     def call(self, function: str, x: Sequence[str]) -> str:
         suffix = "f" if self.number == "float" else ""
         return f"{'fabs' if function == 'abs' else function}{suffix}({', '.join(x)})"
 
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody) -> str:
+    def function(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
+    ) -> str:
         number = self.number
-        given = [f"{number} {a}" if a in body.scalars else f"const {number} *restrict {a}" for a in inputs]
+        given = [
+            f"{number} {a}" if a in body.scalars else f"const {number} *restrict {a}"
+            for a in inputs
+        ]
         results = [f"{number} *restrict {a}" for a in outputs]
         storage = "" if self.public is None or name in self.public else "static "
         head = f"{storage}void {self.prefix}{name}({', '.join([*given, *results])}) {{"
@@ -75,8 +84,10 @@ class JavaScriptLanguage(TextLanguage):
     exported: bool = True
 
     language = "JavaScript"
-    equal, unequal = "===", "!=="
-    infinity, not_a_number = "Infinity", "NaN"
+    equal = "==="
+    unequal = "!=="
+    infinity = "Infinity"
+    not_a_number = "NaN"
 
     def defines(self) -> tuple[str, str]:
         return "const ", "let "
@@ -84,8 +95,13 @@ class JavaScriptLanguage(TextLanguage):
     def call(self, function: str, x: Sequence[str]) -> str:
         return f"Math.{function}({', '.join(x)})"
 
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody) -> str:
-        head = f"{'export ' if self.exported else ''}function {self.prefix}{name}({', '.join([*inputs, *outputs])}) {{"
+    def function(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
+    ) -> str:
+        head = (
+            f"{'export ' if self.exported else ''}function"
+            f" {self.prefix}{name}({', '.join([*inputs, *outputs])}) {{"
+        )
         return "\n".join([head, *body.lines, "}", ""])
 
 
@@ -100,9 +116,11 @@ class MatlabLanguage(TextLanguage):
 
     language = "MATLAB"
     unequal = "~="
-    infinity, not_a_number = "Inf", "NaN"
+    infinity = "Inf"
+    not_a_number = "NaN"
     remark = "% {}"
-    begin_branch, end_branch = "  if {}", "  end"
+    begin_branch = "  if {}"
+    end_branch = "  end"
 
     def element(self, array: str, index: int) -> str:
         return f"{array}({index + 1})"
@@ -124,7 +142,9 @@ class MatlabLanguage(TextLanguage):
         expression = f"{x[0]} ^ {x[1]}" if function == "pow" else f"{function}({', '.join(x)})"
         return f"{REAL}({expression})" if function in COMPLEX else expression
 
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody) -> str:
+    def function(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
+    ) -> str:
         head = f"function [{', '.join(outputs)}] = {self.prefix}{name}({', '.join(inputs)})"
         arrays = [f"  {a} = zeros({body.sizes.get(a, 0)}, 1);" for a in outputs]
         return "\n".join([head, *arrays, *body.lines, "end", ""])
@@ -132,14 +152,18 @@ class MatlabLanguage(TextLanguage):
 
 @dataclasses.dataclass(frozen=True)
 class TorchLanguage(TextLanguage):
-    """Functions of a Python module in which `torch` and `stacked` are defined; arrays are sequences of tensors.
+    """Functions of a Python module in which `torch` and `stacked` are defined; arrays are sequences
+    of tensors.
 
-    A function returns what `stacked` makes of the list of tensors of its array. Every choice computes both sides.
+    A function returns what `stacked` makes of the list of tensors of its array. Every choice
+    computes both sides.
     """
 
     language = "PyTorch"
-    margin, end = "    ", ""
-    infinity, not_a_number = 'float("inf")', 'float("nan")'
+    margin = "    "
+    end = ""
+    infinity = 'float("inf")'
+    not_a_number = 'float("nan")'
     remark = "# {}"
     branches = False  # a product with the gate is zero, but its derivative by the gate is not
 
@@ -154,7 +178,9 @@ class TorchLanguage(TextLanguage):
     def call(self, function: str, x: Sequence[str]) -> str:
         return f"torch.{function}({', '.join(x)})"
 
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody) -> str:
+    def function(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
+    ) -> str:
         like = next(a for a in inputs if a not in body.scalars)
         lines = [f"def {name}({', '.join(inputs)}):", f"    like = {like}[0]"]
         lines += [f"    {a} = [0.0] * {body.sizes.get(a, 0)}" for a in outputs]
@@ -164,13 +190,19 @@ class TorchLanguage(TextLanguage):
 
 @dataclasses.dataclass(frozen=True)
 class WarpLanguage(TextLanguage):
-    """Kernels of a Python module in which `wp`, the type `real` and the functions of _OWN are defined."""
+    """Kernels of a Python module in which `wp`, the type `real` and the functions of _OWN are
+    defined.
+    """
 
     language = "Warp"
-    margin, end, either = "    ", "", "or"
-    infinity, not_a_number = "real(wp.inf)", "real(wp.nan)"
+    margin = "    "
+    end = ""
+    either = "or"
+    infinity = "real(wp.inf)"
+    not_a_number = "real(wp.nan)"
     remark = "# {}"
-    begin_branch, end_branch = "    if {}:", ""
+    begin_branch = "    if {}:"
+    end_branch = ""
 
     def literal(self, value: float) -> str:
         return self.infinity if math.isinf(value) else f"real({value!r})"
@@ -184,7 +216,16 @@ class WarpLanguage(TextLanguage):
     def call(self, function: str, x: Sequence[str]) -> str:
         return f"{'' if function in _OWN else 'wp.'}{function}({', '.join(x)})"
 
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody) -> str:
-        given = [f"{a}: {'real' if a in body.scalars else 'wp.array2d(dtype=real)'}" for a in (*inputs, *outputs)]
-        head = ["@wp.kernel(enable_backward=False)", f"def {name}({', '.join(given)}):", "    column = wp.tid()"]
+    def function(
+        self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
+    ) -> str:
+        given = [
+            f"{a}: {'real' if a in body.scalars else 'wp.array2d(dtype=real)'}"
+            for a in (*inputs, *outputs)
+        ]
+        head = [
+            "@wp.kernel(enable_backward=False)",
+            f"def {name}({', '.join(given)}):",
+            "    column = wp.tid()",
+        ]
         return "\n".join([*head, *body.lines, "", ""])

@@ -1,4 +1,6 @@
-"""Batches: thousands of plants of one structure with different parameters, initial states and inputs, on all cores."""
+"""Batches: thousands of plants of one structure with different parameters, initial states and
+inputs, on all cores.
+"""
 
 from ....core.stubs import attach_stub
 

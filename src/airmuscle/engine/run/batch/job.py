@@ -33,13 +33,15 @@ _hidden = contextvars.ContextVar("hidden", default=False)
 
 @dataclasses.dataclass(eq=False)
 class BatchJob:
-    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be stored.
+    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and
+    columns to be stored.
 
     template  a problem with the plant, for which loops are prepared; None without loops
-    loops     one for all plants, or one for each; their controllers `laws`, where their parameters differ
+    loops     one for all plants, or one for each; their controllers `laws`, where their parameters
+    differ
 
-    Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of rows `reached` (N,),
-    and `reasons`, which say why plants failed.
+    Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of
+    rows `reached` (N,), and `reasons`, which say why plants failed.
     """
 
     compiled: CompiledSystem
@@ -62,8 +64,12 @@ class BatchJob:
 
     def __post_init__(self) -> None:
         count = len(self.initial_states)
-        self.final, self.status = np.full(self.initial_states.shape, np.nan), np.full(count, NOT_RUN)
-        self.reached, sizes = np.zeros(count, dtype=np.int64), self.compiled.sizes
+        self.final, self.status = (
+            np.full(self.initial_states.shape, np.nan),
+            np.full(count, NOT_RUN),
+        )
+        self.reached = np.zeros(count, dtype=np.int64)
+        sizes = self.compiled.sizes
         self.lower_bounds = self.compiled.description.lower_bounds
         """The smallest possible value of each state (n,)."""
         self.own = sizes.states + sizes.outputs + sizes.inputs
@@ -123,33 +129,48 @@ class BatchJob:
         return self._prepared[id(loop)]
 
     def _integrated(self, index: int, one: CompiledSystem, loop: CompiledLoop) -> CompiledRun:
-        """The loop of one plant, integrated from its initial state; it serves another one when it is given back."""
+        """The loop of one plant, integrated from its initial state; it serves another one when it
+        is given back.
+        """
         parameters = loop.parameters.copy() if self.laws is None else self.laws.parameters(index)
-        state, begin = self.initial_states[index], loop.prepared.loop.init
+        state = self.initial_states[index]
+        begin = loop.prepared.loop.init
         run: CompiledRun | None = self._runs.borrow(id(loop))
         if run is None:
             run = CompiledRun(loop, one, self.integrator, state, begin(self.start_time), parameters)
-        else:  # a controller of the user may have changed its first memory, although a memory is a value
-            run.restart(one, state, parameters, begin(self.start_time) if loop.law is None else None)
+        # a controller of the user may have changed its first memory, although a memory is a value
+        else:
+            run.restart(
+                one, state, parameters, begin(self.start_time) if loop.law is None else None
+            )
         run.integrate()
         return run
 
     def _truncate(self, raw: RawSolution) -> RawSolution:
         """The solution up to the first row with a negative air mass, as `simulate` ends it."""
-        rows, bounds = raw.rows[: raw.reached], self.lower_bounds
+        rows = raw.rows[: raw.reached]
+        bounds = self.lower_bounds
         if not (rows < bounds).any() and not (raw.state < bounds).any():
             return raw
         rows = np.vstack([rows, raw.state])
         row = int(np.flatnonzero((rows < bounds).any(axis=1))[0])
         time = float(self.times[row]) if row < raw.reached else raw.time
-        return raw._replace(reached=row, time=time, state=rows[row], status=Status.NEGATIVE_AIR_MASS)
+        return raw._replace(
+            reached=row, time=time, state=rows[row], status=Status.NEGATIVE_AIR_MASS
+        )
 
     def _write(
-        self, index: int, one: CompiledSystem, raw: RawSolution, segments: PiecewiseLinear, more: Mapping[str, Array]
+        self,
+        index: int,
+        one: CompiledSystem,
+        raw: RawSolution,
+        segments: PiecewiseLinear,
+        more: Mapping[str, Array],
     ) -> None:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
-        values, kept = [*states.T], self.kept.tolist()
+        values = [*states.T]
+        kept = self.kept.tolist()
         if any(len(values) <= place < self.own for place in kept):  # outputs or inputs are stored
             recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(one)
             recorder.adopt(one)
@@ -163,13 +184,17 @@ class BatchJob:
                 else:
                     column[index, :reached] = more[name][:reached] if more else np.nan
                 column[index, reached:] = np.nan
-        self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
+        self.final[index] = raw.state
+        self.status[index] = raw.status
+        self.reached[index] = reached
         if raw.status:
             self.reasons[index] = reason_of_end(self.compiled, raw, self.start_time + self.duration)
 
     def mark_not_run(self, index: int, status: Status, reason: str | None = None) -> None:
         """Write that a plant was not simulated."""
-        self.status[index], self.final[index], self.reached[index] = status, np.nan, 0
+        self.status[index] = status
+        self.final[index] = np.nan
+        self.reached[index] = 0
         for column in self.columns.values():
             column[index] = np.nan
         if reason is not None:
@@ -213,9 +238,14 @@ class Queue:
             time.sleep(0.01)
 
 
-def run_workers(queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]) -> bool:
-    """Run each worker on its own thread until the queue is empty; False where the user interrupted it."""
-    complete, working = True, list[concurrent.futures.Future[None]]()
+def run_workers(
+    queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]
+) -> bool:
+    """Run each worker on its own thread until the queue is empty; False where the user interrupted
+    it.
+    """
+    complete = True
+    working = list[concurrent.futures.Future[None]]()
     with concurrent.futures.ThreadPoolExecutor(max(len(workers), 1)) as threads:
         try:
             for worker in workers:
@@ -242,8 +272,11 @@ def hidden_progress() -> Iterator[None]:
 
 @contextlib.contextmanager
 def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A function that takes the number of items done and draws a bar on a terminal once that takes long."""
-    started, bar = time.monotonic(), None
+    """A function that takes the number of items done and draws a bar on a terminal once that takes
+    long.
+    """
+    started = time.monotonic()
+    bar = None
 
     def advanced(done: int) -> None:
         nonlocal bar

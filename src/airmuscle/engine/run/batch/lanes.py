@@ -1,4 +1,5 @@
-"""Lanes: blocks of plants or control loops through one vectorised step together, one thread per core.
+"""Lanes: blocks of plants or control loops through one vectorised step together, one thread per
+core.
 
 Plants are computed in single or double precision, loops in double precision.
 """
@@ -25,7 +26,9 @@ Plants = npt.NDArray[np.intp]
 BITS = 1024
 """Size of a vector of lanes: two of the widest registers, which alternate."""
 MAX_SAMPLES = 200_000
-"""Samples of a run up to which the set points, samples and commands of a block fit in memory (chosen)."""
+"""Samples of a run up to which the set points, samples and commands of a block fit in memory
+(chosen).
+"""
 
 
 class Precision(abc.ABC):
@@ -55,25 +58,36 @@ class Double(Precision):
 
 @dataclasses.dataclass(frozen=True)
 class Single(Precision):
-    """Single precision, seven digits: half the memory and about twice as fast, for integrators of fixed step."""
+    """Single precision, seven digits: half the memory and about twice as fast, for integrators of
+    fixed step.
+    """
 
     bits: ClassVar[int] = 32
-    note: ClassVar[str] = "single precision: rounding errors accumulate over a run; expect about four correct digits"
+    note: ClassVar[str] = (
+        "single precision: rounding errors accumulate over a run; expect about four correct digits"
+    )
 
 
 class LaneArrays(abc.ABC):
-    """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their addresses.
+    """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their
+    addresses.
 
-    more  sizes of further arrays after those of the step: parameters, what it needs of them, states (two), inputs,
+    more  sizes of further arrays after those of the step: parameters, what it needs of them, states
+    (two), inputs,
           their start and slopes, length, outputs
     """
 
     def __init__(self, job: BatchJob, precision: Precision, more: tuple[int, ...] = ()) -> None:
-        number, sizes, integrator = precision.number, job.compiled.sizes, job.integrator
+        number = precision.number
+        sizes = job.compiled.sizes
+        integrator = job.integrator
         assert isinstance(integrator, ExplicitRungeKutta)
-        self.job, self.step, self.width = job, integrator.step, number.lanes
+        self.job = job
+        self.step = integrator.step
+        self.width = number.lanes
         self.addresses, held = job.compiled.program.lanes(integrator.tableau(), number)
-        n, m = sizes.states, sizes.inputs
+        n = sizes.states
+        m = sizes.inputs
         lengths = (sizes.parameters, held, n, n, m, m, m, 1, sizes.outputs, *more)
         self.arrays = [aligned_array((length, self.width), precision.dtype) for length in lengths]
         self.status = np.empty(self.width, dtype=np.int64)
@@ -84,7 +98,8 @@ class LaneArrays(abc.ABC):
 
     def load(self, lane: Plants) -> None:
         """Take over parameters and initial states of one plant a lane."""
-        job, parameters = self.job, self.arrays[0]
+        job = self.job
+        parameters = self.arrays[0]
         parameters[:] = job.compiled.parameters[:, None]
         parameters[job.variations.places] = job.variations.values[lane].T
         self.arrays[2][:] = job.initial_states[lane].T
@@ -92,13 +107,24 @@ class LaneArrays(abc.ABC):
     def finish(self, plants: Plants, final: npt.NDArray[Any]) -> None:
         """Write the final states (W, n) and the status of plants.
 
-        A plant that failed in its lane is simulated again, alone: for its rows, the time of failure and the reason.
+        A plant that failed in its lane is simulated again, alone: for its rows, the time of failure
+        and the reason.
         """
-        job, status = self.job, self.status[: plants.size]
-        job.final[plants], job.status[plants], job.reached[plants] = final[: plants.size], status, job.times.size
-        where = "in single precision, but not in double" if final.dtype == np.float32 else "in its lane, but not alone"
+        job = self.job
+        status = self.status[: plants.size]
+        job.final[plants], job.status[plants], job.reached[plants] = (
+            final[: plants.size],
+            status,
+            job.times.size,
+        )
+        where = (
+            "in single precision, but not in double"
+            if final.dtype == np.float32
+            else "in its lane, but not alone"
+        )
         for i in np.flatnonzero(status):
-            index, failure = int(plants[i]), Status(int(status[i]))
+            index = int(plants[i])
+            failure = Status(int(status[i]))
             job.run_single(index)
             if job.status[index] == Status.DONE:
                 job.mark_not_run(index, failure, f"{failure.message} {where}")
@@ -109,22 +135,42 @@ class LaneBlock(LaneArrays):
 
     def __init__(self, job: BatchJob, precision: Precision, table: "SegmentTable") -> None:
         super().__init__(job, precision)
-        self.table, width, dtype = table, self.width, precision.dtype
+        self.table = table
+        width = self.width
+        dtype = precision.dtype
         self.bounded = np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
         """States with a lower bound; their rows are checked after the run and not stored."""
         self.kept = np.concatenate([job.kept, self.bounded])
         self.rows = np.empty((self.kept.size, width, job.times.size), dtype)
         self.final = np.empty((width, job.compiled.sizes.states), dtype)
-        self.counters = (np.empty(width, np.int64), np.empty(width, np.int64), *(np.empty(width) for _ in range(3)))
+        self.counters = (
+            np.empty(width, np.int64),
+            np.empty(width, np.int64),
+            *(np.empty(width) for _ in range(3)),
+        )
 
     def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
-        job, table = self.job, self.table
+        job = self.job
+        table = self.table
         self.load(lane)
         ended = lanes(
-            *self.addresses, *self.arrays, table.ends, table.values, table.slopes, table.first[lane], table.last[lane],
-            job.start_time, self.step, job.times, self.kept, self.rows, self.final, self.status, stop,
+            *self.addresses,
+            *self.arrays,
+            table.ends,
+            table.values,
+            table.slopes,
+            table.first[lane],
+            table.last[lane],
+            job.start_time,
+            self.step,
+            job.times,
+            self.kept,
+            self.rows,
+            self.final,
+            self.status,
+            stop,
             *self.counters,
-        )  # fmt: skip
+        )
         if ended == Status.INTERRUPTED:
             return
         for j, column in enumerate(job.columns.values()):
@@ -142,16 +188,25 @@ class LoopLaneBlock(LaneArrays):
     def __init__(self, job: BatchJob) -> None:
         first = job.loop_of(0)
         assert first.law is not None
-        law, memory = first.law, len(first.law.initial_memory)
-        k, s, c = len(law.measured_columns), len(law.setpoints), len(law.inputs)
+        law = first.law
+        memory = len(first.law.initial_memory)
+        k = len(law.measured_columns)
+        s = len(law.setpoints)
+        c = len(law.inputs)
         super().__init__(job, Double(), (first.parameters.size, memory, memory, k, s, c, c, c, 1))
-        self.first, self.prepared = first, first.prepared
-        width, m = self.width, job.compiled.sizes.inputs
+        self.first = first
+        self.prepared = first.prepared
+        width = self.width
+        m = job.compiled.sizes.inputs
         self.sample = compiled_sample(law, width)
-        intervals, segments = self.prepared.instants.size - 1, self.prepared.inputs.ends.size
+        intervals = self.prepared.instants.size - 1
+        segments = self.prepared.inputs.ends.size
         self.setpoints = np.empty((intervals, s, width))
         self.values, self.slopes = np.empty((segments, m, width)), np.empty((segments, m, width))
-        self.samples, self.commands = np.empty((intervals, k, width)), np.empty((intervals, c, width))
+        self.samples, self.commands = (
+            np.empty((intervals, k, width)),
+            np.empty((intervals, c, width)),
+        )
         self.kept = job.kept[job.kept < job.own]
         self.rows = np.empty((self.kept.size, width, job.times.size))
         self.starts = self.prepared.inputs.starts(job.start_time)
@@ -159,33 +214,57 @@ class LoopLaneBlock(LaneArrays):
 
     def load(self, lane: Plants) -> None:
         super().load(lane)
-        job, u = self.job, self.arrays[4]
+        job = self.job
+        u = self.arrays[4]
         parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
         for i, plant in enumerate(lane.tolist()):
             loop = job.loop_of(plant)
-            prepared, law = loop.prepared, loop.law
+            prepared = loop.prepared
+            law = loop.law
             assert law is not None
             parameters[:, i] = loop.parameters if job.laws is None else job.laws.parameters(plant)
             memory[:, i] = list(law.initial_memory.values())
             self.setpoints[:, :, i] = prepared.setpoint_values
-            self.values[:, :, i], self.slopes[:, :, i] = prepared.inputs.values, prepared.inputs.slopes
+            self.values[:, :, i] = prepared.inputs.values
+            self.slopes[:, :, i] = prepared.inputs.slopes
             period[:, i], low[:, i], high[:, i], _ = loop.commanding
         u[:] = self.values[0]
 
     def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
-        job, prepared = self.job, self.prepared
+        job = self.job
+        prepared = self.prepared
         self.load(lane)
         ended = loop_lanes(
-            *self.addresses, self.sample.address, *self.arrays, prepared.instants, self.setpoints,
-            prepared.first_segments, self.starts, prepared.inputs.ends, self.values, self.slopes, self.step,
-            self.first.measuring[1], self.first.commanding[3], job.lower_bounds, job.times, self.row_segment, self.kept,
-            self.rows, self.samples, self.commands, self.status, stop,
-        )  # fmt: skip
+            *self.addresses,
+            self.sample.address,
+            *self.arrays,
+            prepared.instants,
+            self.setpoints,
+            prepared.first_segments,
+            self.starts,
+            prepared.inputs.ends,
+            self.values,
+            self.slopes,
+            self.step,
+            self.first.measuring[1],
+            self.first.commanding[3],
+            job.lower_bounds,
+            job.times,
+            self.row_segment,
+            self.kept,
+            self.rows,
+            self.samples,
+            self.commands,
+            self.status,
+            stop,
+        )
         if ended == Status.INTERRUPTED:
             return
         kept = iter(self.rows)
         for place, (name, column) in zip(job.kept.tolist(), job.columns.items(), strict=True):
-            column[plants] = next(kept)[: plants.size] if place < job.own else self._of_loop(name, plants)
+            column[plants] = (
+                next(kept)[: plants.size] if place < job.own else self._of_loop(name, plants)
+            )
         self.finish(plants, self.arrays[2].T)
 
     def _of_loop(self, name: str, plants: Plants) -> Array:
@@ -194,33 +273,44 @@ class LoopLaneBlock(LaneArrays):
         prefix = next(each for each in signals if name.startswith(each))
         index = signals[prefix].index(name.removeprefix(prefix))
         if prefix == SETPOINT:
-            return np.array([self.job.loop_of(i).prepared.at_times[1][:, index] for i in plants.tolist()])
+            return np.array(
+                [self.job.loop_of(i).prepared.at_times[1][:, index] for i in plants.tolist()]
+            )
         at = np.minimum(self.prepared.at_times[0], len(self.samples) - 1)
-        return np.asarray((self.samples if prefix == MEASURED else self.commands)[at, index, : plants.size].T)
+        return np.asarray(
+            (self.samples if prefix == MEASURED else self.commands)[at, index, : plants.size].T
+        )
 
 
 class SegmentTable:
-    """The segments of all plants, one after the other, and the range of those of each; equal inputs share theirs."""
+    """The segments of all plants, one after the other, and the range of those of each; equal inputs
+    share theirs.
+    """
 
     def __init__(self, job: BatchJob) -> None:
         by_identity = {id(segments): segments for segments in job.segments}
-        distinct, number = list(by_identity.values()), {key: i for i, key in enumerate(by_identity)}
+        distinct = list(by_identity.values())
+        number = {key: i for i, key in enumerate(by_identity)}
         self.ends = np.concatenate([s.ends for s in distinct])
         self.values = np.ascontiguousarray(np.concatenate([s.values for s in distinct]))
         self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in distinct]))
         ends = np.cumsum([s.ends.size for s in distinct])
         own = np.array([number[key] for key in map(id, job.segments)])
-        self.first, self.last = np.append(0, ends)[own], ends[own]
+        self.first = np.append(0, ends)[own]
+        self.last = ends[own]
 
 
 def lane_workers(
     job: BatchJob, active: Plants, precision: Precision, cores: int
 ) -> tuple[Queue, list[Callable[[int], Any]], int] | None:
-    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block.
+    """The queue of blocks of the active plants, one worker per core, and the number of plants in a
+    block.
 
     Unused lanes repeat the last plant. None where these plants are computed one by one.
     """
-    if not isinstance(job.integrator, ExplicitRungeKutta) or (job.loops and not run_in_lanes(job, active)):
+    if not isinstance(job.integrator, ExplicitRungeKutta) or (
+        job.loops and not run_in_lanes(job, active)
+    ):
         return None
     make: Callable[[], LaneArrays] = functools.partial(LoopLaneBlock, job)
     if not job.loops:
@@ -236,17 +326,25 @@ def lane_workers(
 
         return run
 
-    return queue, [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))], first.width
+    return (
+        queue,
+        [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))],
+        first.width,
+    )
 
 
 def run_in_lanes(job: BatchJob, plants: Plants) -> bool:
-    """Whether the loops of these plants can be computed in lanes: control laws of one structure, no drivers, common
-    sampling instants and segments, and at most MAX_SAMPLES samples."""
+    """Whether the loops of these plants can be computed in lanes: control laws of one structure, no
+    drivers, common sampling instants and segments, and at most MAX_SAMPLES samples."""
     distinct = {id(loop): loop for loop in job.loops}.values()
     if any(loop.drivers or not isinstance(loop.controller, ControlLaw) for loop in distinct):
         return False
-    structure, sample_time = tree.structure(job.loops[0].controller), job.loops[0].sample_time
-    if any(tree.structure(o.controller) is not structure or o.sample_time != sample_time for o in distinct):
+    structure = tree.structure(job.loops[0].controller)
+    sample_time = job.loops[0].sample_time
+    if any(
+        tree.structure(o.controller) is not structure or o.sample_time != sample_time
+        for o in distinct
+    ):
         return False
     first = job.loop_of(int(plants[0])).prepared
     if first.instants.size > MAX_SAMPLES:

@@ -40,26 +40,34 @@ def simulate_batch(
     precision: Precision = Double(),
     cores: int | None = None,
 ) -> BatchSolution:
-    """Simulate N plants of one structure for `duration` [s] on all cores; a plant that fails does not stop the others.
+    """Simulate N plants of one structure for `duration` [s] on all cores; a plant that fails does
+    not stop the others.
 
-    plant           any System: a Plant, a user-defined one, or WithSensitivities(...), whose derivatives are then
+    plant           any System: a Plant, a user-defined one, or WithSensitivities(...), whose
+    derivatives are then
                     computed in the same pass
-    variations      values (N,) by the path of a parameter, as `airmuscle.core.tree.leaves` names it (`mechanism.mass`)
-    input           an InputSignal or a ControlLoop for all, or one for each. With one ControlLoop for all `variations`
+    variations      values (N,) by the path of a parameter, as `airmuscle.core.tree.leaves` names it
+    (`mechanism.mass`) input           an InputSignal or a ControlLoop for all, or one for each.
+    With one ControlLoop for all `variations`
                     may name parameters of its controller, if it is a ControlLaw: `controller.gain`
-    initial_states  by state a number for all or a column (N,); by default each Plant's equilibrium at ambient pressure
-    output_times    as in `simulate`; with one input for all its instants are among the rows
-    integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps, exactly as in `simulate`. With an
-                    integrator of fixed step, RungeKutta4(1e-3), sixteen plants are computed together, much faster;
-                    so are loops of control laws without drivers whose sampling instants are the same
-    keep            columns to be kept (N, T): states, outputs, inputs, those of a loop such as `command.fill`; all
+    initial_states  by state a number for all or a column (N,); by default each Plant's equilibrium
+    at ambient pressure output_times    as in `simulate`; with one input for all its instants are
+    among the rows integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps,
+    exactly as in `simulate`. With an
+                    integrator of fixed step, RungeKutta4(1e-3), sixteen plants are computed
+                    together, much faster; so are loops of control laws without drivers whose
+                    sampling instants are the same
+    keep            columns to be kept (N, T): states, outputs, inputs, those of a loop such as
+    `command.fill`; all
                     unless given, () for final states alone
     into            folder for the columns, one .npy file each; without it they are held in memory
     precision       Double() or Single()
-    cores           threads; all cores of this process unless given. The result does not depend on it
+    cores           threads; all cores of this process unless given. The result does not depend on
+    it
 
-    Raises ParameterError for an impossible path, value, initial state, input or column; the row is named. An
-    interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants have Status.INTERRUPTED.
+    Raises ParameterError for an impossible path, value, initial state, input or column; the row is
+    named. An interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants
+    have Status.INTERRUPTED.
     """
     check_system("simulate_batch", plant)
     loops = _loops_of(input, plant)
@@ -74,47 +82,80 @@ def simulate_batch(
     segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
     times = _times(output_times, start_time, duration, input, segments, keep)
     if initial_states is not None:
-        states, reasons = given_states(varied, initial_states, count), dict[int, str]()
+        states = given_states(varied, initial_states, count)
+        reasons = dict[int, str]()
     else:
         with progress("computing the equilibrium of each plant", count) as advanced:
             states, reasons = default_states(varied, advanced)
-    template = Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator) if loops else None
+    template = (
+        Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator)
+        if loops
+        else None
+    )
     job = BatchJob(
-        compiled, varied, integrator, states, segments, start_time, duration, times, reasons, template, loops, laws
+        compiled,
+        varied,
+        integrator,
+        states,
+        segments,
+        start_time,
+        duration,
+        times,
+        reasons,
+        template,
+        loops,
+        laws,
     )
     return _solved(job, _kept(job, keep), into, precision, cores or available_cores())
 
 
 def _times(
-    given: float | npt.ArrayLike | None, start: float, duration: float, input: object,
-    segments: tuple[PiecewiseLinear, ...], keep: Sequence[str] | None,
-) -> Array:  # fmt: skip
-    """The times of the rows, with the instants of the input that all plants share; the end if no column is stored."""
+    given: float | npt.ArrayLike | None,
+    start: float,
+    duration: float,
+    input: object,
+    segments: tuple[PiecewiseLinear, ...],
+    keep: Sequence[str] | None,
+) -> Array:
+    """The times of the rows, with the instants of the input that all plants share; the end if no
+    column is stored.
+    """
     end = np.array([start + duration])
     if keep is not None and len(keep) == 0:
         return end
-    return times_of(given, start, duration, segments[0].ends if isinstance(input, InputSignal) else end)
+    return times_of(
+        given, start, duration, segments[0].ends if isinstance(input, InputSignal) else end
+    )
 
 
 def _check_time(duration: float, start_time: float, integrator: Integrator) -> None:
     if not (np.isfinite(duration) and duration > 0 and start_time + duration > start_time):
         raise ParameterError(
-            f"simulate_batch: duration is {duration:g} s from {start_time:g} s on; it must be positive and finite."
+            f"simulate_batch: duration is {duration:g} s from {start_time:g} s on; it must be"
+            " positive and finite."
         )
     if isinstance(integrator, ExplicitRungeKutta) and duration / integrator.step > MAX_STEPS:
         raise ParameterError(
-            f"simulate_batch: {duration:g} s in steps of {integrator.step:g} s are {duration / integrator.step:.3g} "
-            f"steps for each plant; the limit is {MAX_STEPS:g}. Increase the step, or shorten the run."
+            f"simulate_batch: {duration:g} s in steps of {integrator.step:g} s are"
+            f" {duration / integrator.step:.3g} steps for each plant; the limit is {MAX_STEPS:g}."
+            " Increase the step, or shorten the run."
         )
 
 
 def _check_options(
-    initial_states: object, keep: object, into: object, precision: object, cores: object, integrator: Integrator,
-    *, loops: bool,
-) -> None:  # fmt: skip
+    initial_states: object,
+    keep: object,
+    into: object,
+    precision: object,
+    cores: object,
+    integrator: Integrator,
+    *,
+    loops: bool,
+) -> None:
     if initial_states is not None and not isinstance(initial_states, Mapping):
         raise ParameterError(
-            f"initial_states is {one_line(initial_states)}; give for each state a number for all, or a column (N,)."
+            f"initial_states is {one_line(initial_states)}; give for each state a number for all,"
+            " or a column (N,)."
         )
     if keep is not None and not isinstance(keep, Sequence):
         raise ParameterError(f"keep is {keep!r}; give names of columns, ('pressure', 'position').")
@@ -123,38 +164,58 @@ def _check_options(
     if not isinstance(precision, Precision):
         raise ParameterError(f"precision is {precision!r}; give Double() or Single().")
     if precision.bits != 64 and loops:
-        raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
+        raise ParameterError(
+            "simulate_batch: control loops are computed in double precision; omit the precision."
+        )
     if precision.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
         raise ParameterError(
-            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
-            "an integrator of fixed step, such as RungeKutta4(1e-3)."
+            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision;"
+            f" {precision} requires an integrator of fixed step, such as RungeKutta4(1e-3)."
         )
     if cores is not None and (not isinstance(cores, int) or cores < 1):
-        raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
+        raise ParameterError(
+            f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on."
+        )
 
 
 def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) -> int | None:
-    """The number of plants that initial states and inputs are given for; None where they are the same for all."""
-    sizes = {name: np.size(value) for name, value in (initial_states or {}).items() if np.ndim(value) > 0}
+    """The number of plants that initial states and inputs are given for; None where they are the
+    same for all.
+    """
+    sizes = {
+        name: np.size(value) for name, value in (initial_states or {}).items() if np.ndim(value) > 0
+    }
     if len(set(sizes.values())) > 1:
-        raise ParameterError(f"initial_states: every column needs one value per plant; there are {sizes}.")
+        raise ParameterError(
+            f"initial_states: every column needs one value per plant; there are {sizes}."
+        )
     of_states = next(iter(sizes.values()), None)
     if isinstance(input, InputSignal | ControlLoop):
         return of_states
     if not isinstance(input, Sequence):
-        order = " The order of the arguments is: plant, variations, input." if isinstance(input, Mapping) else ""
+        order = (
+            " The order of the arguments is: plant, variations, input."
+            if isinstance(input, Mapping)
+            else ""
+        )
         raise ParameterError(
-            f"simulate_batch: the input is {one_line(input)}; give an InputSignal, a ControlLoop, or a list.{order}"
+            f"simulate_batch: the input is {one_line(input)}; give an InputSignal, a ControlLoop,"
+            f" or a list.{order}"
         )
     if of_states is not None and of_states != len(input):
         raise ParameterError(
-            f"simulate_batch: there are {len(input)} inputs and initial states for {of_states} plants."
+            f"simulate_batch: there are {len(input)} inputs and initial states for {of_states}"
+            " plants."
         )
     return len(input)
 
 
 def _segments(
-    compiled: CompiledSystem, input: InputSignal | Sequence[InputSignal], count: int, start: float, duration: float
+    compiled: CompiledSystem,
+    input: InputSignal | Sequence[InputSignal],
+    count: int,
+    start: float,
+    duration: float,
 ) -> tuple[PiecewiseLinear, ...]:
     """The segments of the input of each plant; the same object where it is the same signal."""
     known: dict[int, PiecewiseLinear] = {}
@@ -163,12 +224,16 @@ def _segments(
         if id(one) in known:
             continue
         if not isinstance(one, InputSignal):
-            raise ParameterError(f"inputs, row {row} is {one_line(one)}; give a Schedule or a SampledSignal.")
+            raise ParameterError(
+                f"inputs, row {row} is {one_line(one)}; give a Schedule or a SampledSignal."
+            )
         try:
             segments = one.checked_segments(compiled.description.input_names, start, duration)
             check_input_range(compiled, segments, start)
         except ParameterError as error:
-            raise (error if isinstance(input, InputSignal) else error.located(f"inputs, row {row}")) from None
+            raise (
+                error if isinstance(input, InputSignal) else error.located(f"inputs, row {row}")
+            ) from None
         known[id(one)] = segments
     each = tuple(known[id(one)] for one in signals)
     return each * count if isinstance(input, InputSignal) else each
@@ -192,41 +257,58 @@ def _loops_of(given: Any, system: System) -> tuple[ControlLoop, ...]:
     if not loops:
         return ()
     if len(loops) < len(inputs):
-        raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
+        raise ParameterError(
+            "simulate_batch: the inputs are control loops and signals; give one kind for all"
+            " plants."
+        )
     distinct = {id(loop): designed_loop(loop, system) for loop in loops}
     loops = tuple(distinct[id(loop)] for loop in loops)
     for row, loop in enumerate(loops):
         if loop.signals != loops[0].signals:
             raise ParameterError(
-                f"inputs, row {row}: {type(loop.controller).__name__} measures or commands other columns than that of "
-                "row 0; all loops of a batch need the same measured columns, set points and commanded inputs."
+                f"inputs, row {row}: {type(loop.controller).__name__} measures or commands other"
+                " columns than that of row 0; all loops of a batch need the same measured columns,"
+                " set points and commanded inputs."
             )
     return loops
 
 
 def _vary(
-    plant: System, given: Mapping[str, npt.ArrayLike], loops: tuple[ControlLoop, ...], count: int | None
+    plant: System,
+    given: Mapping[str, npt.ArrayLike],
+    loops: tuple[ControlLoop, ...],
+    count: int | None,
 ) -> tuple[Variations, Variations | None]:
-    """The variations of the plants, and those of the controllers, whose paths begin with "controller."."""
+    """The variations of the plants, and those of the controllers, whose paths begin with
+    "controller.".
+    """
     if not loops or not isinstance(given, Mapping):
         return variations_of(plant, given, count), None
-    plants = {path: values for path, values in given.items() if not str(path).startswith(CONTROLLER)}
+    plants = {
+        path: values for path, values in given.items() if not str(path).startswith(CONTROLLER)
+    }
     laws = {path[len(CONTROLLER) :]: given[path] for path in given if path not in plants}
     if not laws:
         return variations_of(plant, plants, count), None
     controller = loops[0].controller
     if len(loops) > 1 or not isinstance(controller, ControlLaw):
-        reason = "there is one loop for each plant" if len(loops) > 1 else "its controller is no ControlLaw"
+        reason = (
+            "there is one loop for each plant"
+            if len(loops) > 1
+            else "its controller is no ControlLaw"
+        )
         raise ParameterError(
-            f"variations: '{CONTROLLER}{next(iter(laws))}' varies a parameter of the controller, but {reason}. Give a "
-            "list of loops with the controllers instead."
+            f"variations: '{CONTROLLER}{next(iter(laws))}' varies a parameter of the controller,"
+            f" but {reason}. Give a list of loops with the controllers instead."
         )
     varied = variations_of(controller, laws, count)
     return variations_of(plant, plants, len(varied.values)), varied
 
 
 def _run(job: BatchJob, precision: Precision, cores: int) -> None:
-    """Simulate all plants that have an initial state; those that an interruption leaves out are marked."""
+    """Simulate all plants that have an initial state; those that an interruption leaves out are
+    marked.
+    """
     for index, reason in job.reasons.copy().items():
         job.mark_not_run(index, Status.NOT_STARTED, reason)
     active = np.flatnonzero(np.isfinite(job.initial_states).all(axis=1))
@@ -235,8 +317,11 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     if in_lanes := lane_workers(job, active, precision, cores):
         queue, workers, each = in_lanes
     else:
-        job.run_single(int(active[0]))  # what compiles, compiles here, before threads need it at once
-        queue, each = Queue(active.size - 1), 1
+        job.run_single(
+            int(active[0])
+        )  # what compiles, compiles here, before threads need it at once
+        queue = Queue(active.size - 1)
+        each = 1
         queue.stop[0] = job.status[active[0]] == Status.INTERRUPTED
         active = active[1:]
         workers = [lambda item: job.run_single(int(active[item]))] * min(cores, active.size)
@@ -251,17 +336,30 @@ def _solved(
     job: BatchJob, names: tuple[str, ...], into: str | Path | None, precision: Precision, cores: int
 ) -> BatchSolution:
     """The solution with the columns of these names, in memory or on disk."""
-    shape, path = (len(job.initial_states), job.times.size), Path(into or "")
+    shape = (len(job.initial_states), job.times.size)
+    path = Path(into or "")
     with contextlib.nullcontext() if into is None else new_folder(path) as folder:
         with raise_file_errors(path):
             job.columns.update(new_columns(names, shape, precision.dtype, folder))
         _run(job, precision, cores)
-        final = {name: job.final[:, i].copy() for i, name in enumerate(job.compiled.description.state_names)}
-        notes = tuple(note for note in (f"simulated by {job.integrator}, in a batch", precision.note) if note)
+        final = {
+            name: job.final[:, i].copy()
+            for i, name in enumerate(job.compiled.description.state_names)
+        }
+        notes = tuple(
+            note for note in (f"simulated by {job.integrator}, in a batch", precision.note) if note
+        )
         solution = BatchSolution(
-            job.variations, job.integrator, job.times, dict(job.columns), final, job.status, job.reached, job.reasons,
+            job.variations,
+            job.integrator,
+            job.times,
+            dict(job.columns),
+            final,
+            job.status,
+            job.reached,
+            job.reasons,
             notes,
-        )  # fmt: skip
+        )
         if folder is not None:
             with raise_file_errors(path):
                 write_rest(solution, folder)

@@ -56,7 +56,9 @@ class BatchSolution:
             return self.time
         if name not in self.columns:
             advice = "" if self.columns else " Name the columns in keep."
-            raise ColumnError(f"batch: no column '{name}'{alternatives(name, self.columns, 'kept are')}{advice}")
+            raise ColumnError(
+                f"batch: no column '{name}'{alternatives(name, self.columns, 'kept are')}{advice}"
+            )
         return self.columns[name]
 
     @property
@@ -94,25 +96,41 @@ class BatchSolution:
         index = self._row(index)
         system = self.plant(index)
         rows = slice(int(self.reached[index]))
-        kept = {name: np.asarray(values[index, rows], dtype=float) for name, values in self.columns.items()}
+        kept = {
+            name: np.asarray(values[index, rows], dtype=float)
+            for name, values in self.columns.items()
+        }
         columns = {"time": self.time[rows], **kept}
-        remarks = [*system.describe(), *(system.diagnose(Columns(columns)) if self.reached[index] else [])]
+        remarks = [
+            *system.describe(),
+            *(system.diagnose(Columns(columns)) if self.reached[index] else []),
+        ]
         notes = [f"plant {index} of a batch", *self.notes, *map(str, remarks)]
         if self.status[index]:
             notes.append(self.reason(index))
-        return Recording(columns, "simulation", system.constants, tuple(notes), references=tuple(self.references))
+        return Recording(
+            columns, "simulation", system.constants, tuple(notes), references=tuple(self.references)
+        )
 
     def __repr__(self) -> str:
         failed = f", {self.failed.size} failed" if self.failed.size else ""
-        kept = f"{', '.join(self.columns)} at {self.time.size} times" if self.columns else "final states"
+        kept = (
+            f"{', '.join(self.columns)} at {self.time.size} times"
+            if self.columns
+            else "final states"
+        )
         return f"BatchSolution({len(self)} plants: {kept}{failed})"
 
 
 @contextlib.contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
-    """A context manager for a folder that is renamed to `path` when all is written. Raises FileError."""
+    """A context manager for a folder that is renamed to `path` when all is written. Raises
+    FileError.
+    """
     if path.exists():
-        raise FileError(f"{path}: it exists already; give a folder that does not exist, or remove it.")
+        raise FileError(
+            f"{path}: it exists already; give a folder that does not exist, or remove it."
+        )
     with raise_file_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
@@ -124,21 +142,31 @@ def new_folder(path: Path) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def new_columns(names: Sequence[str], shape: tuple[int, int], kind: Any, folder: Path | None) -> dict[str, Any]:
-    """Arrays (N, T) for columns, in memory or as one .npy file each. Raises ParameterError for too much memory."""
+def new_columns(
+    names: Sequence[str], shape: tuple[int, int], kind: Any, folder: Path | None
+) -> dict[str, Any]:
+    """Arrays (N, T) for columns, in memory or as one .npy file each. Raises ParameterError for too
+    much memory.
+    """
     if folder is not None:
         files = {name: folder / file_of(name) for name in names}
-        columns = {name: np.lib.format.open_memmap(file, "w+", np.dtype(kind), shape) for name, file in files.items()}
-        for file in files.values() if hasattr(os, "posix_fallocate") else ():  # without room, writing ends the process
+        columns = {
+            name: np.lib.format.open_memmap(file, "w+", np.dtype(kind), shape)
+            for name, file in files.items()
+        }
+        for file in (
+            files.values() if hasattr(os, "posix_fallocate") else ()
+        ):  # without room, writing ends the process
             with file.open("r+b") as opened:
                 os.posix_fallocate(opened.fileno(), 0, file.stat().st_size)
         return columns
     size = len(names) * shape[0] * shape[1] * np.dtype(kind).itemsize
     if size > MAX_MEMORY:
         raise ParameterError(
-            f"simulate_batch: {len(names)} columns of {shape[0]} plants at {shape[1]} output times take "
-            f"{size / 1e9:.3g} GB of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose columns (keep=...), "
-            "write to disk (into=...), or fewer output times (output_times=...)."
+            f"simulate_batch: {len(names)} columns of {shape[0]} plants at {shape[1]} output times"
+            f" take {size / 1e9:.3g} GB of memory; the limit is {MAX_MEMORY / 1e9:g} GB. Choose"
+            " columns (keep=...), write to disk (into=...), or fewer output times"
+            " (output_times=...)."
         )
     return {name: np.empty(shape, kind) for name in names}
 
@@ -149,7 +177,9 @@ def file_of(name: str) -> str:
 
 
 def write_rest(solution: BatchSolution, folder: Path) -> None:
-    """Write what is not in the files of the columns: times, status, final states, the notes and a list of all files."""
+    """Write what is not in the files of the columns: times, status, final states, the notes and a
+    list of all files.
+    """
     final = {f"final {name}": values for name, values in solution.final.items()}
     small = {"time": solution.time, "status": solution.status, "reached": solution.reached, **final}
     for column in solution.columns.values():
@@ -157,5 +187,11 @@ def write_rest(solution: BatchSolution, folder: Path) -> None:
     for name, values in small.items():
         np.save(folder / file_of(name), values)
     files = {name: file_of(name) for name in (*solution.columns, *small)}
-    remarks = {"notes": solution.notes, "reasons": solution.reasons, "varied": list(solution.variations.paths)}
-    (folder / "batch.json").write_text(json.dumps({"files": files, **remarks}, indent=2), encoding="utf-8")
+    remarks = {
+        "notes": solution.notes,
+        "reasons": solution.reasons,
+        "varied": list(solution.variations.paths),
+    }
+    (folder / "batch.json").write_text(
+        json.dumps({"files": files, **remarks}, indent=2), encoding="utf-8"
+    )

@@ -21,7 +21,8 @@ _PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
 
 class BatchStepper:
-    """Plants of one structure with states, inputs and parameters of their own, advanced together in equal steps.
+    """Plants of one structure with states, inputs and parameters of their own, advanced together in
+    equal steps.
 
     plant       any System
     count       number of plants N
@@ -29,28 +30,43 @@ class BatchStepper:
     precision   Double() or Single()
     cores       threads; all cores of this process unless given. The result does not depend on it
 
-    states, inputs, parameters, outputs   (B, k, W): blocks of W lanes; plant i is lane i % W of block i // W. The
+    states, inputs, parameters, outputs   (B, k, W): blocks of W lanes; plant i is lane i % W of
+    block i // W. The
                 last block is filled up with further plants, whose numbers are not used
 
-    Nothing is checked between steps: a state that is impossible becomes a number that is not finite. `close` ends the
-    threads. Raises ParameterError for a number of plants or an integrator that is impossible.
+    Nothing is checked between steps: a state that is impossible becomes a number that is not
+    finite. `close` ends the threads. Raises ParameterError for a number of plants or an integrator
+    that is impossible.
     """
 
     def __init__(
-        self, plant: System, count: int, integrator: ExplicitRungeKutta, *, precision: Precision = Double(),
+        self,
+        plant: System,
+        count: int,
+        integrator: ExplicitRungeKutta,
+        *,
+        precision: Precision = Double(),
         cores: int | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         check_system("BatchStepper", plant)
         if not isinstance(count, int) or count < 1:
-            raise ParameterError(f"BatchStepper: count is {count!r}; it must be a whole number from 1 on.")
+            raise ParameterError(
+                f"BatchStepper: count is {count!r}; it must be a whole number from 1 on."
+            )
         if not isinstance(integrator, ExplicitRungeKutta):
             raise ParameterError(
-                f"BatchStepper: the integrator is {integrator!r}; it must have a fixed step, such as RungeKutta4(1e-3)."
+                f"BatchStepper: the integrator is {integrator!r}; it must have a fixed step, such"
+                " as RungeKutta4(1e-3)."
             )
         if cores is not None and (not isinstance(cores, int) or cores < 1):
-            raise ParameterError(f"BatchStepper: cores is {cores!r}; it must be a whole number from 1 on.")
-        compiled, number = compile_system(plant), precision.number
-        self.plant, self.count, self.width = plant, count, number.lanes
+            raise ParameterError(
+                f"BatchStepper: cores is {cores!r}; it must be a whole number from 1 on."
+            )
+        compiled = compile_system(plant)
+        number = precision.number
+        self.plant = plant
+        self.count = count
+        self.width = number.lanes
         self._options = {"integrator": integrator, "precision": precision, "cores": cores}
         self.dtype: Any = precision.dtype
         self.blocks = -(-count // self.width)
@@ -58,24 +74,36 @@ class BatchStepper:
         self._program, self._prepare = compiled.program, _PREPARE(prepare)
         sizes = compiled.sizes
         self.states, self.inputs = self._columns(sizes.states), self._columns(sizes.inputs)
-        self.parameters, self.outputs = self._columns(sizes.parameters), self._columns(sizes.outputs)
+        self.parameters, self.outputs = (
+            self._columns(sizes.parameters),
+            self._columns(sizes.outputs),
+        )
         self._held = self._columns(held)
         self.parameters[:] = compiled.parameters[None, :, None]
         self.prepare()
         cores = min(cores or available_cores(), self.blocks)
         ends = np.linspace(0, self.blocks, cores + 1).astype(np.int64)
         self._steps = np.zeros(1, dtype=np.int64)
-        self._parts = [self._bind(functions, ends[i : i + 2].copy(), integrator.step) for i in range(cores)]
+        self._parts = [
+            self._bind(functions, ends[i : i + 2].copy(), integrator.step) for i in range(cores)
+        ]
         self._threads = concurrent.futures.ThreadPoolExecutor(cores - 1) if cores > 1 else None
 
     def __getstate__(self) -> dict[str, Any]:
         """Arguments and arrays; threads, kernels and addresses belong to a process."""
         arrays = self.states, self.inputs, self.parameters, self.outputs
-        return {"plant": self.plant, "count": self.count, "options": self._options, "arrays": arrays}
+        return {
+            "plant": self.plant,
+            "count": self.count,
+            "options": self._options,
+            "arrays": arrays,
+        }
 
     def __setstate__(self, stored: dict[str, Any]) -> None:
         self.__init__(stored["plant"], stored["count"], **stored["options"])  # type: ignore[misc]
-        for own, array in zip((self.states, self.inputs, self.parameters, self.outputs), stored["arrays"], strict=True):
+        for own, array in zip(
+            (self.states, self.inputs, self.parameters, self.outputs), stored["arrays"], strict=True
+        ):
             own[...] = array
         self.prepare()
 
@@ -87,11 +115,23 @@ class BatchStepper:
 
     def _bind(self, functions: list[int], span: npt.NDArray[np.int64], length: float) -> Any:
         """The kernel for the blocks of one thread."""
-        n, m = self.states.shape[1], self.inputs.shape[1]
-        still, h, other = self._columns(m, 1)[0], self._columns(1, 1)[0], self._columns(n, 1)[0]
+        n = self.states.shape[1]
+        m = self.inputs.shape[1]
+        still = self._columns(m, 1)[0]
+        h = self._columns(1, 1)[0]
+        other = self._columns(n, 1)[0]
         h[:] = length
         return lane_blocks.bind(
-            *functions, self.states, self.inputs, self._held, still, h, other, self.outputs, span, self._steps
+            *functions,
+            self.states,
+            self.inputs,
+            self._held,
+            still,
+            h,
+            other,
+            self.outputs,
+            span,
+            self._steps,
         )
 
     def prepare(self, blocks: npt.NDArray[np.intp] | None = None) -> None:
@@ -100,7 +140,9 @@ class BatchStepper:
             self._prepare(self.parameters[block].ctypes.data, self._held[block].ctypes.data)
 
     def advance(self, steps: int) -> None:
-        """Advance all plants by so many steps with the inputs held, and compute their outputs; 0 steps are allowed."""
+        """Advance all plants by so many steps with the inputs held, and compute their outputs; 0
+        steps are allowed.
+        """
         self._steps[0] = steps
         waiting = [self._threads.submit(part) for part in self._parts[1:]] if self._threads else []
         self._parts[0]()
@@ -108,9 +150,13 @@ class BatchStepper:
             part.result()
 
     def rows(self, columns: Columns, first: int, last: int, dtype: Any) -> Columns:
-        """Columns first .. last - 1 of an array (B, k, W) by plant: a new array (N, last - first)."""
+        """Columns first .. last - 1 of an array (B, k, W) by plant: a new array (N, last -
+        first).
+        """
         table = np.empty((self.blocks * self.width, last - first), dtype)
-        table.reshape(self.blocks, self.width, last - first)[...] = columns[:, first:last].transpose(0, 2, 1)
+        table.reshape(self.blocks, self.width, last - first)[...] = columns[
+            :, first:last
+        ].transpose(0, 2, 1)
         return table[: self.count]
 
     def column(self, columns: Columns, index: int, dtype: Any) -> Columns:

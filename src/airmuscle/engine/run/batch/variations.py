@@ -1,4 +1,6 @@
-"""Variations: parameters of N plants by path, checked as if each plant were constructed; their initial states."""
+"""Variations: parameters of N plants by path, checked as if each plant were constructed; their
+initial states.
+"""
 
 import dataclasses
 import itertools
@@ -8,7 +10,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, check_known, one_line, parts_of, tree
+from ....core import (
+    AirmuscleError,
+    Array,
+    ParameterError,
+    PhysicsError,
+    System,
+    check_known,
+    one_line,
+    parts_of,
+    tree,
+)
 from ....core.declaration import check_together
 
 STATES_AT_ONCE = 500
@@ -17,7 +29,9 @@ STATES_AT_ONCE = 500
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Variations:
-    """A system, and for N others of its structure the values (N, V) of the parameters that differ."""
+    """A system, and for N others of its structure the values (N, V) of the parameters that
+    differ.
+    """
 
     system: System
     paths: tuple[str, ...]
@@ -41,14 +55,20 @@ class Variations:
         return tree.unflatten(self.system, self.parameters(index).tolist())
 
     def nominal(self) -> Array:
-        """Nominal size (N, n) of each state, below which its relative error no longer matters, for every system."""
+        """Nominal size (N, n) of each state, below which its relative error no longer matters, for
+        every system.
+        """
         count = len(self.values)
         if not self.paths:
             return np.array([[s.nominal for s in self.system.states]] * count)
         try:
             columns = [np.broadcast_to(s.nominal, count) for s in self.as_columns().states]
             return np.column_stack([c.astype(float) for c in columns])
-        except (TypeError, ValueError, AirmuscleError):  # a system whose `states` takes plain numbers only
+        except (
+            TypeError,
+            ValueError,
+            AirmuscleError,
+        ):  # a system whose `states` takes plain numbers only
             return np.array([[s.nominal for s in self.one(i).states] for i in range(count)])
 
     def as_columns(self) -> Any:
@@ -63,9 +83,15 @@ class Variations:
         for _, part in parts_of(self.as_columns()) if self.paths else ():
             try:
                 check_together(part)
-            except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
+            except (
+                TypeError,
+                ValueError,
+                AirmuscleError,
+            ):  # rows differ, or one of them is impossible: row by row
                 values = [leaf.value for leaf in tree.leaves(part)]
-                columns = [v.tolist() if isinstance(v, np.ndarray) else itertools.repeat(v) for v in values]
+                columns = [
+                    v.tolist() if isinstance(v, np.ndarray) else itertools.repeat(v) for v in values
+                ]
                 for row, *numbers in zip(range(len(self.values)), *columns, strict=False):
                     try:
                         check_together(tree.unflatten(part, numbers))
@@ -84,12 +110,15 @@ class Column(np.ndarray):
 
 
 def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
-    """The variations of a System, or of a controller. Raises ParameterError for an unknown path or an impossible value.
+    """The variations of a System, or of a controller. Raises ParameterError for an unknown path or
+    an impossible value.
 
     `count` is the number of plants where initial states or inputs determine it.
     """
     if not isinstance(given, Mapping):
-        raise ParameterError(f"variations: they are {one_line(given)}; give a column of values for each path.")
+        raise ParameterError(
+            f"variations: they are {one_line(given)}; give a column of values for each path."
+        )
     leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(tree.leaves(system))}
     columns = []
     for path, values in given.items():
@@ -101,16 +130,21 @@ def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | 
     sizes = {path: len(column) for path, column in zip(given, columns, strict=True)}
     if len({*sizes.values(), *(() if count is None else (count,))}) > 1:
         others = "" if count is None else f", and initial states or inputs for {count}"
-        raise ParameterError(f"variations: every column needs one value per plant; there are {sizes}{others}.")
+        raise ParameterError(
+            f"variations: every column needs one value per plant; there are {sizes}{others}."
+        )
     count = next(iter(sizes.values()), count)
     if count is None:
         raise ParameterError(
-            "simulate_batch: nothing varies; give variations, initial states or inputs, or use simulate."
+            "simulate_batch: nothing varies; give variations, initial states or inputs, or use"
+            " simulate."
         )
     if count == 0:
         raise ParameterError("simulate_batch: there are no plants; give at least one row.")
     table = np.column_stack(columns) if columns else np.empty((count, 0))
-    varied = Variations(system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table)
+    varied = Variations(
+        system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table
+    )
     varied.check_consistent()
     return varied
 
@@ -121,11 +155,13 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
         values = np.array(given, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError(
-            f"variations: '{leaf.path}' must be numbers, one for each plant; it is {one_line(given)}."
+            f"variations: '{leaf.path}' must be numbers, one for each plant; it is"
+            f" {one_line(given)}."
         ) from None
     if values.ndim != 1:
         raise ParameterError(
-            f"variations: '{leaf.path}' must be a column (N,), one value per plant; its shape is {values.shape}."
+            f"variations: '{leaf.path}' must be a column (N,), one value per plant; its shape is"
+            f" {values.shape}."
         )
     declared = leaf.declared
     low, high = declared.bounds
@@ -135,36 +171,44 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
         row = int(wrong[0])
         more = f" ({wrong.size - 1} further rows too)" if wrong.size > 1 else ""
         raise ParameterError(
-            f"variations, row {row}: '{leaf.path}' ({declared.symbol}, {declared.meaning}) is {values[row]:g}{unit}; "
-            f"allowed range: {low:g} to {high:g}{unit}{more}. Values are in SI units."
+            f"variations, row {row}: '{leaf.path}' ({declared.symbol}, {declared.meaning}) is"
+            f" {values[row]:g}{unit}; allowed range: {low:g} to {high:g}{unit}{more}. Values are in"
+            " SI units."
         )
     return values
 
 
 def given_states(variations: Variations, given: Mapping[str, npt.ArrayLike], count: int) -> Array:
-    """Initial states (N, n) from numbers or columns (N,) by name. Raises ParameterError for an impossible one."""
+    """Initial states (N, n) from numbers or columns (N,) by name. Raises ParameterError for an
+    impossible one.
+    """
     system = variations.system
     names = [s.name for s in system.states]
     check_known("the plant has no state", given, names)
     missing = [name for name in names if name not in given]
     if missing:
-        raise ParameterError(f"initial_states lack {', '.join(missing)}; give a number for all, or a column (N,).")
+        raise ParameterError(
+            f"initial_states lack {', '.join(missing)}; give a number for all, or a column (N,)."
+        )
     states = np.empty((count, len(names)))
     for i, name in enumerate(names):
         try:
             states[:, i] = given[name]
         except (TypeError, ValueError):
             raise ParameterError(
-                f"initial_states: '{name}' is {str(given[name])[:80]}; it must be a number for all, or a column (N,)."
+                f"initial_states: '{name}' is {str(given[name])[:80]}; it must be a number for all,"
+                " or a column (N,)."
             ) from None
         wrong = np.flatnonzero(~np.isfinite(states[:, i]))
         if wrong.size:
             raise ParameterError(
-                f"initial_states, row {wrong[0]}: '{name}' is {states[wrong[0], i]}; it must be finite."
+                f"initial_states, row {wrong[0]}: '{name}' is {states[wrong[0], i]}; it must be"
+                " finite."
             )
     for row, i in np.argwhere(states < np.asarray(system.state_lower_bounds)):
         raise ParameterError(
-            f"initial_states, row {row}: '{names[i]}' is {states[row, i]:.4g}; it must not be negative."
+            f"initial_states, row {row}: '{names[i]}' is {states[row, i]:.4g}; it must not be"
+            " negative."
         )
     _check_states(variations, names, states)
     return states
@@ -175,7 +219,11 @@ def _check_states(variations: Variations, names: list[str], states: Array) -> No
     try:
         columns = {name: column.view(Column) for name, column in zip(names, states.T, strict=True)}
         variations.as_columns().check_state(columns)
-    except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
+    except (
+        TypeError,
+        ValueError,
+        AirmuscleError,
+    ):  # rows differ, or one of them is impossible: row by row
         for row, state in enumerate(states.tolist()):
             try:
                 variations.one(row).check_state(dict(zip(names, state, strict=True)))
@@ -185,24 +233,31 @@ def _check_states(variations: Variations, names: list[str], states: Array) -> No
                 ) from None
 
 
-def default_states(variations: Variations, advanced: Callable[[int], None]) -> tuple[Array, dict[int, str]]:
+def default_states(
+    variations: Variations, advanced: Callable[[int], None]
+) -> tuple[Array, dict[int, str]]:
     """The default state of every system (N, n), and why there is none where there is none.
 
-    Systems that differ only in parameters without an effect on it share it. `advanced` is told how many are done.
+    Systems that differ only in parameters without an effect on it share it. `advanced` is told how
+    many are done.
     """
     system = variations.system
     relevant = [i for i, path in enumerate(variations.paths) if system.affects_default_state(path)]
     known: dict[bytes, int] = {}
     values = np.ascontiguousarray(variations.values[:, relevant])
-    shared = np.array([known.setdefault(row.tobytes(), len(known)) for row in values], dtype=np.intp)
+    shared = np.array(
+        [known.setdefault(row.tobytes(), len(known)) for row in values], dtype=np.intp
+    )
     rows = np.unique(shared, return_index=True)[1]
-    states, reasons = np.full((rows.size, len(system.states)), np.nan), dict[int, str]()
+    states = np.full((rows.size, len(system.states)), np.nan)
+    reasons = dict[int, str]()
     for begin in range(0, rows.size, STATES_AT_ONCE):
         part = rows[begin : begin + STATES_AT_ONCE]
         table = system.default_states(variations.table(part))
         if table is None:
             raise ParameterError(
-                f"simulate_batch: give the initial_states of {type(system).__name__}, a value for each state."
+                f"simulate_batch: give the initial_states of {type(system).__name__}, a value for"
+                " each state."
             )
         states[begin : begin + part.size] = table
         for i in np.flatnonzero(~np.isfinite(table).all(axis=1)).tolist():
@@ -213,4 +268,6 @@ def default_states(variations: Variations, advanced: Callable[[int], None]) -> t
                 reasons[begin + i] = f"it has no equilibrium to start from: {error}"
             advanced(begin + i)
         advanced(begin + part.size)
-    return states[shared], {row: reasons[i] for row, i in enumerate(shared.tolist()) if i in reasons}
+    return states[shared], {
+        row: reasons[i] for row, i in enumerate(shared.tolist()) if i in reasons
+    }

@@ -1,4 +1,6 @@
-"""Static characteristics: relations between gauge pressure, contraction and tension; one class per paper."""
+"""Static characteristics: relations between gauge pressure, contraction and tension; one class per
+paper.
+"""
 
 from ....core.stubs import attach_stub
 

@@ -1,15 +1,26 @@
-"""Characteristic (interface): static relation between gauge pressure p [Pa], contraction eps [1] and tension F [N].
+"""Characteristic (interface): static relation between gauge pressure p [Pa], contraction eps [1]
+and tension F [N].
 
-A paper gives the relation solved for one of the three quantities. A model implements this direction; the classes here
-compute the other two by a bracketed root search, and exact slopes by the implicit function theorem. If there are
-several solutions, the one reached from rest is returned: the smallest contraction, pressure or force in equilibrium.
+A paper gives the relation solved for one of the three quantities. A model implements this
+direction; the classes here compute the other two by a bracketed root search, and exact slopes by
+the implicit function theorem. If there are several solutions, the one reached from rest is
+returned: the smallest contraction, pressure or force in equilibrium.
 """
 
 import abc
 from collections.abc import Callable, Iterable
 from typing import ClassVar, NamedTuple, Self
 
-from ....core import INFINITY, IdentificationError, Reference, Value, autodiff, model, ops, parameter
+from ....core import (
+    INFINITY,
+    IdentificationError,
+    Reference,
+    Value,
+    autodiff,
+    model,
+    ops,
+    parameter,
+)
 from ....core.declaration import forwarded
 from ..quantity_arguments import QuantityMethods, Units
 from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
@@ -29,28 +40,36 @@ class Slopes(NamedTuple):
 
 
 class Characteristic(QuantityMethods, abc.ABC):
-    """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is positive.
+    """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is
+    positive.
 
-    Arguments are numbers, arrays or lists in SI units, or texts with a unit: `force("3 bar", "10 %")`.
+    Arguments are numbers, arrays or lists in SI units, or texts with a unit: `force("3 bar", "10
+    %")`.
     """
 
     references: ClassVar[tuple[Reference, ...]] = ()
     traceable: ClassVar[bool] = True
-    """Whether the model is in closed form over `ops`; otherwise a plant uses it through `as_force_law`."""
+    """Whether the model is in closed form over `ops`; otherwise a plant uses it through
+    `as_force_law`.
+    """
     redundant: ClassVar[tuple[str, ...]] = ()
     """Parameters that a fit keeps at those of `guess`, because they only scale other parameters."""
     argument_units: ClassVar[Units] = {
-        "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),
+        "force": ("Pa", "1"),
+        "contraction": ("Pa", "N"),
+        "pressure": ("1", "N"),
+        "slopes": ("Pa", "1"),
         "stiffness": ("Pa", "1"),
-    }  # fmt: skip
+    }
     check_ratio = staticmethod(warn_above_whole_length)
 
     @classmethod
     def guess(cls, data: MeasuredPoints) -> Self:
-        """The law with initial parameters for a fit to measured points: recordings, or their `DataScales`.
+        """The law with initial parameters for a fit to measured points: recordings, or their
+        `DataScales`.
 
-        A law that defines it is compared with the others. Raises IdentificationError where they do not follow from the
-        data.
+        A law that defines it is compared with the others. Raises IdentificationError where they do
+        not follow from the data.
         """
         raise IdentificationError(
             f"{cls.__name__} is not started from data; give its initial parameters.",
@@ -58,14 +77,20 @@ class Characteristic(QuantityMethods, abc.ABC):
         )
 
     @classmethod
-    def variants(cls, data: MeasuredPoints, surface: "Callable[[int], ForceLaw]") -> "dict[str, Characteristic]":
-        """The initial laws of this class that are compared, by name: that of `guess`, or several structures.
+    def variants(
+        cls, data: MeasuredPoints, surface: "Callable[[int], ForceLaw]"
+    ) -> "dict[str, Characteristic]":
+        """The initial laws of this class that are compared, by name: that of `guess`, or several
+        structures.
 
-        surface  a surface of a total degree with coefficients of zero, for laws that contain another one
+        surface  a surface of a total degree with coefficients of zero, for laws that contain
+        another one
 
         Empty for a law without `guess`. Raises IdentificationError as `guess`.
         """
-        own = getattr(cls.guess, "__func__", None) is not getattr(Characteristic.guess, "__func__", None)
+        own = getattr(cls.guess, "__func__", None) is not getattr(
+            Characteristic.guess, "__func__", None
+        )
         return {cls.__name__: cls.guess(data)} if own else {}
 
     @property
@@ -85,7 +110,9 @@ class Characteristic(QuantityMethods, abc.ABC):
 
     @abc.abstractmethod
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises SolveError."""
+        """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises
+        SolveError.
+        """
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N] before any limit is applied; fits evaluate the residuals with it."""
@@ -93,15 +120,21 @@ class Characteristic(QuantityMethods, abc.ABC):
 
     @abc.abstractmethod
     def contraction(self, pressure: Value, force: Value) -> Value:
-        """Contraction [1] at gauge pressure [Pa] and tension [N]; arrays broadcast. Raises SolveError."""
+        """Contraction [1] at gauge pressure [Pa] and tension [N]; arrays broadcast. Raises
+        SolveError.
+        """
 
     @abc.abstractmethod
     def pressure(self, contraction: Value, force: Value) -> Value:
-        """Gauge pressure [Pa] at contraction [1] and tension [N]; arrays broadcast. Raises SolveError."""
+        """Gauge pressure [Pa] at contraction [1] and tension [N]; arrays broadcast. Raises
+        SolveError.
+        """
 
     @abc.abstractmethod
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
-        """Exact partial derivatives of the tension at gauge pressure [Pa] and contraction [1]; arrays broadcast."""
+        """Exact partial derivatives of the tension at gauge pressure [Pa] and contraction [1];
+        arrays broadcast.
+        """
 
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
         """Stiffness -dF/deps [N] at constant pressure; divide by the resting length for [N/m]."""
@@ -111,23 +144,23 @@ class Characteristic(QuantityMethods, abc.ABC):
         low, high = self.contraction_range
         limits = describe_range(100 * low, 100 * high, "%")
         return (
-            f"{type(self).__name__}: no contraction in the range {limits} is in equilibrium with {force:.4g} N at "
-            f"{pressure / 1e3:.4g} kPa. "
+            f"{type(self).__name__}: no contraction in the range {limits} is in equilibrium with"
+            f" {force:.4g} N at {pressure / 1e3:.4g} kPa. "
         )
 
     def _no_pressure_message(self, contraction: float, force: float) -> str:
         low, high = self.pressure_range
         limits = describe_range(low / 1e3, high / 1e3, "kPa")
         return (
-            f"{type(self).__name__}: no gauge pressure in the range {limits} gives {force:.4g} N at a contraction of "
-            f"{100 * contraction:.4g} %. "
+            f"{type(self).__name__}: no gauge pressure in the range {limits} gives {force:.4g} N at"
+            f" a contraction of {100 * contraction:.4g} %. "
         )
 
     def _no_force_message(self, pressure: float, contraction: float) -> str:
         limits = describe_range(*self.force_range, "N")
         return (
-            f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % "
-            f"at {pressure / 1e3:.4g} kPa. "
+            f"{type(self).__name__}: no force in the range {limits} gives a contraction of"
+            f" {100 * contraction:.4g} % at {pressure / 1e3:.4g} kPa. "
         )
 
 
@@ -136,15 +169,26 @@ class ForceLaw(Characteristic):
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         return solve_direction(
-            lambda contraction, p, _: self.force(p, contraction), self.contraction_range, (pressure, force), 1,
-            self._no_contraction_message, "Available force", "N", falling=True,
-        )  # fmt: skip
+            lambda contraction, p, _: self.force(p, contraction),
+            self.contraction_range,
+            (pressure, force),
+            1,
+            self._no_contraction_message,
+            "Available force",
+            "N",
+            falling=True,
+        )
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         return solve_direction(
-            lambda pressure, c, _: self.force(pressure, c), self.pressure_range, (contraction, force), 1,
-            self._no_pressure_message, "Available force", "N",
-        )  # fmt: skip
+            lambda pressure, c, _: self.force(pressure, c),
+            self.pressure_range,
+            (contraction, force),
+            1,
+            self._no_pressure_message,
+            "Available force",
+            "N",
+        )
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         return Slopes(
@@ -165,7 +209,9 @@ class AreaLaw(ForceLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         solution = force / self.effective_area(contraction)
-        return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
+        return check_solution(
+            solution, self.pressure_range, (contraction, force), self._pressure_limits_message
+        )
 
     def _contraction_limits_message(self, pressure: float, force: float) -> str:
         """Message for a tension that decreases monotonically over the contraction range."""
@@ -187,15 +233,26 @@ class ContractionLaw(Characteristic):
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return solve_direction(
-            lambda force, p, _: self.contraction(p, force), self.force_range, (pressure, contraction), 1,
-            self._no_force_message, "Available contraction at this pressure", "%", falling=True,
-        )  # fmt: skip
+            lambda force, p, _: self.contraction(p, force),
+            self.force_range,
+            (pressure, contraction),
+            1,
+            self._no_force_message,
+            "Available contraction at this pressure",
+            "%",
+            falling=True,
+        )
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         return solve_direction(
-            lambda pressure, _, load: self.contraction(pressure, load), self.pressure_range, (contraction, force), 0,
-            self._no_pressure_message, "Available contraction at this load", "%",
-        )  # fmt: skip
+            lambda pressure, _, load: self.contraction(pressure, load),
+            self.pressure_range,
+            (contraction, force),
+            0,
+            self._no_pressure_message,
+            "Available contraction at this load",
+            "%",
+        )
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
@@ -209,15 +266,25 @@ class PressureLaw(Characteristic):
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return solve_direction(
-            lambda force, _, c: self.pressure(c, force), self.force_range, (pressure, contraction), 0,
-            self._no_force_message, "Required pressure at this contraction", "kPa",
-        )  # fmt: skip
+            lambda force, _, c: self.pressure(c, force),
+            self.force_range,
+            (pressure, contraction),
+            0,
+            self._no_force_message,
+            "Required pressure at this contraction",
+            "kPa",
+        )
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         return solve_direction(
-            lambda contraction, _, load: self.pressure(contraction, load), self.contraction_range, (pressure, force), 0,
-            self._no_contraction_message, "Required pressure at this load", "kPa",
-        )  # fmt: skip
+            lambda contraction, _, load: self.pressure(contraction, load),
+            self.contraction_range,
+            (pressure, force),
+            0,
+            self._no_contraction_message,
+            "Required pressure at this load",
+            "kPa",
+        )
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
@@ -235,12 +302,17 @@ def _ratio(a: Value, b: Value) -> Value:
 class Clamped(ForceLaw):
     """Limited force: F = min(max(F_inner, F_min), F_max).
 
-    A muscle pulls and never pushes; the upper limit is that of the force compensator or of the catalogue.
+    A muscle pulls and never pushes; the upper limit is that of the force compensator or of the
+    catalogue.
     """
 
     inner: ForceLaw
-    min_force: float = parameter("N", "F_min", "lower limit of the force", fitted=False, default=0.0)
-    max_force: float = parameter("N", "F_max", "upper limit of the force", fitted=False, default=1.0e5)
+    min_force: float = parameter(
+        "N", "F_min", "lower limit of the force", fitted=False, default=0.0
+    )
+    max_force: float = parameter(
+        "N", "F_max", "upper limit of the force", fitted=False, default=1.0e5
+    )
 
     contraction_range = forwarded("inner.contraction_range")
     unclamped_force = forwarded("inner.unclamped_force")

@@ -19,14 +19,17 @@ Sides = Callable[[Array, Array], tuple[Array, Array]]
 
 @dataclasses.dataclass(frozen=True)
 class EnergyDefect:
-    """Maximum difference of two quantities that should be equal over a validity range, and its location."""
+    """Maximum difference of two quantities that should be equal over a validity range, and its
+    location.
+    """
 
     worst: float
     unit: str
     pressure: float
     contraction: float
     relative: float
-    """`worst` divided by the maximum magnitude of the quantity that follows from the volume of the muscle.
+    """`worst` divided by the maximum magnitude of the quantity that follows from the volume of the
+    muscle.
 
     NaN if the volume is constant.
     """
@@ -41,18 +44,21 @@ class EnergyDefect:
     def place(self) -> str:
         """Where the difference is a maximum, and the excluded share, in words."""
         return (
-            f"at {self.pressure / 1e3:.4g} kPa and {100 * self.contraction:.2f} % of contraction; slack on "
-            f"{100 * self.slack:.0f} % of the validity range"
+            f"at {self.pressure / 1e3:.4g} kPa and {100 * self.contraction:.2f} % of contraction;"
+            f" slack on {100 * self.slack:.0f} % of the validity range"
         )
 
 
-def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange) -> EnergyDefect:
-    """Maximum |dF/dp + dV/dL| [m2] over the validity range; zero if force and volume derive from one potential.
+def maxwell_defect(
+    characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange
+) -> EnergyDefect:
+    """Maximum |dF/dp + dV/dL| [m2] over the validity range; zero if force and volume derive from
+    one potential.
 
-    F(p, L) tension, V(L) volume, dV/dL = -(dV/deps)/L0. A muscle with a defect generates or loses energy on a closed
-    path of pressure and length: the defect times the enclosed area. Slack states are excluded, because the volume of a
-    slack muscle does not follow from its length, and straight fibres, whose dV/dL is infinite. Raises SolveError if the
-    muscle is slack everywhere.
+    F(p, L) tension, V(L) volume, dV/dL = -(dV/deps)/L0. A muscle with a defect generates or loses
+    energy on a closed path of pressure and length: the defect times the enclosed area. Slack states
+    are excluded, because the volume of a slack muscle does not follow from its length, and straight
+    fibres, whose dV/dL is infinite. Raises SolveError if the muscle is slack everywhere.
     """
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
@@ -65,11 +71,12 @@ def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_
 def virtual_work_defect(
     characteristic: Characteristic, geometry: Geometry, validity_range: ValidityRange
 ) -> EnergyDefect:
-    """Maximum |F + p dV/dL| [N] over the taut states of the validity range: forces of wall and ends, model errors.
+    """Maximum |F + p dV/dL| [N] over the taut states of the validity range: forces of wall and
+    ends, model errors.
 
-    Zero for an ideal muscle, whose force is due to its volume only. A law may conserve energy and still differ by the
-    energy stored in its wall; `maxwell_defect` distinguishes the two. Raises SolveError if the muscle is slack
-    everywhere.
+    Zero for an ideal muscle, whose force is due to its volume only. A law may conserve energy and
+    still differ by the energy stored in its wall; `maxwell_defect` distinguishes the two. Raises
+    SolveError if the muscle is slack everywhere.
     """
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
@@ -79,18 +86,29 @@ def virtual_work_defect(
     return _largest(characteristic, sides, validity_range, "N")
 
 
-def _largest(law: Characteristic, sides: Sides, validity_range: ValidityRange, unit: str) -> EnergyDefect:
-    edges = (np.linspace(*limits, _POINTS) for limits in (validity_range.pressure, validity_range.contraction))
+def _largest(
+    law: Characteristic, sides: Sides, validity_range: ValidityRange, unit: str
+) -> EnergyDefect:
+    edges = (
+        np.linspace(*limits, _POINTS)
+        for limits in (validity_range.pressure, validity_range.contraction)
+    )
     p, c = (side.reshape(-1) for side in np.meshgrid(*edges))
     taut = np.asarray(law.force(p, c)) > 0
     if not taut.any():
-        raise SolveError(f"{type(law).__name__} is slack in its whole validity range; the defect is not defined.")
-    p, c = p[taut], c[taut]
+        raise SolveError(
+            f"{type(law).__name__} is slack in its whole validity range; the defect is not defined."
+        )
+    p = p[taut]
+    c = c[taut]
     with np.errstate(invalid="ignore"):  # zero pressure times the infinite dV/dL of straight fibres
         actual, expected = (np.broadcast_to(side, p.shape) for side in sides(p, c))
     p, c, actual, expected = (side[np.isfinite(expected)] for side in (p, c, actual, expected))
     difference = np.abs(actual - expected)
     at = int(np.argmax(difference))
-    worst, scale = float(difference[at]), float(np.abs(expected).max())
+    worst = float(difference[at])
+    scale = float(np.abs(expected).max())
     relative = worst / scale if scale > 0 else math.nan
-    return EnergyDefect(worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean()))
+    return EnergyDefect(
+        worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean())
+    )

@@ -1,4 +1,6 @@
-"""Wrappers for muscles of one type and different lengths: rigid ends, a correction by the length, partial pooling."""
+"""Wrappers for muscles of one type and different lengths: rigid ends, a correction by the length,
+partial pooling.
+"""
 
 import abc
 import dataclasses
@@ -12,7 +14,9 @@ from .base import Characteristic, ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
 _RANGE_FACTOR = 2.0
-"""Factor by which the contraction range of the inner surface exceeds that of the whole muscle (chosen)."""
+"""Factor by which the contraction range of the inner surface exceeds that of the whole muscle
+(chosen).
+"""
 
 
 class LengthLaw(ForceLaw):
@@ -33,7 +37,9 @@ class LengthLaw(ForceLaw):
         """Return the model of a muscle of the same type with this resting length [m]."""
         return self._with(resting_length=resting_length)
 
-    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+    def with_validity_range(
+        self, pressure: tuple[float, float], contraction: tuple[float, float]
+    ) -> Self:
         """Return the model with its surfaces on another validity range."""
         return self._on_range("with_validity_range", pressure, contraction)
 
@@ -41,10 +47,18 @@ class LengthLaw(ForceLaw):
         """Return the same force law with its surfaces on another validity range."""
         return self._on_range("rescaled", pressure, contraction)
 
-    def _on_range(self, method: str, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+    def _on_range(
+        self, method: str, pressure: tuple[float, float], contraction: tuple[float, float]
+    ) -> Self:
         laws = {name: getattr(self, name) for name in self.parts}
         limits = pressure, self._range_of_parts(contraction)
-        return self._with(**{name: getattr(law, method)(*limits) for name, law in laws.items() if hasattr(law, method)})
+        return self._with(
+            **{
+                name: getattr(law, method)(*limits)
+                for name, law in laws.items()
+                if hasattr(law, method)
+            }
+        )
 
     def _range_of_parts(self, contraction: tuple[float, float]) -> tuple[float, float]:
         """The range of the contraction of the parts for this one of the whole muscle."""
@@ -59,34 +73,47 @@ class LengthLaw(ForceLaw):
 class EffectiveLength(LengthLaw):
     """Force law of the active length: F = F_inner(p, (eps L_0 + d)/(L_0 - l_d)).
 
-    eps: contraction of the whole muscle; l_d: length of the ends, which do not contract, so that short muscles contract
-    less; d: their elongation under pressure, or zero error of the length measurement. Developed for airmuscle; the
-    effect of the ends is from Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
+    eps: contraction of the whole muscle; l_d: length of the ends, which do not contract, so that
+    short muscles contract less; d: their elongation under pressure, or zero error of the length
+    measurement. Developed for airmuscle; the effect of the ends is from Tondu and Lopez (2000),
+    whose end correction is L_0/(L_0 - l_d).
     """
 
     inner: ForceLaw
     resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
-    dead_length: float = parameter("m", "l_d", "length of the ends, which do not contract", bounds=(-1.0, 1.0))
+    dead_length: float = parameter(
+        "m", "l_d", "length of the ends, which do not contract", bounds=(-1.0, 1.0)
+    )
     end_shift: float = parameter(
-        "m", "d", "elongation of the ends, or zero error of the length", bounds=(-0.1, 0.1), default=0.0
+        "m",
+        "d",
+        "elongation of the ends, or zero error of the length",
+        bounds=(-0.1, 0.1),
+        default=0.0,
     )
 
     @classmethod
-    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+    def variants(
+        cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]
+    ) -> dict[str, Characteristic]:
         length = DataScales.of(data).check_lengths().resting_length
-        return {f"effective length, degree {n}": cls(surface(n), length, dead_length=0.005) for n in range(2, 6)}
+        return {
+            f"effective length, degree {n}": cls(surface(n), length, dead_length=0.005)
+            for n in range(2, 6)
+        }
 
     def check(self) -> None:
         if not self.dead_length < self.resting_length:
             raise ParameterError(
-                f"EffectiveLength: dead_length {self.dead_length:g} m must be less than resting_length "
-                f"{self.resting_length:g} m."
+                f"EffectiveLength: dead_length {self.dead_length:g} m must be less than"
+                f" resting_length {self.resting_length:g} m."
             )
 
     @property
     def contraction_range(self) -> tuple[float, float]:
         low, high = self.inner.contraction_range
-        length, active = self.resting_length, self.resting_length - self.dead_length
+        length = self.resting_length
+        active = self.resting_length - self.dead_length
         return ((low * active - self.end_shift) / length, (high * active - self.end_shift) / length)
 
     def _range_of_parts(self, contraction: tuple[float, float]) -> tuple[float, float]:
@@ -108,10 +135,11 @@ class EffectiveLength(LengthLaw):
 
 @model
 class LengthFamily(LengthLaw):
-    """Base class: F = max(0, F_inner(p, eps) + s(L_0) F_change(p, eps)), with s = 0 at the reference length.
+    """Base class: F = max(0, F_inner(p, eps) + s(L_0) F_change(p, eps)), with s = 0 at the
+    reference length.
 
-    L_0: length between the fittings; s: length factor, defined by the subclass. Force limits of the inner models are
-    not applied.
+    L_0: length between the fittings; s: length factor, defined by the subclass. Force limits of the
+    inner models are not applied.
     """
 
     parts: ClassVar[tuple[str, ...]] = ("inner", "change")
@@ -122,14 +150,22 @@ class LengthFamily(LengthLaw):
     change: ForceLaw
     resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     reference_length: float = parameter(
-        "m", "L_ref", "reference length, at which the correction is zero", bounds=(1e-3, 20.0), fitted=False
+        "m",
+        "L_ref",
+        "reference length, at which the correction is zero",
+        bounds=(1e-3, 20.0),
+        fitted=False,
     )
 
     @classmethod
-    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+    def variants(
+        cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]
+    ) -> dict[str, Characteristic]:
         length = DataScales.of(data).check_lengths().resting_length
         return {
-            f"term in {cls.term}, degree {n}, change of degree {k}": cls(surface(n), surface(k), length, length)
+            f"term in {cls.term}, degree {n}, change of degree {k}": cls(
+                surface(n), surface(k), length, length
+            )
             for n in range(2, 6)
             for k in range(1, min(n, 3) + 1)
         }
@@ -152,8 +188,8 @@ class LengthFamily(LengthLaw):
 class InverseLength(LengthFamily):
     """Length factor in 1/L_0: F = max(0, F_inner(p, eps) + (L_ref/L_0 - 1) F_change(p, eps)).
 
-    Force limits of the inner models are not applied. If both models are surfaces, every coefficient has a term in
-    1/L_0, the effect of ends of constant size. Developed for airmuscle.
+    Force limits of the inner models are not applied. If both models are surfaces, every coefficient
+    has a term in 1/L_0, the effect of ends of constant size. Developed for airmuscle.
     """
 
     term: ClassVar[str] = "1/L0"
@@ -166,9 +202,10 @@ class InverseLength(LengthFamily):
 class LogarithmicLength(LengthFamily):
     """Logarithmic length factor: F = max(0, F_inner(p, eps) + ln(L_0/L_ref) F_change(p, eps)).
 
-    Force limits of the inner models are not applied. The logarithm lies between a term in 1/L_0, which is negligible
-    for long muscles, and a term in L_0, which is unbounded. Developed for airmuscle from measured muscles of 83 to 382
-    mm, whose force increased about equally with the first and the second doubling of length.
+    Force limits of the inner models are not applied. The logarithm lies between a term in 1/L_0,
+    which is negligible for long muscles, and a term in L_0, which is unbounded. Developed for
+    airmuscle from measured muscles of 83 to 382 mm, whose force increased about equally with the
+    first and the second doubling of length.
     """
 
     term: ClassVar[str] = "ln L0"
@@ -183,60 +220,86 @@ class PooledLengthLaw(ForceLaw):
 
         s = 1 where F_pop >= 0, otherwise max(0, 1 + c F_pop)
 
-    F_pop: law of the population, for any resting length L_0; F_s: effect of specimen s (a random effect), drawn from a
-    normal distribution of mean 0; c: decay of the effects below zero force, so that a specimen is slack where the
-    population is far from pulling; 0 keeps the effects everywhere. A new muscle has the mean of this prior, F_s = 0;
-    `with_resting_length` returns its law. `for_specimen` returns the law of a measured muscle. Without names of
-    specimens the one effect gives the structure for a fit. Force limits of the inner models are not applied. Developed
-    for airmuscle; the prediction of random effects is from Robinson, Statistical Science 6:15 (1991).
+    F_pop: law of the population, for any resting length L_0; F_s: effect of specimen s (a random
+    effect), drawn from a normal distribution of mean 0; c: decay of the effects below zero force,
+    so that a specimen is slack where the population is far from pulling; 0 keeps the effects
+    everywhere. A new muscle has the mean of this prior, F_s = 0; `with_resting_length` returns its
+    law. `for_specimen` returns the law of a measured muscle. Without names of specimens the one
+    effect gives the structure for a fit. Force limits of the inner models are not applied.
+    Developed for airmuscle; the prediction of random effects is from Robinson, Statistical Science
+    6:15 (1991).
     """
 
     population: ForceLaw
     effects: tuple[ForceLaw, ...]
     specimens: tuple[str, ...] = ()
     specimen_lengths: tuple[float, ...] = parameter(
-        "m", "L_s", "resting lengths of the specimens", bounds=(1e-3, 20.0), fitted=False, default=()
+        "m",
+        "L_s",
+        "resting lengths of the specimens",
+        bounds=(1e-3, 20.0),
+        fitted=False,
+        default=(),
     )
     specimen: str = ""
     effect_decay: float = parameter(
-        "1/N", "c", "relative decay of the specimen effects below zero force of the population",
-        bounds=(0.0, 1e3), fitted=False, default=0.0,
-    )  # fmt: skip
+        "1/N",
+        "c",
+        "relative decay of the specimen effects below zero force of the population",
+        bounds=(0.0, 1e3),
+        fitted=False,
+        default=0.0,
+    )
 
     def check(self) -> None:
         named = len(self.specimens)
         if not len(self.effects) == max(named, 1) or not len(self.specimen_lengths) == named:
             raise ParameterError(
-                f"PooledLengthLaw has {named} specimens, {len(self.effects)} effects and {len(self.specimen_lengths)} "
-                "specimen_lengths; these numbers must be equal (without specimens: one effect)."
+                f"PooledLengthLaw has {named} specimens, {len(self.effects)} effects and"
+                f" {len(self.specimen_lengths)} specimen_lengths; these numbers must be equal"
+                " (without specimens: one effect)."
             )
         if len(set(self.specimens)) < named or "" in self.specimens:
-            raise ParameterError("PooledLengthLaw.specimens must be different names, none of them empty.")
+            raise ParameterError(
+                "PooledLengthLaw.specimens must be different names, none of them empty."
+            )
         if not self.specimen:
             return
-        stated, own = self.specimen_lengths[self._index(self.specimen)], self.resting_length
+        stated = self.specimen_lengths[self._index(self.specimen)]
+        own = self.resting_length
         if own is not None and abs(stated - own) > 1e-6:
             raise ParameterError(
-                f"PooledLengthLaw: the resting length of {self.specimen} is {stated:g} m, but that of its population "
-                f"is {own:g} m. Write {stated:g} m there, or use for_specimen('{self.specimen}')."
+                f"PooledLengthLaw: the resting length of {self.specimen} is {stated:g} m, but that"
+                f" of its population is {own:g} m. Write {stated:g} m there, or use"
+                f" for_specimen('{self.specimen}')."
             )
 
     @property
     def resting_length(self) -> float | None:
-        """Resting length [m] of this muscle; None if the law of the population does not depend on it."""
+        """Resting length [m] of this muscle; None if the law of the population does not depend on
+        it.
+        """
         length: float | None = getattr(self.population, "resting_length", None)
         return length
 
     contraction_range = forwarded("population.contraction_range")
 
     def with_resting_length(self, resting_length: float) -> "PooledLengthLaw":
-        """Return the law of a new muscle of the same type with this resting length [m]: its effect is zero."""
-        return dataclasses.replace(self, population=_of_length(self.population, resting_length), specimen="")
+        """Return the law of a new muscle of the same type with this resting length [m]: its effect
+        is zero.
+        """
+        return dataclasses.replace(
+            self, population=_of_length(self.population, resting_length), specimen=""
+        )
 
     def for_specimen(self, specimen: str) -> "PooledLengthLaw":
-        """Return the law of a measured muscle, with its resting length and effect. Raises ParameterError."""
+        """Return the law of a measured muscle, with its resting length and effect. Raises
+        ParameterError.
+        """
         length = self.specimen_lengths[self._index(specimen)]
-        return dataclasses.replace(self, population=_of_length(self.population, length), specimen=specimen)
+        return dataclasses.replace(
+            self, population=_of_length(self.population, length), specimen=specimen
+        )
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
@@ -245,7 +308,9 @@ class PooledLengthLaw(ForceLaw):
         force = self.population.unclamped_force(pressure, contraction)
         if not self.specimen:
             return force
-        effect = self.effects[self.specimens.index(self.specimen)].unclamped_force(pressure, contraction)
+        effect = self.effects[self.specimens.index(self.specimen)].unclamped_force(
+            pressure, contraction
+        )
         return force + self.effect_share(force) * effect
 
     def effect_share(self, force: Value) -> Value:
@@ -256,12 +321,15 @@ class PooledLengthLaw(ForceLaw):
         if specimen not in self.specimens:
             known = ", ".join(self.specimens) or "none"
             raise ParameterError(
-                f"PooledLengthLaw: '{specimen}' is not among the specimens ({known}). Give one of these, or "
-                f"with_resting_length(...) for a new muscle.{suggestion(specimen, self.specimens)}"
+                f"PooledLengthLaw: '{specimen}' is not among the specimens ({known}). Give one of"
+                " these, or with_resting_length(...) for a new"
+                f" muscle.{suggestion(specimen, self.specimens)}"
             )
         return self.specimens.index(specimen)
 
 
 def _of_length(law: ForceLaw, resting_length: float) -> ForceLaw:
-    scaled: ForceLaw = law.with_resting_length(resting_length) if hasattr(law, "with_resting_length") else law
+    scaled: ForceLaw = (
+        law.with_resting_length(resting_length) if hasattr(law, "with_resting_length") else law
+    )
     return scaled

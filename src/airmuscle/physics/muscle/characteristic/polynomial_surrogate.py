@@ -1,4 +1,6 @@
-"""Polynomial surrogate: a traceable approximation of any characteristic, with the search for its maximum error."""
+"""Polynomial surrogate: a traceable approximation of any characteristic, with the search for its
+maximum error.
+"""
 
 import warnings
 from collections.abc import Callable
@@ -17,31 +19,45 @@ _STARTS = 40
 _BISECTIONS = 12
 """Halvings of a grid step towards the edge of the solutions, chosen: 1/4096 of the step."""
 _REFINEMENTS = 4
-"""Local grids around each start, each three times finer than the one before, chosen: 1/81 of the step."""
+"""Local grids around each start, each three times finer than the one before, chosen: 1/81 of the
+step.
+"""
 _OFFSETS = np.linspace(-1.0, 1.0, 7)
 _Error = Callable[[Array, Array], Array]
 _NO_CLAMP = 1e6
-"""Force limit [N] of the surface, above that of any muscle, so that negative forces are approximated as well."""
+"""Force limit [N] of the surface, above that of any muscle, so that negative forces are
+approximated as well.
+"""
 _MARGIN = 1.05
-"""Factor of the maximum error that the search finds, chosen, for what lies between the points of its last grids."""
+"""Factor of the maximum error that the search finds, chosen, for what lies between the points of
+its last grids.
+"""
 
 
 @model
 class PolynomialSurrogate(ForceLaw):
     """Polynomial surface fitted to another characteristic, with its errors on the validity range.
 
-    `max_error` is estimated: 1.05 times the maximum that a search finds (grid, edge of the region with a solution,
-    local refinement). It is no proven bound: a peak of the error narrower than 1/38 of the range may be missed.
-    `coverage` is the fraction of the validity range in which that characteristic has a solution; elsewhere the
-    polynomial is extrapolated.
+    `max_error` is estimated: 1.05 times the maximum that a search finds (grid, edge of the region
+    with a solution, local refinement). It is no proven bound: a peak of the error narrower than
+    1/38 of the range may be missed. `coverage` is the fraction of the validity range in which that
+    characteristic has a solution; elsewhere the polynomial is extrapolated.
     """
 
     surface: ContractileSurface
     max_error: float = parameter(
-        "N", "dF_max", "estimated maximum error on the validity range", bounds=(0.0, 1e9), fitted=False
+        "N",
+        "dF_max",
+        "estimated maximum error on the validity range",
+        bounds=(0.0, 1e9),
+        fitted=False,
     )
     rms_error: float = parameter(
-        "N", "dF_rms", "root mean square error on the validity range", bounds=(0.0, 1e9), fitted=False
+        "N",
+        "dF_rms",
+        "root mean square error on the validity range",
+        bounds=(0.0, 1e9),
+        fitted=False,
     )
     coverage: float = parameter(
         "1", "A", "fraction of the validity range with a solution", bounds=(0.0, 1.0), fitted=False
@@ -56,14 +72,17 @@ class PolynomialSurrogate(ForceLaw):
         return self.surface.force(pressure, contraction)
 
 
-def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: int = 9) -> PolynomialSurrogate:
+def as_force_law(
+    law: Characteristic, validity_range: ValidityRange, *, degree: int = 9
+) -> PolynomialSurrogate:
     """Return a traceable force law that approximates `law` on a validity range.
 
-    A polynomial of total degree `degree` is fitted by least squares on a dense grid; the errors are evaluated on a
-    second grid between its points, from which the search for the maximum error starts. Points without a solution are
-    omitted, with an AirmuscleWarning that states their fraction. Raises SolveError if too few points have a solution,
-    or if the force is unbounded at one of them, as that of straight fibres at zero contraction, and ParameterError for
-    a degree that is not an integer, 0 or more.
+    A polynomial of total degree `degree` is fitted by least squares on a dense grid; the errors are
+    evaluated on a second grid between its points, from which the search for the maximum error
+    starts. Points without a solution are omitted, with an AirmuscleWarning that states their
+    fraction. Raises SolveError if too few points have a solution, or if the force is unbounded at
+    one of them, as that of straight fibres at zero contraction, and ParameterError for a degree
+    that is not an integer, 0 or more.
     """
     check_degree("as_force_law", degree)
     count = 4 * (degree + 1)
@@ -72,17 +91,22 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     known = np.isfinite(force)
     if known.sum() < 2 * len(exponents(degree)):
         raise SolveError(
-            f"as_force_law: {type(law).__name__} has a solution at {known.sum()} of {known.size} points of the "
-            f"validity range, too few for degree {degree}. Choose a validity range in which the model has solutions."
+            f"as_force_law: {type(law).__name__} has a solution at {known.sum()} of {known.size}"
+            f" points of the validity range, too few for degree {degree}. Choose a validity range"
+            " in which the model has solutions."
         )
     x, q = _scale(validity_range, pressure[known], contraction[known])
     powers = np.stack([x**i * q**j for i, j in exponents(degree)], axis=1)
     coefficients = np.linalg.lstsq(powers, force[known], rcond=None)[0]
     limits = (*validity_range.pressure, *validity_range.contraction, -_NO_CLAMP, _NO_CLAMP)
-    return _with_errors(law, ContractileSurface(tuple(coefficients.tolist()), *limits, degree), validity_range)
+    return _with_errors(
+        law, ContractileSurface(tuple(coefficients.tolist()), *limits, degree), validity_range
+    )
 
 
-def _with_errors(law: Characteristic, surface: ContractileSurface, limits: ValidityRange) -> PolynomialSurrogate:
+def _with_errors(
+    law: Characteristic, surface: ContractileSurface, limits: ValidityRange
+) -> PolynomialSurrogate:
     """Return the surrogate of a fitted surface with its errors."""
     nodes = np.linspace(-1.0, 1.0, 4 * surface.degree + 3)
     pressure, contraction = _grid(limits, nodes)
@@ -90,16 +114,16 @@ def _with_errors(law: Characteristic, surface: ContractileSurface, limits: Valid
     if (unbounded := np.abs(force) > _NO_CLAMP).any():
         at = int(np.argmax(unbounded))
         raise SolveError(
-            f"as_force_law: the force of {type(law).__name__} is unbounded at a contraction of "
-            f"{100 * contraction[at]:.4g} % and {pressure[at] / 1e3:.4g} kPa. Choose a validity range without this "
-            "point."
+            f"as_force_law: the force of {type(law).__name__} is unbounded at a contraction of"
+            f" {100 * contraction[at]:.4g} % and {pressure[at] / 1e3:.4g} kPa. Choose a validity"
+            " range without this point."
         )
     error = surface.force(pressure, contraction) - force
     known = np.isfinite(error)
     if not known.all():
         warnings.warn(
-            f"{type(law).__name__} has no solution on {100 * (1 - known.mean()):.2g} % of the validity range; the "
-            "values of its polynomial surrogate there are meaningless.",
+            f"{type(law).__name__} has no solution on {100 * (1 - known.mean()):.2g} % of the"
+            " validity range; the values of its polynomial surrogate there are meaningless.",
             AirmuscleWarning,
             stacklevel=4,
         )
@@ -108,7 +132,9 @@ def _with_errors(law: Characteristic, surface: ContractileSurface, limits: Valid
         at = _physical(limits, x, q)
         return np.asarray(np.abs(surface.force(*at) - values_or_nan(law.force, *at)))
 
-    largest = _MARGIN * estimate_maximum(magnitude, np.abs(error).reshape(nodes.size, nodes.size), nodes)
+    largest = _MARGIN * estimate_maximum(
+        magnitude, np.abs(error).reshape(nodes.size, nodes.size), nodes
+    )
     rms = float(np.sqrt(np.mean(error[known] ** 2)))
     return PolynomialSurrogate(surface, largest, rms, float(known.mean()), type(law).__name__)
 
@@ -121,37 +147,54 @@ def _grid(validity_range: ValidityRange, nodes: Array) -> tuple[Array, Array]:
 
 def _physical(validity_range: ValidityRange, x: Array, q: Array) -> tuple[Array, Array]:
     """Pressures [Pa] and contractions [1] of the scaled contraction x and pressure q, -1..1."""
-    (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
+    p_low, p_high = validity_range.pressure
+    c_low, c_high = validity_range.contraction
     pressure = np.clip(p_low + (q + 1) / 2 * (p_high - p_low), p_low, p_high)
     return pressure, np.clip(c_low + (x + 1) / 2 * (c_high - c_low), c_low, c_high)
 
 
-def _scale(validity_range: ValidityRange, pressure: Array, contraction: Array) -> tuple[Array, Array]:
+def _scale(
+    validity_range: ValidityRange, pressure: Array, contraction: Array
+) -> tuple[Array, Array]:
     """Contraction and pressure scaled to -1..1 on the validity range."""
-    (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
-    return 2 * (contraction - c_low) / (c_high - c_low) - 1, 2 * (pressure - p_low) / (p_high - p_low) - 1
+    p_low, p_high = validity_range.pressure
+    c_low, c_high = validity_range.contraction
+    return (
+        2 * (contraction - c_low) / (c_high - c_low) - 1,
+        2 * (pressure - p_low) / (p_high - p_low) - 1,
+    )
 
 
 def estimate_maximum(error: _Error, values: Array, nodes: Array) -> float:
-    """Return the maximum of `error(x, y)` on -1..1 x -1..1 from its values on a grid, refined locally.
+    """Return the maximum of `error(x, y)` on -1..1 x -1..1 from its values on a grid, refined
+    locally.
 
-    `values[i, j]` is the error at x = nodes[j], y = nodes[i]; NaN marks points without a solution. From the greatest
-    local maxima of the grid, and from the last points with a solution between a grid point that has one and a
-    neighbour that has none, local grids follow the error to its maximum. A peak narrower than the grid step, away
-    from these points, is not found: the result is an estimate, from below.
+    `values[i, j]` is the error at x = nodes[j], y = nodes[i]; NaN marks points without a solution.
+    From the greatest local maxima of the grid, and from the last points with a solution between a
+    grid point that has one and a neighbour that has none, local grids follow the error to its
+    maximum. A peak narrower than the grid step, away from these points, is not found: the result is
+    an estimate, from below.
     """
     step = float(nodes[1] - nodes[0])
     starts = [_local_maxima(values, nodes), *_edges(error, values, nodes)]
     x, y, best = (np.concatenate(parts) for parts in zip(*starts, strict=True))
     first = np.argsort(best)[::-1][:_STARTS]
-    x, y, best = x[first], y[first], best[first]
+    x = x[first]
+    y = y[first]
+    best = best[first]
     dx, dy = (offset.reshape(-1) for offset in np.meshgrid(_OFFSETS, _OFFSETS))
     for _ in range(_REFINEMENTS):
         near = [np.clip(at[:, None] + step * d, -1.0, 1.0) for at, d in ((x, dx), (y, dy))]
-        found = np.nan_to_num(error(near[0].reshape(-1), near[1].reshape(-1)), nan=-1.0).reshape(near[0].shape)
-        row, column = np.arange(len(x)), found.argmax(axis=1)
+        found = np.nan_to_num(error(near[0].reshape(-1), near[1].reshape(-1)), nan=-1.0).reshape(
+            near[0].shape
+        )
+        row = np.arange(len(x))
+        column = found.argmax(axis=1)
         better = found[row, column] > best
-        x, y = (np.where(better, points[row, column], at) for points, at in zip(near, (x, y), strict=True))
+        x, y = (
+            np.where(better, points[row, column], at)
+            for points, at in zip(near, (x, y), strict=True)
+        )
         best = np.maximum(best, found[row, column])
         step /= 3.0
     return float(best.max())
@@ -167,7 +210,9 @@ def _local_maxima(values: Array, nodes: Array) -> tuple[Array, Array, Array]:
 
 
 def _edges(error: _Error, values: Array, nodes: Array) -> list[tuple[Array, Array, Array]]:
-    """Last points with a solution between neighbours of the grid of which one has none, as vectors x, y and error."""
+    """Last points with a solution between neighbours of the grid of which one has none, as vectors
+    x, y and error.
+    """
     y, x = np.meshgrid(nodes, nodes, indexing="ij")
     found = []
     for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
@@ -179,14 +224,20 @@ def _edges(error: _Error, values: Array, nodes: Array) -> list[tuple[Array, Arra
     return found
 
 
-def _bisect(error: _Error, value: Array, x: tuple[Array, Array], y: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-    """Last points with a solution on lines from points with one to points without, and the errors there."""
-    share, width = np.zeros_like(value), 1.0
+def _bisect(
+    error: _Error, value: Array, x: tuple[Array, Array], y: tuple[Array, Array]
+) -> tuple[Array, Array, Array]:
+    """Last points with a solution on lines from points with one to points without, and the errors
+    there.
+    """
+    share = np.zeros_like(value)
+    width = 1.0
     for _ in range(_BISECTIONS):
         width /= 2.0
         tried = share + width
         at = error(*((1.0 - tried) * low + tried * high for low, high in (x, y)))
         known = np.isfinite(at)
-        share, value = np.where(known, tried, share), np.where(known, at, value)
+        share = np.where(known, tried, share)
+        value = np.where(known, at, value)
     at_x, at_y = ((1.0 - share) * low + share * high for low, high in (x, y))
     return at_x, at_y, value

@@ -1,4 +1,6 @@
-"""Rubber wall of a straight-fibre muscle: linear relation of hoop stress and strain, threshold of contraction."""
+"""Rubber wall of a straight-fibre muscle: linear relation of hoop stress and strain, threshold of
+contraction.
+"""
 
 import abc
 
@@ -13,12 +15,15 @@ from .solve import check_solution
 class RubberLine:
     """Linear rubber: sigma = alpha eps + beta,   eps = (r - r_0)/r_0.
 
-    sigma: nominal hoop stress, referred to the initial wall thickness. With inextensible fibres the hoop force per arc
-    length is sigma t, so that no correction for the decreasing thickness is required. A positive beta is a prestress,
-    as in a balloon. Reference: Saga et al. 2007, (10), (11), Fig. 4.
+    sigma: nominal hoop stress, referred to the initial wall thickness. With inextensible fibres the
+    hoop force per arc length is sigma t, so that no correction for the decreasing thickness is
+    required. A positive beta is a prestress, as in a balloon. Reference: Saga et al. 2007, (10),
+    (11), Fig. 4.
     """
 
-    slope: float = parameter("Pa", "alpha", "increase of the hoop stress with strain", bounds=(0.0, 1e8))
+    slope: float = parameter(
+        "Pa", "alpha", "increase of the hoop stress with strain", bounds=(0.0, 1e8)
+    )
     intercept: float = parameter("Pa", "beta", "hoop stress at rest", bounds=(-1e7, 1e7))
 
     def stress(self, strain: Value) -> Value:
@@ -26,11 +31,19 @@ class RubberLine:
         return self.slope * strain + self.intercept
 
     def energy(self, arc_excess: Value, arc_excess_squared: Value, end_radius: Value) -> Value:
-        """Energy per wall thickness [N], U/t = 2 pi (alpha Q/(2 r_0) + beta G); linear, also valid for derivatives."""
-        return 2 * pi * (self.slope * arc_excess_squared / (2 * end_radius) + self.intercept * arc_excess)
+        """Energy per wall thickness [N], U/t = 2 pi (alpha Q/(2 r_0) + beta G); linear, also valid
+        for derivatives.
+        """
+        return (
+            2
+            * pi
+            * (self.slope * arc_excess_squared / (2 * end_radius) + self.intercept * arc_excess)
+        )
 
     def integrate_stress(self, excess: Value, length: Value, end_radius: Value) -> Value:
-        """Integral of the hoop stress [N/m] from the integral of r - r_0 [m2] over a path and its length [m]."""
+        """Integral of the hoop stress [N/m] from the integral of r - r_0 [m2] over a path and its
+        length [m].
+        """
         return self.slope / end_radius * excess + self.intercept * length
 
 
@@ -59,7 +72,9 @@ class ArcIntegral(RubberIntegral):
 
 
 class RubberLaw(Characteristic):
-    """Law of straight fibres on a rubber tube, which contracts above a threshold pressure (base class)."""
+    """Law of straight fibres on a rubber tube, which contracts above a threshold pressure (base
+    class).
+    """
 
     geometry: FibreTube
     rubber: RubberLine
@@ -73,7 +88,9 @@ class RubberLaw(Characteristic):
     def check_threshold(self, pressure: Value, force: Value) -> None:
         """Raise SolveError for a gauge pressure [Pa] below the threshold; `force` is quoted."""
         above = (self.threshold_pressure, float("inf"))
-        check_solution(pressure + 0.0 * force, above, (pressure, force), self._below_threshold_message)
+        check_solution(
+            pressure + 0.0 * force, above, (pressure, force), self._below_threshold_message
+        )
 
     def _below_threshold_message(self, pressure: float, force: float) -> str:
         return (

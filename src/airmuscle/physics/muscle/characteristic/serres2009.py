@@ -1,4 +1,6 @@
-"""Serres 2009: Reynolds model of a Festo muscle, with two pressure ranges of the spring stiffness; its damper."""
+"""Serres 2009: Reynolds model of a Festo muscle, with two pressure ranges of the spring stiffness;
+its damper.
+"""
 
 from typing import ClassVar, Self
 
@@ -13,11 +15,12 @@ SERRES_2009 = published("serres-2009")
 
 @model
 class Serres2009(ForceLaw):
-    """Contractile force and parallel spring: F = f_0 + f_1 p - K(p) L_0 eps,   K = max(k_0 - k_1 p, k_2 + k_3 p).
+    """Contractile force and parallel spring: F = f_0 + f_1 p - K(p) L_0 eps,   K = max(k_0 - k_1 p,
+    k_2 + k_3 p).
 
-    p: gauge pressure; eps: contraction; f: contractile force; K: spring stiffness, which decreases up to 314 kPa, where
-    its two printed lines intersect, and increases above. It is given in N/mm for one specimen, so that its resting
-    length L_0 is required. Reference: Serres et al. (2009).
+    p: gauge pressure; eps: contraction; f: contractile force; K: spring stiffness, which decreases
+    up to 314 kPa, where its two printed lines intersect, and increases above. It is given in N/mm
+    for one specimen, so that its resting length L_0 is required. Reference: Serres et al. (2009).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (SERRES_2009,)
@@ -27,13 +30,21 @@ class Serres2009(ForceLaw):
     force_by_pressure: float = parameter(
         "N/Pa", "f_1", "increase of the contractile force with pressure", default=2.91e-3
     )
-    softening_offset: float = parameter("N/m", "k_0", "softening line: stiffness at zero pressure", default=32.7e3)
+    softening_offset: float = parameter(
+        "N/m", "k_0", "softening line: stiffness at zero pressure", default=32.7e3
+    )
     softening: float = parameter(
         "N/m/Pa", "k_1", "softening line: decrease with pressure", bounds=(0.0, 1e3), default=0.0321
     )
-    stiffening_offset: float = parameter("N/m", "k_2", "stiffening line: stiffness at zero pressure", default=17e3)
+    stiffening_offset: float = parameter(
+        "N/m", "k_2", "stiffening line: stiffness at zero pressure", default=17e3
+    )
     stiffening: float = parameter(
-        "N/m/Pa", "k_3", "stiffening line: increase with pressure", bounds=(0.0, 1e3), default=0.0179
+        "N/m/Pa",
+        "k_3",
+        "stiffening line: increase with pressure",
+        bounds=(0.0, 1e3),
+        default=0.0179,
     )
 
     @classmethod
@@ -49,10 +60,12 @@ class Serres2009(ForceLaw):
 
 @model
 class Serres2009Spring(Spring):
-    """Spring F_PP = max(k_0 - k_1 p, k_2 + k_3 p, 0) L_0 eps; the stiffness has its minimum at p = 314 kPa gauge.
+    """Spring F_PP = max(k_0 - k_1 p, k_2 + k_3 p, 0) L_0 eps; the stiffness has its minimum at p =
+    314 kPa gauge.
 
-    Identified from 150 to 550 kPa on one Festo muscle. The characteristic `Serres2009` already contains this spring;
-    use it only with another contractile element. Reference: Serres et al. (2009), abstract.
+    Identified from 150 to 550 kPa on one Festo muscle. The characteristic `Serres2009` already
+    contains this spring; use it only with another contractile element. Reference: Serres et al.
+    (2009), abstract.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (SERRES_2009,)
@@ -78,24 +91,38 @@ class Serres2009Spring(Spring):
 
 @model
 class Serres2009Damper(Damper):
-    """Damper F_TL = B v with B = b_c during shortening and max(b_r, b_0 + b_1 p) during lengthening.
+    """Damper F_TL = B v with B = b_c during shortening and max(b_r, b_0 + b_1 p) during
+    lengthening.
 
-    p gauge pressure. Identified from 150 to 550 kPa. During lengthening the coefficient is constant up to 372 kPa,
-    where the two printed lines intersect, and increases above. Reference: Serres et al. (2009), abstract.
+    p gauge pressure. Identified from 150 to 550 kPa. During lengthening the coefficient is constant
+    up to 372 kPa, where the two printed lines intersect, and increases above. Reference: Serres et
+    al. (2009), abstract.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (SERRES_2009,)
 
-    shortening: float = parameter("N s/m", "b_c", "shortening coefficient", bounds=(0.0, 1e6), default=2.90e3)
+    shortening: float = parameter(
+        "N s/m", "b_c", "shortening coefficient", bounds=(0.0, 1e6), default=2.90e3
+    )
     lengthening: float = parameter(
         "N s/m", "b_r", "lengthening coefficient at low pressure", bounds=(0.0, 1e6), default=1.57e3
     )
     rising_offset: float = parameter(
-        "N s/m", "b_0", "rising line for lengthening at zero gauge pressure", bounds=(-1e6, 1e6), default=311.0
+        "N s/m",
+        "b_0",
+        "rising line for lengthening at zero gauge pressure",
+        bounds=(-1e6, 1e6),
+        default=311.0,
     )
     rising_slope: float = parameter(
-        "N s/(m Pa)", "b_1", "slope of the rising line over pressure", bounds=(0.0, 1.0), default=3.38e-3
+        "N s/(m Pa)",
+        "b_1",
+        "slope of the rising line over pressure",
+        bounds=(0.0, 1.0),
+        default=3.38e-3,
     )
 
     def coefficients(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
-        return self.shortening, ops.maximum(self.lengthening, self.rising_offset + self.rising_slope * pressure)
+        return self.shortening, ops.maximum(
+            self.lengthening, self.rising_offset + self.rising_slope * pressure
+        )

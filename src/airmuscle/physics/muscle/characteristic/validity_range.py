@@ -1,4 +1,6 @@
-"""Ranges of data: where a characteristic is valid, and the scales of measured points, from which a fit starts."""
+"""Ranges of data: where a characteristic is valid, and the scales of measured points, from which a
+fit starts.
+"""
 
 import dataclasses
 import math
@@ -23,16 +25,32 @@ class ValidityRange:
     """Rectangle of gauge pressure and contraction; outside it a characteristic is extrapolated."""
 
     min_pressure: float = parameter(
-        "Pa", "p_low", "lower limit of the validity range in gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False
+        "Pa",
+        "p_low",
+        "lower limit of the validity range in gauge pressure",
+        bounds=PRESSURE_BOUNDS,
+        fitted=False,
     )
     max_pressure: float = parameter(
-        "Pa", "p_high", "upper limit of the validity range in gauge pressure", bounds=PRESSURE_BOUNDS, fitted=False
+        "Pa",
+        "p_high",
+        "upper limit of the validity range in gauge pressure",
+        bounds=PRESSURE_BOUNDS,
+        fitted=False,
     )
     min_contraction: float = parameter(
-        "1", "eps_low", "lower limit of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
+        "1",
+        "eps_low",
+        "lower limit of the validity range in contraction",
+        bounds=CONTRACTION_BOUNDS,
+        fitted=False,
     )
     max_contraction: float = parameter(
-        "1", "eps_high", "upper limit of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
+        "1",
+        "eps_high",
+        "upper limit of the validity range in contraction",
+        bounds=CONTRACTION_BOUNDS,
+        fitted=False,
     )
 
     @property
@@ -48,11 +66,19 @@ class ValidityRange:
     def contains(self, pressure: Value, contraction: Value) -> Value:
         """Return whether points are within the range, limits included; arrays broadcast."""
         in_pressure = (pressure >= self.min_pressure) & (pressure <= self.max_pressure)
-        return in_pressure & (contraction >= self.min_contraction) & (contraction <= self.max_contraction)
+        return (
+            in_pressure
+            & (contraction >= self.min_contraction)
+            & (contraction <= self.max_contraction)
+        )
 
 
-def validity_range_of(characteristic: Any, stated: ValidityRange | None = None) -> ValidityRange | None:
-    """Return the stated validity range, otherwise the one stored in the law by its fit, otherwise None."""
+def validity_range_of(
+    characteristic: Any, stated: ValidityRange | None = None
+) -> ValidityRange | None:
+    """Return the stated validity range, otherwise the one stored in the law by its fit, otherwise
+    None.
+    """
     names = [field.name for field in dataclasses.fields(ValidityRange)]
     if stated is not None or not all(hasattr(characteristic, name) for name in names):
         return stated
@@ -78,40 +104,55 @@ class DataScales:
 
     @classmethod
     def of(cls, data: "MeasuredPoints") -> "DataScales":
-        """The scales of all rows of one recording or several; given scales as they are. Raises IdentificationError
-        where a column has no value."""
+        """The scales of all rows of one recording or several; given scales as they are. Raises
+        IdentificationError where a column has no value."""
         if isinstance(data, DataScales):
             return data
-        runs, names = [data] if isinstance(data, Recording) else list(data), ("force", "pressure", "contraction")
+        runs = [data] if isinstance(data, Recording) else list(data)
+        names = ("force", "pressure", "contraction")
         columns = [[run[name] for run in runs if not np.isnan(run[name]).all()] for name in names]
         if runs and not all(columns):  # without recordings, the call that lacks them is named
-            refuse_guess("the recordings have no value of the pressure, of the contraction or of the force")
-        force, pressure, contraction = (max(float(np.nanmax(values)) for values in column) for column in columns)
+            refuse_guess(
+                "the recordings have no value of the pressure, of the contraction or of the force"
+            )
+        force, pressure, contraction = (
+            max(float(np.nanmax(values)) for values in column) for column in columns
+        )
         lengths = [run.constants.get("resting_length") for run in runs]
         known = {float(length) for length in lengths if length is not None}
         complete = len(lengths) > 0 and None not in lengths
-        specimens = {run.constants.get("specimen", length) for run, length in zip(runs, lengths, strict=True)}
+        specimens = {
+            run.constants.get("specimen", length) for run, length in zip(runs, lengths, strict=True)
+        }
         length, count = (max(known), len(known)) if complete else (None, 0)
         return cls(force, pressure, contraction, length, count, len(specimens))
 
     @property
     def resting_length(self) -> float:
-        """Maximum resting length [m]. Raises IdentificationError unless every recording states one."""
+        """Maximum resting length [m]. Raises IdentificationError unless every recording states
+        one.
+        """
         if self.max_length is None:
-            refuse_guess("not every recording states its resting length", "State the resting length.")
+            refuse_guess(
+                "not every recording states its resting length", "State the resting length."
+            )
         return self.max_length
 
     @property
     def braid(self) -> Braid:
-        """A braid of the resting length that exerts the maximum force at the maximum pressure, with a radius of 0.2 to
-        100 mm. Raises IdentificationError without a positive pressure, or unless every recording states its length."""
+        """A braid of the resting length that exerts the maximum force at the maximum pressure, with
+        a radius of 0.2 to 100 mm. Raises IdentificationError without a positive pressure, or unless
+        every recording states its length.
+        """
         area = math.pi * self.check_positive("pressure").pressure
         area *= 3 / math.tan(BRAID_ANGLE) ** 2 - 1 / math.sin(BRAID_ANGLE) ** 2
         radius = min(max(math.sqrt(max(self.force, 1.0) / area), 2e-4), 0.1)
         return Braid(radius, BRAID_ANGLE, self.resting_length)
 
     def check_positive(self, name: str) -> Self:
-        """These scales. Raises IdentificationError where the maximum of `force` or `pressure` is not positive."""
+        """These scales. Raises IdentificationError where the maximum of `force` or `pressure` is
+        not positive.
+        """
         if not getattr(self, name) > 0:
             refuse_guess(f"no row has a positive {name}")
         return self

@@ -1,4 +1,6 @@
-"""Laws of virtual work: force from the volume of a geometry, also with the rubber of a circular meridian."""
+"""Laws of virtual work: force from the volume of a geometry, also with the rubber of a circular
+meridian.
+"""
 
 import functools
 from typing import ClassVar
@@ -18,10 +20,10 @@ from .solve import check_solution, find_first_root
 class VirtualWork(AreaLaw):
     """Virtual work: F = -p dV/dL = p (dV/deps)/L_0.
 
-    p: gauge pressure; V: enclosed volume; L = L_0 (1 - eps): length. The work p dV of the air is transferred to the
-    load without loss, so that the Maxwell defect dF/dp + dV/dL is zero everywhere. Above the contraction of maximum
-    volume the force is negative; limit it with `Clamped` if required.
-    Reference: Chou and Hannaford (1996), derivation of the force.
+    p: gauge pressure; V: enclosed volume; L = L_0 (1 - eps): length. The work p dV of the air is
+    transferred to the load without loss, so that the Maxwell defect dF/dp + dV/dL is zero
+    everywhere. Above the contraction of maximum volume the force is negative; limit it with
+    `Clamped` if required. Reference: Chou and Hannaford (1996), derivation of the force.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
@@ -36,27 +38,32 @@ class VirtualWork(AreaLaw):
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         if not type(self.geometry).traceable:
             raise TraceError(
-                f"VirtualWork: {type(self.geometry).__name__} is not in closed form, so that its second derivative "
-                "is not available. Replace it by airmuscle.geometry.as_polynomial(geometry)."
+                f"VirtualWork: {type(self.geometry).__name__} is not in closed form, so that its"
+                " second derivative is not available. Replace it by"
+                " airmuscle.geometry.as_polynomial(geometry)."
             )
         return super().slopes(pressure, contraction)
 
 
 _MIN_ANGLE = 1e-200
-"""Lower bound of the angle in a denominator, which avoids a division by zero for straight fibres."""
+"""Lower bound of the angle in a denominator, which avoids a division by zero for straight
+fibres.
+"""
 
 
 @model
 class CircleVirtualWork(RubberLaw, ForceLaw):
     """Straight-fibre muscle with a circular meridian, by virtual work.
 
-        F = (p dV/deps - dU/deps)/l_0,   U = 2 pi t [alpha Q/(2 r_0) + beta G],   sin(psi)/psi = 1 - eps
+        F = (p dV/deps - dU/deps)/l_0,   U = 2 pi t [alpha Q/(2 r_0) + beta G],   sin(psi)/psi = 1 -
+        eps
 
-    Per segment of fibre length l_0 and end radius r_0: V volume, G = Int (r - r_0) ds, Q = Int (r - r_0)^2 ds of the
-    circular arc with half angle psi, all in closed form. Volume and force follow from one potential, so that a
-    simulation conserves energy. Compared with the exact meridian, the pressure differs by less than 0.7 % from 100 N up
-    to 30 % contraction, and by -1 % to 6.3 % without load. The meridian is from Ferraresi et al. 2001, the rubber from
-    Saga et al. 2007; the force balance is from neither.
+    Per segment of fibre length l_0 and end radius r_0: V volume, G = Int (r - r_0) ds, Q = Int (r -
+    r_0)^2 ds of the circular arc with half angle psi, all in closed form. Volume and force follow
+    from one potential, so that a simulation conserves energy. Compared with the exact meridian, the
+    pressure differs by less than 0.7 % from 100 N up to 30 % contraction, and by -1 % to 6.3 %
+    without load. The meridian is from Ferraresi et al. 2001, the rubber from Saga et al. 2007; the
+    force balance is from neither.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FERRARESI_2001, SAGA_2007)
@@ -68,17 +75,22 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
     def check(self) -> None:
         if not isinstance(self.geometry.meridian, CircularArc):
             raise ParameterError(
-                f"CircleVirtualWork requires a circular meridian; its geometry has a "
-                f"{type(self.geometry.meridian).__name__}. Use StraightFibre(..., meridian=CircularArc())."
+                "CircleVirtualWork requires a circular meridian; its geometry has a"
+                f" {type(self.geometry.meridian).__name__}. Use StraightFibre(...,"
+                " meridian=CircularArc())."
             )
 
     @property
     def contraction_range(self) -> tuple[float, float]:
-        """From zero to the maximum volume, where the pressure required for a load becomes infinite."""
+        """From zero to the maximum volume, where the pressure required for a load becomes
+        infinite.
+        """
         return (0.0, _contraction_of_max_volume(self.geometry) * (1.0 - 1e-9))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N]; negative beyond the maximum volume, unbounded at zero contraction (straight fibres)."""
+        """Tension [N]; negative beyond the maximum volume, unbounded at zero contraction (straight
+        fibres).
+        """
         self._check_contraction(contraction, self.geometry.contraction_range)
         area, rubber, angle = self._work_terms(contraction)
         return (pressure * area - rubber) / ops.maximum(angle, _MIN_ANGLE)
@@ -86,7 +98,9 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
     def pressure(self, contraction: Value, force: Value) -> Value:
         self._check_contraction(contraction, self.contraction_range)
         solution = self._pressure(contraction, force)
-        return check_solution(solution, self.pressure_range, (contraction, force), self._no_pressure_message)
+        return check_solution(
+            solution, self.pressure_range, (contraction, force), self._no_pressure_message
+        )
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         def residual(contraction: Value, p: Value, load: Value) -> Value:
@@ -105,26 +119,37 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
         return (force * angle + rubber) / area
 
     def _work_terms(self, contraction: Value) -> tuple[Value, Value, Value]:
-        """psi (dV/deps)/l_0 [m2], psi (dU/deps)/l_0 [N] and psi [rad], which are finite at zero contraction."""
-        tube, arc = self.geometry, CircularArc()
+        """psi (dV/deps)/l_0 [m2], psi (dU/deps)/l_0 [N] and psi [rad], which are finite at zero
+        contraction.
+        """
+        tube = self.geometry
+        arc = CircularArc()
         angle_squared = arc.angle_squared(contraction)
         derivatives = arc.derivatives_times_angle(angle_squared, tube.fibre_length, tube.end_radius)
-        energy = self.rubber.energy(derivatives.arc_excess, derivatives.arc_excess_squared, tube.end_radius)
+        energy = self.rubber.energy(
+            derivatives.arc_excess, derivatives.arc_excess_squared, tube.end_radius
+        )
         rubber = self.wall_thickness * energy / tube.fibre_length
         return derivatives.volume / tube.fibre_length, rubber, ops.sqrt(angle_squared)
 
     def _check_contraction(self, contraction: Value, limits: tuple[float, float]) -> None:
-        """Raise GeometryLimitError if a contraction is outside `limits`, unless the model is being traced."""
+        """Raise GeometryLimitError if a contraction is outside `limits`, unless the model is being
+        traced.
+        """
         if not ops.is_symbol(self.wall_thickness):
             check_contraction_range(contraction, limits, "CircleVirtualWork")
 
 
 @functools.lru_cache(maxsize=256)
 def _contraction_of_max_volume(tube: StraightFibre) -> float:
-    """Contraction of maximum volume, by bisection of dV/deps, or the upper limit of the geometry."""
+    """Contraction of maximum volume, by bisection of dV/deps, or the upper limit of the
+    geometry.
+    """
     low, high = tube.contraction_range
     while (middle := (low + high) / 2) not in (low, high):
         arc = CircularArc()
-        derivatives = arc.derivatives_times_angle(arc.angle_squared(middle), tube.fibre_length, tube.end_radius)
+        derivatives = arc.derivatives_times_angle(
+            arc.angle_squared(middle), tube.fibre_length, tube.end_radius
+        )
         low, high = (middle, high) if derivatives.volume > 0 else (low, middle)
     return high

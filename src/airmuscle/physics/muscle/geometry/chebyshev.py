@@ -1,4 +1,6 @@
-"""Geometries from numbers: a table of measured volumes, a rigid vessel, a Chebyshev approximation with its error."""
+"""Geometries from numbers: a table of measured volumes, a rigid vessel, a Chebyshev approximation
+with its error.
+"""
 
 import functools
 from typing import Any, ClassVar
@@ -13,23 +15,29 @@ from .base import LENGTHS, RESTING_LENGTH, Geometry, check_degree
 class TabulatedGeometry(Geometry):
     """Monotone piecewise cubic interpolation (PCHIP) of V(eps) through the rows (eps_i, V_i).
 
-    The outline is the cylinder of this volume. Contractions outside the table raise GeometryLimitError. The geometry
-    is not in closed form; for a plant, approximate it with `as_polynomial`, which states the approximation error.
-    Reference: Fritsch and Carlson, SIAM J. Numer. Anal. 17:238 (1980).
+    The outline is the cylinder of this volume. Contractions outside the table raise
+    GeometryLimitError. The geometry is not in closed form; for a plant, approximate it with
+    `as_polynomial`, which states the approximation error. Reference: Fritsch and Carlson, SIAM J.
+    Numer. Anal. 17:238 (1980).
     """
 
     traceable: ClassVar[bool] = False
 
-    contractions: tuple[float, ...] = parameter("1", "eps_i", "contractions of the rows, increasing", fitted=False)
-    volumes: tuple[float, ...] = parameter("m3", "V_i", "volumes of the rows", bounds=(0.0, 1.0), fitted=False)
+    contractions: tuple[float, ...] = parameter(
+        "1", "eps_i", "contractions of the rows, increasing", fitted=False
+    )
+    volumes: tuple[float, ...] = parameter(
+        "m3", "V_i", "volumes of the rows", bounds=(0.0, 1.0), fitted=False
+    )
     resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
 
     def check(self) -> None:
         rows = len(self.contractions)
         if rows < 2 or rows != len(self.volumes) or (np.diff(self.contractions) <= 0).any():
             raise ParameterError(
-                f"TabulatedGeometry: {rows} contractions and {len(self.volumes)} volumes; at least two rows are "
-                "required, each with both values, in order of increasing contraction."
+                f"TabulatedGeometry: {rows} contractions and {len(self.volumes)} volumes; at least"
+                " two rows are required, each with both values, in order of increasing"
+                " contraction."
             )
 
     @property
@@ -53,7 +61,9 @@ class TabulatedGeometry(Geometry):
 
 @model
 class Vessel(Geometry):
-    """Constant volume: a test chamber, or a muscle (with an expanding wall) whose contraction was not recorded."""
+    """Constant volume: a test chamber, or a muscle (with an expanding wall) whose contraction was
+    not recorded.
+    """
 
     enclosed_volume: float = parameter("m3", "V_0", "enclosed volume", bounds=(1e-7, 1e-1))
     resting_length: float = parameter(
@@ -73,20 +83,28 @@ class Vessel(Geometry):
 
 
 _ERROR_POINTS = 1001
-"""Points at which the approximation error is evaluated; dense enough for the kinks in the slope of a table."""
+"""Points at which the approximation error is evaluated; dense enough for the kinks in the slope of
+a table.
+"""
 
 
 @model
 class ChebyshevGeometry(Geometry):
-    """Polynomial volume: V = Sum_k a_k T_k(x),   x = (2 eps - eps_low - eps_high)/(eps_high - eps_low).
+    """Polynomial volume: V = Sum_k a_k T_k(x),   x = (2 eps - eps_low - eps_high)/(eps_high -
+    eps_low).
 
-    T_k: Chebyshev polynomials, evaluated by Clenshaw's recurrence. Outside the validity range the volume is
-    extrapolated linearly. The outline is the cylinder of this volume; plot the approximated geometry instead.
-    `volume_error` and `derivative_error` are the maximum errors of V and dV/deps, as evaluated by `as_polynomial`.
+    T_k: Chebyshev polynomials, evaluated by Clenshaw's recurrence. Outside the validity range the
+    volume is extrapolated linearly. The outline is the cylinder of this volume; plot the
+    approximated geometry instead. `volume_error` and `derivative_error` are the maximum errors of V
+    and dV/deps, as evaluated by `as_polynomial`.
     """
 
-    coefficients: tuple[float, ...] = parameter("m3", "a_k", "coefficients of the Chebyshev polynomials", fitted=False)
-    min_contraction: float = parameter("1", "eps_low", "lower limit of the validity range in contraction", fitted=False)
+    coefficients: tuple[float, ...] = parameter(
+        "m3", "a_k", "coefficients of the Chebyshev polynomials", fitted=False
+    )
+    min_contraction: float = parameter(
+        "1", "eps_low", "lower limit of the validity range in contraction", fitted=False
+    )
     max_contraction: float = parameter(
         "1", "eps_high", "upper limit of the validity range in contraction", fitted=False
     )
@@ -101,10 +119,13 @@ class ChebyshevGeometry(Geometry):
     def check(self) -> None:
         if len(self.coefficients) < 2:
             raise ParameterError(
-                f"ChebyshevGeometry: {len(self.coefficients)} coefficients; at least two are required (degree 1)."
+                f"ChebyshevGeometry: {len(self.coefficients)} coefficients; at least two are"
+                " required (degree 1)."
             )
         if not self.max_contraction < 1.0:
-            raise ParameterError("ChebyshevGeometry: max_contraction must be less than 1, where the length is zero.")
+            raise ParameterError(
+                "ChebyshevGeometry: max_contraction must be less than 1, where the length is zero."
+            )
 
     @property
     def contraction_range(self) -> tuple[float, float]:
@@ -122,28 +143,33 @@ class ChebyshevGeometry(Geometry):
         for a in reversed(self.coefficients[1:]):
             d, d_next = 2 * b + 2 * inner * d - d_next, d
             b, b_next = a + 2 * inner * b - b_next, b
-        value, slope = self.coefficients[0] + inner * b - b_next, b + inner * d - d_next
+        value = self.coefficients[0] + inner * b - b_next
+        slope = b + inner * d - d_next
         return value + slope * (x - inner)
 
 
 def as_polynomial(
     geometry: Geometry, degree: int = 16, contraction_range: tuple[float, float] | None = None
 ) -> ChebyshevGeometry:
-    """Return a traceable geometry that interpolates `geometry` at the Chebyshev points of a contraction range [1].
+    """Return a traceable geometry that interpolates `geometry` at the Chebyshev points of a
+    contraction range [1].
 
-    The default range is that of the geometry. The errors are evaluated at 1001 points. If dV/deps is infinite at zero
-    contraction, as for straight fibres, the range must begin above zero, otherwise GeometryLimitError is raised, as it
-    is if the range exceeds that of the geometry. Raises ParameterError for a degree that is not a positive integer.
+    The default range is that of the geometry. The errors are evaluated at 1001 points. If dV/deps
+    is infinite at zero contraction, as for straight fibres, the range must begin above zero,
+    otherwise GeometryLimitError is raised, as it is if the range exceeds that of the geometry.
+    Raises ParameterError for a degree that is not a positive integer.
     """
     check_degree("as_polynomial", degree, 1)
     low, high = contraction_range or geometry.contraction_range
     geometry.check_contraction([low, high])
     if low < high and not np.isfinite(geometry.volume_derivative(low)):
         raise GeometryLimitError(
-            f"as_polynomial: dV/deps of {type(geometry).__name__} is infinite at a contraction of {100 * low:.4g} %. "
-            f"Give a contraction_range that begins above it, such as ({low + 0.01:g}, {high:g})."
+            f"as_polynomial: dV/deps of {type(geometry).__name__} is infinite at a contraction of"
+            f" {100 * low:.4g} %. Give a contraction_range that begins above it, such as"
+            f" ({low + 0.01:g}, {high:g})."
         )
-    middle, half = (low + high) / 2, (high - low) / 2
+    middle = (low + high) / 2
+    half = (high - low) / 2
     coefficients = np.polynomial.chebyshev.chebinterpolate(
         lambda x: geometry.volume(np.clip(middle + half * x, low, high)),
         degree,  # rounding may leave the limits
@@ -154,4 +180,6 @@ def as_polynomial(
         np.abs(polynomial.volume(points) - geometry.volume(points)).max(),
         np.abs(polynomial.volume_derivative(points) - geometry.volume_derivative(points)).max(),
     )
-    return ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length, *(float(e) for e in errors))
+    return ChebyshevGeometry(
+        tuple(coefficients), low, high, geometry.resting_length, *(float(e) for e in errors)
+    )

@@ -1,4 +1,6 @@
-"""Meridians of a straight-fibre muscle: parabolas and catenary of Saga et al. 2007, circular arc; their integrals."""
+"""Meridians of a straight-fibre muscle: parabolas and catenary of Saga et al. 2007, circular arc;
+their integrals.
+"""
 
 import abc
 import math
@@ -9,11 +11,13 @@ import numpy as np
 from ....core import Array, Reference, Value, model, ops, published
 from .base import Profile
 
-SAGA_2007, FERRARESI_2001 = published("saga-2007"), published("ferraresi-2001")
+SAGA_2007 = published("saga-2007")
+FERRARESI_2001 = published("ferraresi-2001")
 
 
 class Segment(NamedTuple):
-    """One segment of the muscle at a contraction. x: axial position; r: radius; s: arc length; r_0: end radius.
+    """One segment of the muscle at a contraction. x: axial position; r: radius; s: arc length; r_0:
+    end radius.
 
     length               chord l [m]
     arc                  Int ds [m]; equal to the fibre length except for approximate meridians
@@ -51,15 +55,23 @@ class Meridian(abc.ABC):
 
     references: ClassVar[tuple[Reference, ...]] = (SAGA_2007,)
     max_contraction: ClassVar[float] = 0.5
-    """Above 50 % every meridian is beyond its maximum volume or, for the parabola (3), beyond its maximum radius."""
+    """Above 50 % every meridian is beyond its maximum volume or, for the parabola (3), beyond its
+    maximum radius.
+    """
 
     @abc.abstractmethod
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
-        """Shape and integrals of the segment at a contraction [1]; lengths in [m]; arrays broadcast."""
+        """Shape and integrals of the segment at a contraction [1]; lengths in [m]; arrays
+        broadcast.
+        """
 
     @abc.abstractmethod
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, position: Array) -> Profile:
-        """Axial positions from the middle [m] and radii [m] at normalised positions from -1 to 1 along the outline."""
+    def profile(
+        self, contraction: float, fibre_length: float, end_radius: float, position: Array
+    ) -> Profile:
+        """Axial positions from the middle [m] and radii [m] at normalised positions from -1 to 1
+        along the outline.
+        """
 
 
 def segment_volume(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
@@ -68,26 +80,35 @@ def segment_volume(end_radius: Value, length: Value, excess: Value, excess_squar
 
 
 TERMS = 18
-"""Number of terms; the first omitted term is below 1e-18 of the sum for |w| <= 45, the range of the meridians."""
-_COEFFICIENTS = tuple(tuple(1.0 / math.factorial(m + 2 * n) for n in range(TERMS)) for m in range(6))
+"""Number of terms; the first omitted term is below 1e-18 of the sum for |w| <= 45, the range of the
+meridians.
+"""
+_COEFFICIENTS = tuple(
+    tuple(1.0 / math.factorial(m + 2 * n) for n in range(TERMS)) for m in range(6)
+)
 
 
 def stumpff(order: int, w: Value) -> Value:
     """Stumpff function S_m(w) = Sum_n w^n / (m + 2 n)! of an order m from 0 to 5.
 
-    S_0 = cosh u, S_1 = sinh(u)/u, S_2 = (cosh u - 1)/u^2, S_3 = (sinh u - u)/u^3 with w = u^2, and accordingly for cos
-    and sin with w = -psi^2, without the cancellation of sines and cosines in the formulas of a flat arc.
+    S_0 = cosh u, S_1 = sinh(u)/u, S_2 = (cosh u - 1)/u^2, S_3 = (sinh u - u)/u^3 with w = u^2, and
+    accordingly for cos and sin with w = -psi^2, without the cancellation of sines and cosines in
+    the formulas of a flat arc.
     """
     return ops.polynomial(_COEFFICIENTS[order], w)
 
 
 def double_angle_term(w: Value) -> Value:
-    """(u (cosh 2u + 2) - (3/2) sinh 2u)/u^5 with w = u^2, or with cos and sin of psi for w = -psi^2; 8/15 at zero."""
+    """(u (cosh 2u + 2) - (3/2) sinh 2u)/u^5 with w = u^2, or with cos and sin of psi for w =
+    -psi^2; 8/15 at zero.
+    """
     return 16 * (stumpff(4, 4 * w) - 3 * stumpff(5, 4 * w))
 
 
 def triple_angle_term(w: Value) -> Value:
-    """(sinh(3u)/6 + (3/2) sinh u - 2 u cosh u)/u^5, or with cos and sin of psi for w = -psi^2; 4/15 at zero."""
+    """(sinh(3u)/6 + (3/2) sinh u - 2 u cosh u)/u^5, or with cos and sin of psi for w = -psi^2; 4/15
+    at zero.
+    """
     return 40.5 * stumpff(5, 9 * w) + 1.5 * stumpff(5, w) - 2 * stumpff(4, w)
 
 
@@ -102,10 +123,12 @@ def _arc_element(slope_squared: Value, t: float) -> Value:
 
 
 def arc_surplus(slope_squared: Value) -> Value:
-    """arc/chord - 1 = (sqrt(1 + u^2) + asinh(u)/u)/2 - 1 of a parabola with end slope u, accurate down to u = 0.
+    """arc/chord - 1 = (sqrt(1 + u^2) + asinh(u)/u)/2 - 1 of a parabola with end slope u, accurate
+    down to u = 0.
 
-    This and the related integrals use Gauss quadrature with 24 points, whose error is below rounding for u < 4. All
-    terms are positive, so that there is no cancellation, unlike in the closed forms.
+    This and the related integrals use Gauss quadrature with 24 points, whose error is below
+    rounding for u < 4. All terms are positive, so that there is no cancellation, unlike in the
+    closed forms.
     """
     return slope_squared * sum(w * t * t / (1.0 + _arc_element(slope_squared, t)) for t, w in _RULE)
 
@@ -123,10 +146,13 @@ class ParabolicMeridian(Meridian):
         """Square of the end slope at a contraction [1]."""
 
     def segment(self, contraction: Value, fibre_length: Value, end_radius: Value) -> Segment:
-        z, length = self.slope_squared(contraction), fibre_length * (1.0 - contraction)
+        z = self.slope_squared(contraction)
+        length = fibre_length * (1.0 - contraction)
         slope = ops.sqrt(z)
         rise = length * slope / 4
-        rise_squared = length**2 * z / 16  # not rise**2, whose derivative is 0 times infinity at rest
+        rise_squared = (
+            length**2 * z / 16
+        )  # not rise**2, whose derivative is 0 times infinity at rest
         excess = 2 * length * rise / 3
         steepness = ops.sqrt(1.0 + z)
         return Segment(
@@ -142,7 +168,9 @@ class ParabolicMeridian(Meridian):
             volume=segment_volume(end_radius, length, excess, 8 * length * rise_squared / 15),
         )
 
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, position: Array) -> Profile:
+    def profile(
+        self, contraction: float, fibre_length: float, end_radius: float, position: Array
+    ) -> Profile:
         segment = self.segment(contraction, fibre_length, end_radius)
         rise = segment.max_radius - end_radius
         return segment.length / 2 * position, end_radius + rise * (1.0 - position * position)
@@ -152,8 +180,9 @@ class ParabolicMeridian(Meridian):
 class Parabola(ParabolicMeridian):
     """Parabola: f(x) = -x^2/(2 a) + l^2/(8 a) + r_0,   a = sqrt(l^3/(24 (l_0 - l))).
 
-    With this a [m] the arc equals l_0 to second order in the slope only: it is 0.3 % too short at 10 % contraction
-    and 11 % at 40 %. The end slope is l/(2 a). Reference: Saga et al. 2007, equations (2), (3).
+    With this a [m] the arc equals l_0 to second order in the slope only: it is 0.3 % too short at
+    10 % contraction and 11 % at 40 %. The end slope is l/(2 a). Reference: Saga et al. 2007,
+    equations (2), (3).
     """
 
     def slope_squared(self, contraction: Value) -> Value:
@@ -162,10 +191,11 @@ class Parabola(ParabolicMeridian):
 
 @model
 class TrueArcParabola(ParabolicMeridian):
-    """Parabola whose arc equals the fibre length: (sqrt(1 + u^2) + asinh(u)/u)/2 = 1/(1 - eps), u: end slope.
+    """Parabola whose arc equals the fibre length: (sqrt(1 + u^2) + asinh(u)/u)/2 = 1/(1 - eps), u:
+    end slope.
 
-    u^2 is computed by five Newton steps from u = sqrt(6 eps)(1 + 0.95 eps), which converge to rounding precision for
-    eps <= 0.5.
+    u^2 is computed by five Newton steps from u = sqrt(6 eps)(1 + 0.95 eps), which converge to
+    rounding precision for eps <= 0.5.
     """
 
     def slope_squared(self, contraction: Value) -> Value:
@@ -212,7 +242,9 @@ class Catenary(Meridian):
             w = w - 2 * (w * stumpff(3, w) - target) / (stumpff(2, w) - stumpff(3, w))
         return w
 
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, position: Array) -> Profile:
+    def profile(
+        self, contraction: float, fibre_length: float, end_radius: float, position: Array
+    ) -> Profile:
         w = self.shape_squared(contraction)
         half = fibre_length * (1.0 - contraction) / 2
         t = position
@@ -222,7 +254,9 @@ class Catenary(Meridian):
 
 
 class SegmentDerivatives(NamedTuple):
-    """Derivatives of the integrals of one segment by contraction: dV/deps [m3], dG/deps [m2] and dQ/deps [m3]."""
+    """Derivatives of the integrals of one segment by contraction: dV/deps [m3], dG/deps [m2] and
+    dQ/deps [m3].
+    """
 
     volume: Value
     arc_excess: Value
@@ -231,11 +265,12 @@ class SegmentDerivatives(NamedTuple):
 
 @model
 class CircularArc(Meridian):
-    """Circular arc: r = r_0 + rho (cos t - cos psi), |t| <= psi,   sin(psi)/psi = 1 - eps,   rho = l_0/(2 psi).
+    """Circular arc: r = r_0 + rho (cos t - cos psi), |t| <= psi,   sin(psi)/psi = 1 - eps,   rho =
+    l_0/(2 psi).
 
-    rho: radius of the arc [m]; psi: half angle [rad], a right angle at eps = 1 - 2/pi = 36.3 %. psi^2 is computed by
-    Newton steps from psi = sqrt(6 eps)(1 + 0.15 eps); four steps converge to rounding precision for eps <= 0.5.
-    Reference: Ferraresi et al. 2001.
+    rho: radius of the arc [m]; psi: half angle [rad], a right angle at eps = 1 - 2/pi = 36.3 %.
+    psi^2 is computed by Newton steps from psi = sqrt(6 eps)(1 + 0.15 eps); four steps converge to
+    rounding precision for eps <= 0.5. Reference: Ferraresi et al. 2001.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FERRARESI_2001,)
@@ -255,7 +290,9 @@ class CircularArc(Meridian):
             excess=excess,
             arc_excess=fibre_length**2 * psi * (stumpff(2, -z) - stumpff(3, -z)) / 2,
             arc_excess_squared=fibre_length**3 * z * double_angle_term(-z) / 8,
-            volume=segment_volume(end_radius, length, excess, fibre_length**3 * z * triple_angle_term(-z) / 8),
+            volume=segment_volume(
+                end_radius, length, excess, fibre_length**3 * z * triple_angle_term(-z) / 8
+            ),
         )
 
     def angle_squared(self, contraction: Value) -> Value:
@@ -268,14 +305,18 @@ class CircularArc(Meridian):
     def derivatives_times_angle(
         self, angle_squared: Value, fibre_length: Value, end_radius: Value
     ) -> SegmentDerivatives:
-        """psi times the derivatives of the integrals; finite at psi = 0, where the derivatives are infinite.
+        """psi times the derivatives of the integrals; finite at psi = 0, where the derivatives are
+        infinite.
 
-        From d eps/d psi = psi (S_2 - S_3) and the derivatives of the closed forms with respect to psi, w = -psi^2.
+        From d eps/d psi = psi (S_2 - S_3) and the derivatives of the closed forms with respect to
+        psi, w = -psi^2.
         """
         z = angle_squared
         angle_derivative = stumpff(2, -z) - stumpff(3, -z)
         excess = fibre_length**2 * (stumpff(2, -4 * z) - 2 * stumpff(3, -4 * z))
-        squared = fibre_length**3 * (stumpff(1, -z) * stumpff(3, -4 * z) - 0.375 * triple_angle_term(-z))
+        squared = fibre_length**3 * (
+            stumpff(1, -z) * stumpff(3, -4 * z) - 0.375 * triple_angle_term(-z)
+        )
         psi = ops.sqrt(z)
         rise = 2 * end_radius * excess + squared * psi
         moment = stumpff(3, -4 * z) - 5 * stumpff(4, -4 * z) + 9 * stumpff(5, -4 * z)
@@ -285,7 +326,9 @@ class CircularArc(Meridian):
             arc_excess_squared=2 * fibre_length**3 * psi * moment / angle_derivative,
         )
 
-    def profile(self, contraction: float, fibre_length: float, end_radius: float, position: Array) -> Profile:
+    def profile(
+        self, contraction: float, fibre_length: float, end_radius: float, position: Array
+    ) -> Profile:
         z = self.angle_squared(contraction)
         t = position
         # cos(psi t) - cos psi as a product of sines, without cancellation for a flat arc

@@ -1,4 +1,6 @@
-"""Straight-fibre geometries: tubes of axial fibres between rings, with an assumed or the exact outline; fibre sums."""
+"""Straight-fibre geometries: tubes of axial fibres between rings, with an assumed or the exact
+outline; fibre sums.
+"""
 
 import abc
 import functools
@@ -13,13 +15,20 @@ from .meridian import CircularArc, Meridian, Segment
 DAERDEN_LEFEBER_2001 = published("daerden-lefeber-2001")
 _ROOT_MU_BRACKET = (1e-6, 0.9)
 """Search interval of sqrt(mu)."""
-_ROOT_TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+_ROOT_TOLERANCES = {
+    "xatol": 0.0,
+    "xrtol": 4 * float(np.finfo(float).eps),
+    "fatol": 0.0,
+    "frtol": 0.0,
+}
 _SEARCH: dict[str, Any] = {"tolerances": _ROOT_TOLERANCES, "maxiter": 300}
 """Options of the root searches, which end at rounding."""
 
 
 class FibreSum(abc.ABC):
-    """M = Sum sin(theta_n) over the half section, theta_n = (pi/m)(2 n + 1): Saga et al. 2007, (13), (15)."""
+    """M = Sum sin(theta_n) over the half section, theta_n = (pi/m)(2 n + 1): Saga et al. 2007,
+    (13), (15).
+    """
 
     @abc.abstractmethod
     def sum_of_sines(self, fibres: int) -> Value:
@@ -28,7 +37,9 @@ class FibreSum(abc.ABC):
 
 @model
 class PrintedFibreSum(FibreSum):
-    """Sum over n = 0..m/2, as (15) is printed: one fibre lies beyond pi and is subtracted; 4.93074 for 16 fibres."""
+    """Sum over n = 0..m/2, as (15) is printed: one fibre lies beyond pi and is subtracted; 4.93074
+    for 16 fibres.
+    """
 
     def sum_of_sines(self, fibres: int) -> Value:
         return 1.0 / ops.sin(ops.pi / fibres) - ops.sin(ops.pi / fibres)
@@ -36,7 +47,9 @@ class PrintedFibreSum(FibreSum):
 
 @model
 class HalfShellFibreSum(FibreSum):
-    """Sum over n = 0..m/2 - 1, the fibres of the half section: 1/sin(pi/m); 5.12583 for 16 fibres."""
+    """Sum over n = 0..m/2 - 1, the fibres of the half section: 1/sin(pi/m); 5.12583 for 16
+    fibres.
+    """
 
     def sum_of_sines(self, fibres: int) -> Value:
         return 1.0 / ops.sin(ops.pi / fibres)
@@ -44,7 +57,9 @@ class HalfShellFibreSum(FibreSum):
 
 @model
 class UniformFibreSum(FibreSum):
-    """Continuous distribution of fibres: m/pi, as axial symmetry requires; 5.09296 for 16 fibres."""
+    """Continuous distribution of fibres: m/pi, as axial symmetry requires; 5.09296 for 16
+    fibres.
+    """
 
     def sum_of_sines(self, fibres: int) -> Value:
         return fibres / ops.pi
@@ -54,7 +69,9 @@ class UniformFibreSum(FibreSum):
 class UserDefinedFibreSum(FibreSum):
     """User-defined value, for sensitivity studies."""
 
-    value: float = parameter("1", "M", "sum of the sines of the fibre angles", bounds=(0.1, 1e3), fitted=False)
+    value: float = parameter(
+        "1", "M", "sum of the sines of the fibre angles", bounds=(0.1, 1e3), fitted=False
+    )
 
     def sum_of_sines(self, fibres: int) -> Value:
         return self.value
@@ -62,14 +79,18 @@ class UserDefinedFibreSum(FibreSum):
 
 @model
 class FibreTube(Geometry):
-    """Straight inextensible fibres between rings of equal diameter: n rings form n + 1 equal segments in series.
+    """Straight inextensible fibres between rings of equal diameter: n rings form n + 1 equal
+    segments in series.
 
-    Each segment has the fibre length l_0 = L_0/(n + 1) and the contraction of the whole muscle. The width of a ring is
-    neglected. Equal division by the rings is inferred; Saga et al. 2007 do not state it.
+    Each segment has the fibre length l_0 = L_0/(n + 1) and the contraction of the whole muscle. The
+    width of a ring is neglected. Equal division by the rings is inferred; Saga et al. 2007 do not
+    state it.
     """
 
     resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
-    end_diameter: float = parameter("m", "d_0", "diameter at the ends and rings", bounds=(1e-4, 0.5), fitted=False)
+    end_diameter: float = parameter(
+        "m", "d_0", "diameter at the ends and rings", bounds=(1e-4, 0.5), fitted=False
+    )
     rings: int = within(0, 1_000_000, default=0)
 
     @property
@@ -89,11 +110,15 @@ class FibreTube(Geometry):
 
     @abc.abstractmethod
     def segment(self, contraction: Value) -> Segment:
-        """Shape and integrals of one segment at a contraction [1]. Raises GeometryLimitError outside the range."""
+        """Shape and integrals of one segment at a contraction [1]. Raises GeometryLimitError
+        outside the range.
+        """
 
     @abc.abstractmethod
     def profile(self, contraction: float, position: Array) -> Profile:
-        """Axial positions from the middle of a segment [m] and radii [m] at normalised positions from -1 to 1."""
+        """Axial positions from the middle of a segment [m] and radii [m] at normalised positions
+        from -1 to 1.
+        """
 
     def volume(self, contraction: Value) -> Value:
         return self.segments * self.segment(contraction).volume
@@ -109,9 +134,11 @@ class FibreTube(Geometry):
 
 @model
 class StraightFibre(FibreTube):
-    """Straight-fibre tube with an assumed meridian: CircularArc, Catenary, TrueArcParabola, or Parabola (Saga et al.).
+    """Straight-fibre tube with an assumed meridian: CircularArc, Catenary, TrueArcParabola, or
+    Parabola (Saga et al.).
 
-    The default is the circular arc: it preserves the fibre length and has the smallest error under virtual work.
+    The default is the circular arc: it preserves the fibre length and has the smallest error under
+    virtual work.
     """
 
     meridian: Meridian = CircularArc()
@@ -137,7 +164,9 @@ class EllipticOutline(NamedTuple):
     """Parameter mu, angle theta_0 and elliptic integrals that define an outline."""
 
     parameter: Any
-    """mu = R^2/(2 (R^2 + A)) with A = F/(pi p); the tension is zero at 1/2 and compressive above."""
+    """mu = R^2/(2 (R^2 + A)) with A = F/(pi p); the tension is zero at 1/2 and compressive
+    above.
+    """
     angle: Any
     """theta_0 with cos(theta_0) = r_0/R."""
     first: Any
@@ -148,14 +177,17 @@ class EllipticOutline(NamedTuple):
 
 @model
 class PleatedTube(FibreTube):
-    """Straight-fibre muscle without hoop stress: N cos(phi) = F + pi p r^2 with N constant along the fibre.
+    """Straight-fibre muscle without hoop stress: N cos(phi) = F + pi p r^2 with N constant along
+    the fibre.
 
-        l_0 = (R/sqrt mu) F,  l = (R/sqrt mu)(2 E - F),  eps = 2 (1 - E/F),  F/p = pi R^2 (1 - 2 mu)/(2 mu)
-        V = (pi R^3/(3 mu^1.5)) [(1 - mu) F - (1 - 2 mu) E + 2 mu sin(theta_0) cos(theta_0) D_0]
+        l_0 = (R/sqrt mu) F,  l = (R/sqrt mu)(2 E - F),  eps = 2 (1 - E/F),  F/p = pi R^2 (1 - 2
+        mu)/(2 mu) V = (pi R^3/(3 mu^1.5)) [(1 - mu) F - (1 - 2 mu) E + 2 mu sin(theta_0)
+        cos(theta_0) D_0]
 
-    R: maximum radius; F, E: incomplete elliptic integrals F(theta_0 | mu), E(theta_0 | mu) with parameter
-    mu = R^2/(2 (R^2 + A)), A = F/(pi p), cos(theta_0) = r_0/R, D_0 = sqrt(1 - mu sin^2 theta_0). Carlson's symmetric
-    integrals remain accurate at small contraction. Same form as in Daerden and Lefeber 2001.
+    R: maximum radius; F, E: incomplete elliptic integrals F(theta_0 | mu), E(theta_0 | mu) with
+    parameter mu = R^2/(2 (R^2 + A)), A = F/(pi p), cos(theta_0) = r_0/R, D_0 = sqrt(1 - mu sin^2
+    theta_0). Carlson's symmetric integrals remain accurate at small contraction. Same form as in
+    Daerden and Lefeber 2001.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (DAERDEN_LEFEBER_2001,)
@@ -163,7 +195,8 @@ class PleatedTube(FibreTube):
 
     @property
     def contraction_range(self) -> tuple[float, float]:
-        """From zero to 50 %, less for a short tube, more for a slender one, to its `free_contraction`.
+        """From zero to 50 %, less for a short tube, more for a slender one, to its
+        `free_contraction`.
 
         Above `free_contraction` the tension is negative.
         """
@@ -181,7 +214,9 @@ class PleatedTube(FibreTube):
         return float(self.fibre_length / self.end_radius)
 
     def elliptic_outline(self, contraction: Value) -> EllipticOutline:
-        """Parameter, angle and integrals at a contraction [1], by a bracketed root search for the parameter."""
+        """Parameter, angle and integrals at a contraction [1], by a bracketed root search for the
+        parameter.
+        """
         from scipy.optimize import elementwise
 
         self.check_contraction(contraction)
@@ -190,7 +225,8 @@ class PleatedTube(FibreTube):
         def residual(root_mu: Any, c: Any) -> Any:
             return _contraction(root_mu * root_mu, self._slenderness) - c
 
-        # searched in sqrt(mu), which is proportional to contraction^(1/4) near zero and keeps the accuracy there
+        # searched in sqrt(mu), which is proportional to contraction^(1/4) near zero and keeps the
+        # accuracy there
         root = elementwise.find_root(residual, _ROOT_MU_BRACKET, args=(target,), **_SEARCH)
         mu = np.where(target > 0, root.x, np.nan) ** 2
         angle = _angle(mu, self._slenderness)
@@ -204,7 +240,9 @@ class PleatedTube(FibreTube):
         return unwrap_scalar(np.where(np.asarray(contraction) > 0, area, np.inf))
 
     def volume_derivative(self, contraction: Value) -> Value:
-        """dV/deps = L_0 F/p [m3] by virtual work; the tests compare it with the derivative of the volume."""
+        """dV/deps = L_0 F/p [m3] by virtual work; the tests compare it with the derivative of the
+        volume.
+        """
         return self.resting_length * self.effective_area(contraction)
 
     def segment(self, contraction: Value) -> Segment:
@@ -217,7 +255,9 @@ class PleatedTube(FibreTube):
         section = radius**2 / root * sine * delta
         arc_moment = radius**2 / mu * np.arcsin(root * sine)
         squares = radius**3 / root * (shape.first - shape.deficit / mu)
-        bracket = shape.deficit + mu * (shape.first - 2 * shape.deficit) + 2 * mu * sine * cosine * delta
+        bracket = (
+            shape.deficit + mu * (shape.first - 2 * shape.deficit) + 2 * mu * sine * cosine * delta
+        )
         # with A + r^2 = R^2 (1 - 2 mu + 2 mu cos^2)/(2 mu) and N/(pi p) = R^2/(2 mu)
         values = (
             length,
@@ -230,10 +270,27 @@ class PleatedTube(FibreTube):
             squares - 2 * self.end_radius * arc_moment + self.end_radius**2 * self.fibre_length,
             np.pi * radius**3 / (3 * mu**1.5) * bracket,
         )
-        rest, r0 = self.fibre_length, self.end_radius
-        cylinder = (rest, rest, r0, 0.0, 1.0, 0.0, 0.0, 0.0, np.pi * r0**2 * rest)  # at zero contraction, where mu = 0
+        rest = self.fibre_length
+        r0 = self.end_radius
+        cylinder = (
+            rest,
+            rest,
+            r0,
+            0.0,
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            np.pi * r0**2 * rest,
+        )  # at zero contraction, where mu = 0
         pairs = zip(values, cylinder, strict=True)
-        return Segment(r0, *(unwrap_scalar(np.where(np.asarray(contraction) > 0, v, at_rest)) for v, at_rest in pairs))
+        return Segment(
+            r0,
+            *(
+                unwrap_scalar(np.where(np.asarray(contraction) > 0, v, at_rest))
+                for v, at_rest in pairs
+            ),
+        )
 
     def profile(self, contraction: float, position: Array) -> Profile:
         from scipy.special import ellipeinc, ellipkinc
@@ -252,14 +309,17 @@ def _integrals(mu: Any, angle: Any) -> tuple[Any, Any]:
     """Return F(angle | mu) and F - E by Carlson's symmetric integrals."""
     from scipy.special import elliprd, elliprf
 
-    sine, cosine = np.sin(angle), np.cos(angle)
+    sine = np.sin(angle)
+    cosine = np.cos(angle)
     delta_squared = 1 - mu * sine**2
     first = sine * elliprf(cosine**2, delta_squared, 1.0)
     return first, mu / 3 * sine**3 * elliprd(cosine**2, delta_squared, 1.0)
 
 
 def _angle(mu: Any, slenderness: float) -> Any:
-    """Return theta_0 with F(theta_0 | mu) = lambda sqrt(mu) cos(theta_0); the difference increases with the angle."""
+    """Return theta_0 with F(theta_0 | mu) = lambda sqrt(mu) cos(theta_0); the difference increases
+    with the angle.
+    """
     from scipy.optimize import elementwise
     from scipy.special import ellipkinc
 
