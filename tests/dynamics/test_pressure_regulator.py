@@ -196,18 +196,57 @@ def test_a_record_with_reversals_determines_the_regulator():
     assert fit.zeros[0] == pytest.approx(-8e3, abs=600)
 
 
-def test_what_a_record_excites_too_little_is_named_with_the_command_that_would():
+def one_step(perturbation=0.0, seed=0):
+    """A small step up alone, one reading missing, every pressure times 1 + perturbation * N(0, 1)."""
     run = record([(0.0, 3e5), (0.5, 3.2e5)])
-    missing = run.with_columns(
-        pressure=np.where(np.arange(len(run)) == 50, np.nan, run["pressure"])
-    )
-    fit = am.bench.fit_regulator([missing], supply_pressure=0.578e6)
-    assert np.isfinite(fit.zeros).all()
+    missing = np.where(np.arange(len(run)) == 50, np.nan, run["pressure"])
+    noise = np.random.default_rng(seed).standard_normal(len(run))
+    return run.with_columns(pressure=missing * (1.0 + perturbation * noise))
+
+
+@pytest.fixture(scope="module")
+def too_little():
+    return am.bench.fit_regulator([one_step()], supply_pressure=0.578e6)
+
+
+def undetermined(fit):
+    return {remark.split()[0].removeprefix("circuit.") for remark in fit.remarks}
+
+
+def test_what_a_record_excites_too_little_is_named_with_the_command_that_would(too_little):
+    assert np.isfinite(too_little.zeros).all()
     assert any(
-        "circuit.discharge.conductance is not determined; give a step down" in each
-        for each in fit.remarks
+        "circuit.discharge.conductance is not determined; give a step down" in remark
+        for remark in too_little.remarks
     )
-    assert "too little excited: circuit.overlap" in str(fit)
+    assert "too little excited: circuit.overlap" in str(too_little)
+    # One step has a delay, a time constant and a height.
+    assert len(undetermined(too_little)) >= 9 - 3
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("size", [1e-13, 1e-12])
+def test_what_is_not_determined_does_not_depend_on_the_last_digits(too_little, size, seed):
+    again = am.bench.fit_regulator([one_step(size, seed)], supply_pressure=0.578e6)
+    assert again.remarks == too_little.remarks
+    for first, second in zip(too_little.fit.estimates, again.fit.estimates, strict=True):
+        assert second.value == pytest.approx(first.value, abs=0.01 * first.stderr)
+        assert second.stderr == pytest.approx(first.stderr, rel=0.02)
+
+
+@pytest.mark.parametrize("integral_rate", [0.02, 0.1])
+def test_what_is_not_determined_stays_near_its_initial_value(integral_rate):
+    initial = replace(ITV.circuit, integral_rate=integral_rate)
+    fit = am.bench.fit_regulator([one_step()], supply_pressure=0.578e6, initial=initial)
+    assert "integral_rate" in undetermined(fit)
+    assert fit.regulator.integral_rate == pytest.approx(integral_rate, rel=0.2)
+
+
+def test_the_report_does_not_call_determined_what_the_remarks_call_not_determined(too_little):
+    weak = len(too_little.fit.identifiability.undetermined)
+    assert weak > 0
+    (summary,) = too_little.chapter().paragraphs
+    assert f"{9 - weak} of 9 combinations of the unknowns" in summary
 
 
 @pytest.mark.parametrize(

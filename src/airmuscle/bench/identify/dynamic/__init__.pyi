@@ -3,6 +3,7 @@ from .dynamic_chapter import dynamic_chapters as dynamic_chapters
 from .experiment import CommandInstants as CommandInstants
 from .experiment import Experiment as Experiment
 from .experiment import InitialValue as InitialValue
+from .experiment import PriorValue as PriorValue
 from .experiment import StartTime as StartTime
 from .experiment import stated_ambient as stated_ambient
 from .fit import CrossPrediction as CrossPrediction

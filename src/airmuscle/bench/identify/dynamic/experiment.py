@@ -4,6 +4,7 @@ of its own.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -84,6 +85,14 @@ RecordUnknown = ParameterPaths | StartTime | InitialValue | CommandInstants
 """An unknown with its own value in every record."""
 
 
+class PriorValue(NamedTuple):
+    """What is known of a positive parameter before a fit: its value [SI], and the standard
+    deviation of the logarithm of the true value over it."""
+
+    value: float
+    deviation: float
+
+
 @dataclasses.dataclass(frozen=True)
 class Unknown:
     """One unknown number: parameters with a common value, a start time or an initial value.
@@ -99,6 +108,7 @@ class Unknown:
     unit: str
     symbol: str
     meaning: str
+    prior: "PriorValue | None" = None
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -137,25 +147,37 @@ def make_unknowns(
     free: Sequence[ParameterPaths],
     per_record: Sequence[RecordUnknown],
     bounds: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, PriorValue] | None = None,
 ) -> tuple[Unknown, ...]:
     """The unknowns common to all records, then those of each record. Raises ParameterError for
     unknown names.
     """
-    unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
+    priors = priors or {}
+    unknowns = [_plant_unknown(plant, paths, None, bounds, priors) for paths in free]
     for i, experiment in enumerate(experiments):
         for target in per_record:
             if isinstance(target, StartTime | InitialValue | CommandInstants):
                 unknowns += _record_unknowns(experiment, target, i)
             else:
-                unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
+                unknowns.append(
+                    _plant_unknown(experiment.plant or plant, target, i, bounds, priors)
+                )
     if not unknowns:
         example = Hint("To name one, for example", "free", ("circuit.fill.conductance",))
         raise ParameterError("no parameter is free; at least one is required.", hint=example)
-    for name in bounds:
-        if name not in {u.name.partition(" of record")[0] for u in unknowns}:
+    names = {u.name.partition(" of record")[0] for u in unknowns}
+    stated = {**dict.fromkeys(priors, "a prior is"), **dict.fromkeys(bounds, "bounds are")}
+    for name, subject in stated.items():
+        if name not in names:
             free = ", ".join(u.name for u in unknowns)
             raise ParameterError(
-                f"bounds are given for '{name}', which is not free; free are {free}."
+                f"{subject} given for '{name}', which is not free; free are {free}."
+            )
+    for name, (value, deviation) in priors.items():
+        if not (value > 0.0 and deviation > 0.0):
+            raise ParameterError(
+                f"the prior of '{name}' has the value {value:g} and the standard deviation"
+                f" {deviation:g} of its logarithm; both must be positive."
             )
     return tuple(unknowns)
 
@@ -165,6 +187,7 @@ def _plant_unknown(
     target: ParameterPaths,
     record: int | None,
     bounds: Mapping[str, tuple[float, float]],
+    priors: Mapping[str, PriorValue],
 ) -> Unknown:
     paths = (target,) if isinstance(target, str) else target
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
@@ -179,7 +202,16 @@ def _plant_unknown(
         )
     declared = leaf.declared
     return Unknown(
-        name, paths, record, leaf.value, low, high, declared.unit, declared.symbol, declared.meaning
+        name,
+        paths,
+        record,
+        leaf.value,
+        low,
+        high,
+        declared.unit,
+        declared.symbol,
+        declared.meaning,
+        priors.get(paths[0]),
     )
 
 

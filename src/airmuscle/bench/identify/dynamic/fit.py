@@ -20,6 +20,7 @@ from ..statistics import Estimate
 from .experiment import (
     Experiment,
     ParameterPaths,
+    PriorValue,
     RecordUnknown,
     check_ambient,
     describe_ambient,
@@ -53,6 +54,7 @@ def fit_dynamic(
     observed: Mapping[str, float],
     per_record: Sequence[RecordUnknown] = (),
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    prior: Mapping[str, PriorValue] | None = None,
     starts: int = 1,
     seed: int = 0,
     method: Integrator | None = None,
@@ -69,6 +71,8 @@ def fit_dynamic(
     StartTime(margin),
                 CommandInstants(margin) or InitialValue(name, margin)
     bounds      by the first path; by default those declared
+    prior       by the first path, what is known before: a parameter that the records do not
+    determine then stays near that value
     starts      number of initial guesses of a multi-start: the values of the plant, and a Latin
     hypercube within a
                 factor of three. A search whose sum of squares is a thousand times the lowest one
@@ -87,7 +91,7 @@ def fit_dynamic(
         )
     for experiment in experiments:
         check_ambient(plant, experiment)
-    unknowns = make_unknowns(plant, experiments, free, per_record, bounds or {})
+    unknowns = make_unknowns(plant, experiments, free, per_record, bounds or {}, prior)
     method = method or Rodas4()
     models = tuple(
         RecordModel(plant, e, i, unknowns, observed, method) for i, e in enumerate(experiments)
@@ -210,9 +214,14 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
     inner = np.flatnonzero(~on_bound)
     residual_std = float(np.sqrt(np.sum(residuals**2) / (residuals.size - inner.size)))
     names = [problem.unknowns[k].name for k in inner]
-    analysis = analyse_identifiability(jacobian[:, inner], names, np.ones(inner.size), residual_std)
+    # A prior is of the logarithm, so that the unknown is judged relative to its estimate.
+    magnitudes = np.where(problem.has_prior, np.abs(scaled), 1.0)[inner]
+    known = residual_std * problem.prior_residuals(scaled)[1]
+    analysis = analyse_identifiability(
+        np.concatenate([jacobian, known])[:, inner], names, magnitudes, residual_std
+    )
     covariance = np.full((scaled.size, scaled.size), np.nan)
-    inverse = analysis.inverse()
+    inverse = analysis.inverse() * np.outer(magnitudes, magnitudes)
     covariance[np.ix_(inner, inner)] = inverse * residual_std**2
     standard_errors = np.sqrt(np.diag(covariance))
     estimates = tuple(

@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from ....core import AirmuscleError, Array
 from .experiment import Unknown
@@ -185,6 +186,9 @@ STEP_BUDGET_FACTOR = 20
 """A simulation is aborted after this many steps, or after this many times the steps of the best
 simulation of its search if that is more; chosen."""
 
+MIN_RATIO = 1e-9
+"""Least ratio of an unknown with a prior to its prior value (chosen): a bound may be zero."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DynamicFitProblem:
@@ -262,6 +266,24 @@ class DynamicFitProblem:
             return residuals[0], jacobians[0], longest
         return np.concatenate(residuals), np.concatenate(jacobians), longest
 
+    @functools.cached_property
+    def has_prior(self) -> npt.NDArray[np.bool_]:
+        """Which unknowns have a prior, a mask (P,)."""
+        return np.array([u.prior is not None for u in self.unknowns], dtype=bool)
+
+    def prior_residuals(self, scaled: Array) -> tuple[Array, Array]:
+        """ln(value/prior value) of the unknowns with a prior (K,) in its standard deviations, and
+        the Jacobian (K, P) by the scaled unknowns.
+        """
+        indices = np.flatnonzero(self.has_prior)
+        priors = np.array([u.prior for u in self.unknowns if u.prior is not None]).reshape(-1, 2)
+        values, deviations = priors.T
+        relative = self.scales[indices] / values
+        ratios = np.maximum(scaled[indices] * relative, MIN_RATIO)
+        jacobian = np.zeros((indices.size, scaled.size))
+        jacobian[np.arange(indices.size), indices] = relative / ratios / deviations
+        return np.log(ratios) / deviations, jacobian
+
     def solve(self, scaled: Array, fixed: Sequence[int] = ()) -> tuple[Array, float]:
         """Least squares from an initial guess (P,) with some unknowns fixed, given by index: the
         scaled unknowns, and the sum of squares, which is infinite where the guess cannot be
@@ -284,6 +306,10 @@ class DynamicFitProblem:
                 residuals, jacobian, steps = self.run(tried, max_steps)
             except AirmuscleError:
                 return None
+            if self.has_prior.any():
+                known, slopes = self.prior_residuals(tried)
+                residuals = np.concatenate([residuals, known])
+                jacobian = np.concatenate([jacobian, slopes])
             cost = float(residuals @ residuals)
             if cost < min_cost:
                 min_cost = cost

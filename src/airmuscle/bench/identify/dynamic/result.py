@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import Array, IdentificationError, check_known, tree
+from ....core import Array, IdentificationError, check_known, counted, tree
 from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....engine.compile import System
 from ....recording import Recording
@@ -223,18 +223,19 @@ class DynamicFit(Reported):
         """The description of the fit: estimates, residuals of each record, identifiability, the
         records' courses.
         """
-        rank = self.identifiability.rank
         inner = self.identifiability.singular_values.size
+        determined = inner - len(self.identifiability.undetermined)
         searches = self.costs.size
         reached = f"{self.starts_at_optimum} of {searches} searches reached this optimum"
         if searches == 1:
             reached = "one search, so other optima were not sought; increase the number of starts"
         summary = (
-            f"Residual standard deviation {self.residual_std:.3g} times that of the sensors; rank"
-            f" {rank} of {inner} unknowns that are not on a bound; {reached}."
+            f"Residual standard deviation {self.residual_std:.3g} times that of the sensors;"
+            f" {determined} of {counted(inner, 'combination')} of the unknowns that are not on a"
+            f" bound {'is' if determined == 1 else 'are'} determined; {reached}."
         )
         counts = {
-            "rank": rank,
+            "determined combinations": determined,
             "unknowns not on a bound": inner,
             "searches": searches,
             "searches at the optimum": self.starts_at_optimum,
