@@ -14,25 +14,23 @@ import pytest
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "airmuscle"
 COLUMNS = 100
-VAGUE_NAMES = set(
-    [
-        "each",
-        "found",
-        "own",
-        "one",
-        "other",
-        "others",
-        "few",
-        "some",
-        "kept",
-        "held",
-        "handed",
-        "given",
-        "told",
-        "ways",
-        "whole",
-    ]
-)
+VAGUE_NAMES = {
+    "each",
+    "found",
+    "own",
+    "one",
+    "other",
+    "others",
+    "few",
+    "some",
+    "kept",
+    "held",
+    "handed",
+    "given",
+    "told",
+    "ways",
+    "whole",
+}
 BRANCHES = (
     ast.If,
     ast.For,
