@@ -2,7 +2,7 @@
 of their results.
 
     python benchmarks/control_benchmark.py [--quick] [--searches 3] [--on-off-searches 3]
-    [--processes 2]
+        [--processes 2]
                                            [--results FOLDER] [--out PAGE]
 
 Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed

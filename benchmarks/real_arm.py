@@ -1,7 +1,7 @@
 """Free run of an arm identified from measured episodes, beside persistence and ARX.
 
     python benchmarks/real_arm.py EPISODES.npz MAPPING.toml [--left-out 300] [--residual] [--figure
-    horizon.png]
+        horizon.png]
 
 The episodes are read by `read_episodes`; the last ones judge. Windows of 40 rows begin at rows 10,
 50, ... of each episode; a model is given angles and speeds at their start and the pressures until

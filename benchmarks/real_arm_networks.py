@@ -2,7 +2,7 @@
 features and a GRU.
 
     python benchmarks/real_arm_networks.py EPISODES.npz MAPPING.toml [--left-out 300] [--minutes 20]
-    [--keep ERRORS.npz]
+        [--keep ERRORS.npz]
 
 Both are fitted to the first episodes, see what `fit_joint` sees (the rows before the start of a
 window, angle and speed at its start, and the pressures until its end), and are judged on the last

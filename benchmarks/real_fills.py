@@ -2,7 +2,7 @@
 tube.
 
 ./run python benchmarks/real_fills.py FOLDER_OR_FILES...   (CSV with time and pressure; a record is
-one fill)
+                                                           one fill)
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 that slip.
 
 python examples/A12_noisy_hysteresis.py    prints both on the same noisy pressure, and a first loop
-that is wider
+                                           that is wider
 
 The switch is that of a published simulator (porcaro_2026, common/actions/torque.py), the widths of
 80 and 53 kPa are those of its joint (docs/hysteresis_play). Force, slip and gain are chosen.

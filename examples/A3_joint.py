@@ -2,7 +2,7 @@
 release delay.
 
 python examples/A3_joint.py        prints the equilibrium, the response to an opening of the valve,
-and the poles
+                                   and the poles
 
 Dimensions, valve and brake are chosen.
 """

@@ -2,7 +2,7 @@
 regulators.
 
 python examples/A5_joint_statics.py        prints the pressures, and the angle and stiffness that
-the joint reaches
+                                           the joint reaches
 
 The joint is a plant of the library; its dimensions are chosen, and so are the wanted angles and
 stiffnesses.

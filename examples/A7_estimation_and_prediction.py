@@ -2,7 +2,7 @@
 hysteresis.
 
 python examples/A7_estimation_and_prediction.py    writes estimation_and_prediction.png to the
-working directory
+                                                   working directory
 
 The muscle is the DMSP-20-300 of Martens and Boblan; joints, loads, friction, valves, noise and
 sample times are chosen.

@@ -2,7 +2,7 @@
 simulation.
 
 python examples/A9_sizing.py        prints the choices, the valves and the stroke that the lift
-reaches
+                                    reaches
 
 Load, stroke, supply, safety factor and cycle time are chosen.
 """

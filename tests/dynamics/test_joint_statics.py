@@ -1,7 +1,7 @@
 """Statics of a joint: two equations for two pressures, and their inverse.
 
 Q_1(theta, p_1) + Q_2(theta, p_2) = dV/dtheta + load,   K_1 + K_2 = K with K_i = -dQ_i/dtheta at
-constant pressure
+                                                        constant pressure
 """
 
 from __future__ import annotations

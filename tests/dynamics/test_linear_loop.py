@@ -2,7 +2,7 @@
 python-control.
 
 L(z) = C(z) z^-d (1 - a) z/(z - a) Z{G(s) (1 - exp(-s h))/s},   a = exp(-h/T): PID C, delay d and
-lag T of the sensor.
+    lag T of the sensor.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 stuck valve.
 
 p_1 = p_0 + d, p_2 = p_0 - d;  u_i = K (r_i - y_i) outside the dead zone;  u = K_f (r + T r');  u_i
-= u_f from t_f on.
+                               = u_f from t_f on.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """An arm of unknown size: reduced forces, links in space and stick-slip, driven by pressures.
 
 F = S(p a + d),   d/dt dT/dv - dT/dq + dV/dq = Q,   power of friction + growth of bristle energy <=
-0
+                  0
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Sizing: the shortest muscle whose law holds the load at both end points.
 
 lift   F(p_1, eps_1) = F_1/n,   F(p_2, eps_1 + S/L) = F_2/n,   S_F F <= F_max(eps) = min(F(p_max,
-eps), F_rated) joint  n r (F(p_c, eps_c) - F(p_min, eps_e)) = M,   eps_c - eps_e = r Theta/L air
-m = p V/(R T) of both end points
+       eps), F_rated)
+joint  n r (F(p_c, eps_c) - F(p_min, eps_e)) = M,   eps_c - eps_e = r Theta/L
+air    m = p V/(R T) of both end points
 """
 
 from __future__ import annotations

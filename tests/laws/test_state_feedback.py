@@ -1,8 +1,9 @@
 """State feedback with observer and integral action, against the same equations in matrices.
 
 x_k = x^-_k + K (y_k - y_0 - C x^-_k),   u_k = u_0 + N (r_k - z_0) - L x_k - L_I w_k limited to the
-ranges of the inputs, x^-_(k+1) = A x_k + B (u_k - u_0),   w_(k+1) = w_k + h (z_k - r_k), unchanged
-while an input is limited
+                                         ranges of the inputs,
+x^-_(k+1) = A x_k + B (u_k - u_0),   w_(k+1) = w_k + h (z_k - r_k), unchanged while an input is
+                                     limited
 """
 
 from __future__ import annotations

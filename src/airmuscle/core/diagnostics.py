@@ -64,7 +64,7 @@ class Diagnostic:
     text     the remark, a sentence without its full stop
     rows     how many rows of the recording it concerns; 0 where it concerns the result as a whole
     hint     what to do about it, a Hint if it is an argument of a function; empty where there is
-    nothing to do
+             nothing to do
     """
 
     code: DiagnosticCode
@@ -100,7 +100,7 @@ class Columns(Mapping[str, Array]):
     """Columns (N,) of a run by name, with the smallest and largest value of each.
 
     places, lower, upper   the smallest and largest values that are known, and by column where they
-    stand among them
+                           stand among them
     """
 
     def __init__(

@@ -53,7 +53,7 @@ class DisplayUnits:
     """A choice of display units, which is in force in this process, or in a `with` block only.
 
     units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default
-    of the output
+           of the output
 
     Raises UnitError.
     """

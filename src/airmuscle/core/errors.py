@@ -56,7 +56,7 @@ class HintedText(str):
     interface.
 
     parts  texts, and hints as whole sentences; a hint is separated from the text before it by a
-    space
+           space
     """
 
     parts: tuple[str | Hint, ...]
@@ -164,7 +164,7 @@ class AirmuscleError(Exception):
 
     message  location, cause and allowed values; a HintedText keeps its hints
     hint     the remedy, if it is an argument of a public function; it becomes the last sentence of
-    the message
+             the message
     """
 
     def __init__(self, message: str = "", *, hint: Hint | None = None) -> None:

@@ -82,7 +82,7 @@ def shared_folder(folder: Path | str, workers: int | None = None) -> "Iterator[S
 
     folder   a folder of a file system that all processes see; it is created if it is missing
     workers  number of local processes of this one, by default one per core; 1: a thread of this
-    process itself
+             process itself
 
     Each process runs the same program with the same input. Each task is computed by the process
     that claims it first; its result is stored in the folder, where the others read it. The claim of

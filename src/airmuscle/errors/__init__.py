@@ -6,13 +6,13 @@ kind of the cause:
     AirmuscleError
         InputError                    invalid input
             FileError (and FolderInUseError), ColumnError, UnitError, ParameterError,
-            UnknownNameError
+                UnknownNameError
         PhysicsError                  the model has no solution
             SolveError, GeometryLimitError, RatingError, EquilibriumError
         TraceError                    a model cannot be compiled
         IdentificationError           the data cannot determine the requested quantities
         SimulationError               a simulation ended early; `.solution` contains the partial
-        results
+                                      results
     AirmuscleWarning                  a result that may differ from what the user expects
 """
 

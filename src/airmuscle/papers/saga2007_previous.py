@@ -33,7 +33,7 @@ class Ferraresi2001:
     """Muscle with a circular meridian and the force balances (A) and (B), whose labels are lost.
 
         (A) (2 E R^2 s/ri)(sin phi - phi cos phi) + E lf s (r0 - ri)/ri + T sin phi
-        Sum_{n=-N/4}^{N/4} cos(2 pi n/N)
+            Sum_{n=-N/4}^{N/4} cos(2 pi n/N)
               - p [R^2 phi + 2 R r0 sin phi - (R^2/2) sin 2 phi] = 0
         (B) F + pi p (r0 + R (1 - cos phi))^2 - N T = 0
 

@@ -155,8 +155,7 @@ def displacement_columns(
 
     columns    `shortening` x, or `elongation` u = -x; also `position` y = x if its zero is stated
     constants  displacement_zero: the reading [m] at the resting length, subtracted from each of
-    them (default: 0);
-               resting_length L0 [m]
+               them (default: 0); resting_length L0 [m]
 
     Without the resting length, the column is `shortening` [m]. A contraction or length in the
     columns is kept.

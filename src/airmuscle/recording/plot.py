@@ -93,7 +93,7 @@ def panels_of(names: Iterable[str], units: Mapping[str, str], *, ordered: bool) 
 
     units    SI units of columns that are no known quantity, by name
     ordered  whether the panels are in the usual order of the quantities; otherwise in that of the
-    columns
+             columns
     """
     groups: dict[tuple[str, str], list[str]] = {}
     known = list(names)

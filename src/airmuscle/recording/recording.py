@@ -41,9 +41,10 @@ class Recording(NotebookDisplay):
     columns    values by column name
     origin     name of the file, or description of the simulation
     constants  constants of the run: resting_length [m], ambient [Pa], ambient_temperature [K],
-    specimen notes      notes for the user, such as assumptions made by the reader units      units
-    stated in the file, before conversion to SI references sources: of published measurements, or of
-    the models of a simulation
+               specimen
+    notes      notes for the user, such as assumptions made by the reader
+    units      units stated in the file, before conversion to SI
+    references sources: of published measurements, or of the models of a simulation
     """
 
     columns: Mapping[str, Array]

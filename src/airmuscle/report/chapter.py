@@ -24,10 +24,10 @@ class TableColumn(ShortRepr):
     """A column of a table: numbers in SI units, or texts.
 
     values  numbers, texts, truth values, pairs (first, last) of a range; None where there is no
-    value unit    SI unit of the numbers, "1" of a ratio, BY_ROW; empty for texts and counts shown
-    unit in which the page, the terminal and the CSV file show them, by default `unit`; of the
-    column "unit", a
-            sequence of the units in which the numbers of each row are shown
+            value
+    unit    SI unit of the numbers, "1" of a ratio, BY_ROW; empty for texts and counts
+    shown   unit in which the page, the terminal and the CSV file show them, by default `unit`; of
+            the column "unit", a sequence of the units in which the numbers of each row are shown
     digits  significant digits that are shown
     brief   whether the brief view has the column
     short   heading in the brief view, if the name is too long for a terminal
@@ -61,10 +61,13 @@ class Table(ShortRepr):
     """A titled table, written to data/<name>.csv.
 
     columns  by name; values alone are a column without unit, whose name may end with one, `pressure
-    [MPa]` shown    whether the page has it series   whether it is a long series, which only its
-    file has folded   whether the page shows its title alone until the reader unfolds it brief
-    rows of the brief view: the first ones, or the indices of some; 0 for none key      name in
-    JSON, by default `name`; several chapters of a report may have a table of the same key
+             [MPa]`
+    shown    whether the page has it
+    series   whether it is a long series, which only its file has
+    folded   whether the page shows its title alone until the reader unfolds it
+    brief    rows of the brief view: the first ones, or the indices of some; 0 for none
+    key      name in JSON, by default `name`; several chapters of a report may have a table of the
+             same key
     """
 
     name: str
@@ -125,7 +128,7 @@ class Plot:
     """A figure with its caption. Embedded in the page and written to figures/<name>.svg and .png.
 
     figure  a Matplotlib figure, a function that draws one, or the files of a rendered one by their
-    format
+            format
     """
 
     name: str
@@ -157,8 +160,10 @@ class Chapter(ShortRepr):
 
     name      identifier in the page and in JSON
     summary   paragraphs, as a tuple or separated by blank lines; the first states the result in a
-    sentence or two problems  faults of the data that make results wrong notes     remarks on the
-    data and what to do brief     whether the brief view has the chapter
+              sentence or two
+    problems  faults of the data that make results wrong
+    notes     remarks on the data and what to do
+    brief     whether the brief view has the chapter
     """
 
     name: str

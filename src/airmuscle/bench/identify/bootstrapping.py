@@ -44,8 +44,7 @@ def bootstrap(
 
     recordings  those that were fitted
     by          the groups: RunSplit(), LevelSplit(...) or SpecimenSplit(); by default the first of
-    these that has at
-                least `MIN_GROUPS` groups
+                these that has at least `MIN_GROUPS` groups
     progress    called with the completed fraction
     workers     number of processes, as in `compare`; the result does not depend on it
 

@@ -169,7 +169,7 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
     none.
 
     residuals  (model - measured) of each row of each recording [SI], NaN for rows that are not
-    measured
+               measured
 
     The medians of both branches are compared at equal driven quantity, so that neither an error of
     the law that both share nor an outlier counts. Their average difference must exceed three

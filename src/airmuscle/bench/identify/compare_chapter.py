@@ -126,8 +126,7 @@ def select_law(
 
     leave_out   the split of a single purpose, as in `compare`
     both        whether one law must serve both purposes; by default if no split is given and the
-    recordings contain
-                three specimens or more, each in several runs
+                recordings contain three specimens or more, each in several runs
 
     The other arguments are those of `compare`. Raises IdentificationError where no candidate is
     determined.

@@ -167,7 +167,7 @@ class GroupRefits:
         not certain.
 
         start  of the iteration for a law that is not linear in its parameters; by default the fit
-        to all rows
+               to all rows
         """
         if self._basis is None:
             return None

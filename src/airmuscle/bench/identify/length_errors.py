@@ -128,12 +128,12 @@ def estimate_length_error(
     law.
 
     law            fitted to all recordings, as initial values; of a PooledLengthLaw its population
-    law, because effects
-                   of the specimens take up an error of their length
+                   law, because effects of the specimens take up an error of their length
     specimen       name as SpecimenSplit gives it: the constant `specimen`, or the resting length in
-    mm prior_std      standard deviation [m] of the normal prior of the error, whose mean is 0
+                   mm
+    prior_std      standard deviation [m] of the normal prior of the error, whose mean is 0
     min_reduction  reduction of the mean square residual below half of which, by its derivative, the
-    search is ended
+                   search is ended
 
     Rows are correlated, so that the squares are divided by the ratio of rows to effective rows.
     Raises IdentificationError where the corrected data do not determine the law, ParameterError for

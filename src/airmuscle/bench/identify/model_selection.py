@@ -277,21 +277,19 @@ def compare(
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
     candidates  by default `standard_candidates`, the laws whose initial values follow from the
-    data; of these, a law
-                that is not linear in its parameters is excluded as soon as its error shows that it
-                is not recommended
+                data; of these, a law that is not linear in its parameters is excluded as soon as
+                its error shows that it is not recommended
     leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or
-    BlockSplit(); it
-                defines the purpose of the ranking: the best law for other muscles is not the best
-                for the measured ones. By default the first of specimens, runs and levels with three
-                groups or more
+                BlockSplit(); it defines the purpose of the ranking: the best law for other muscles
+                is not the best for the measured ones. By default the first of specimens, runs and
+                levels with three groups or more
     loss        LeastSquares(), or a robust loss such as Huber(scale) with its scale in force [N];
-    all errors are then
-                rms errors of residuals that are limited to `loss.limit`, and a note states the
-                limit
+                all errors are then rms errors of residuals that are limited to `loss.limit`, and a
+                note states the limit
     workers     number of processes, for several of which a script needs `if __name__ ==
-    "__main__":`, or an executor progress    called with the name of each candidate and the
-    completed fraction, at the end with an empty name
+                "__main__":`, or an executor
+    progress    called with the name of each candidate and the completed fraction, at the end with
+                an empty name
 
     The recommended law is the one with the fewest parameters among those whose error is not larger
     than the lowest one by more than one standard error of the difference (Breiman et al.,

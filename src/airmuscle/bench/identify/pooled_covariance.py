@@ -196,7 +196,7 @@ def estimate_pooled_covariance(
 
     ratio      of the residual variance of a row to that of the effects
     deviation  standard deviation of a coefficient of the effects between specimens, with its
-    degrees of freedom
+               degrees of freedom
 
     The groups are the runs where each specimen has three or more. Otherwise they are successive
     parts of the runs, as few as determine the errors, if the rows follow in time or are correlated

@@ -56,8 +56,7 @@ class RecursiveFit(ShortRepr):
     degree      degree of the polynomial; (degree + 1)(degree + 2)/2 coefficients
     sigma       standard deviation of a force [N], used until the residuals determine it
     forgetting  weight of the information of all former samples at each sample, 1 for none lost;
-    less follows a muscle
-                that changes
+                less follows a muscle that changes
     """
 
     limits: BenchLimits

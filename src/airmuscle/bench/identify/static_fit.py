@@ -87,15 +87,15 @@ def fit(
 
     law         structure and initial values; parameters declared as not fitted keep their value
     recordings  one recording or several, with the columns pressure [Pa], contraction [1] and force
-    [N] loss        LeastSquares() or Huber(scale), the scale in the unit of the fitted quantity
+                [N]
+    loss        LeastSquares() or Huber(scale), the scale in the unit of the fitted quantity
     censoring   the range of force within which rows are measured values. By default rows at zero
-    force, at the clamp of
-                the law, or at the limit of the force sensor are censored: they contribute only
-                where the law violates their bound. `UNCENSORED` treats all rows as measured values
+                force, at the clamp of the law, or at the limit of the force sensor are censored:
+                they contribute only where the law violates their bound. `UNCENSORED` treats all
+                rows as measured values
     sigma       standard deviations of the rows, of which only the ratios matter. By default the
-    rows of different test
-                rigs are weighted by the standard deviations of their sensors; `sigma=1.0` weights
-                all rows equally
+                rows of different test rigs are weighted by the standard deviations of their
+                sensors; `sigma=1.0` weights all rows equally
     fixed       names of further parameters that keep their value
 
     Residuals are taken in the quantity that the law gives (force, contraction or pressure), and the

@@ -37,10 +37,13 @@ class AngleEstimate(ShortRepr):
 
     angle     (N, R, J) [rad] mean of the runs from all poses, corrected
     spread    (N, R, J) [rad] standard deviation of these runs: large where the joint has not moved
-    since the start band      (R, J) [rad] half-width that holds 95 % of the errors of the fitted
-    episodes at this row measured  (N, R, J) [rad]; `range` (J,) [rad] of the fitted angles between
-    their 1 and 99 % quantiles unseen    (J,) share of the rows where pressures alone do not
-    determine the angle: motion is needed to see it
+              since the start
+    band      (R, J) [rad] half-width that holds 95 % of the errors of the fitted episodes at this
+              row
+    measured  (N, R, J) [rad]; `range` (J,) [rad] of the fitted angles between their 1 and 99 %
+              quantiles
+    unseen    (J,) share of the rows where pressures alone do not determine the angle: motion is
+              needed to see it
     """
 
     angle: Array

@@ -84,9 +84,10 @@ class EpisodeMapping:
     """Contents of a file of episodes, as its mapping file states them.
 
     sample_time  [s], or None if `time` names a column [s]; starts: array with the first row of
-    every episode, where a file holds all of them; angles, speeds, pressures, commands: Channels;
-    pairs: for each joint the numbers, from 1, of the muscle that raises its angle and of its
-    antagonist; axes of the joints in the frames of their links.
+                 every episode, where a
+    file holds all of them; angles, speeds, pressures, commands: Channels; pairs: for each joint the
+    numbers, from 1, of the muscle that raises its angle and of its antagonist; axes of the joints
+    in the frames of their links.
     """
 
     angles: Channels

@@ -61,17 +61,15 @@ def fit_joint(
     """Identify a joint, or an arm of joints, from episodes of pressures and angles.
 
     pairs     for each joint the muscles, from 1, that raise and lower its angle; found from the
-    record unless given axes      axes of the joints in the frames of their links, (0, 0, 1) for z:
-    the inertial coupling of the links is
-              then identified; without them every joint has its own inertia
+              record unless given
+    axes      axes of the joints in the frames of their links, (0, 0, 1) for z: the inertial
+              coupling of the links is then identified; without them every joint has its own inertia
     left_out  share of the episodes, the last ones, on which the free run is judged; by default a
-    tenth, or 19 episodes
-              if that is more, but a third at most
+              tenth, or 19 episodes if that is more, but a third at most
     rows      horizon of the free run
     residual  whether a hybrid law is fitted to what physics leaves (GaussianResidual); a joint has
-    one if it gains 15 %
-              on fitted episodes held back, and loses at most 5 % on the 5 % of them farthest from
-              the data
+              one if it gains 15 % on fitted episodes held back, and loses at most 5 % on the 5 % of
+              them farthest from the data
     progress  called with one line after each stage
 
     Forces are linear in pressure with polynomials of the angle (LinearInPressure), friction sticks

@@ -98,9 +98,11 @@ class RegulatorLag:
     """Two first-order lags in series behind a limited level, row by row, for one muscle.
 
     c = clip(c + K u, c_min, c_max) where commands u are increments, c = clip(c_0 + K u, ...) where
-    they are levels; x += a_1 (c - x),   p += a_2 (x - p). While the pressure is measured, its error
-    e corrects c and x by k_c e and k_x e, and p is the reading. `values`: K, a_1, a_2, k_c, k_x,
-    c_min, c_max [1e5 Pa], and c_0; `delay` of the command in rows. The form is chosen.
+    they are levels;
+    x += a_1 (c - x),   p += a_2 (x - p). While the pressure is measured, its error e corrects c and
+                        x by k_c e and
+    k_x e, and p is the reading. `values`: K, a_1, a_2, k_c, k_x, c_min, c_max [1e5 Pa], and c_0;
+    `delay` of the command in rows. The form is chosen.
     """
 
     values: tuple[float, ...]
@@ -306,7 +308,8 @@ def fit_residual(
     back confirm.
 
     arm      with stick-slip; its pressures are those of the episodes, in their order, `delay` rows
-    later centres  number of the Gaussian functions
+             later
+    centres  number of the Gaussian functions
 
     Physics stays as it is. The ridge draws towards the residual of the joints before; of its
     weights that episodes held back confirm, the one with the smallest error of the joint there is

@@ -95,9 +95,10 @@ def fit_known_joint(
     library.
 
     arm   muscle i has the pressure i of the episodes, coordinate j their angle j; the search starts
-    from its values free  paths of its parameters, `zeros`, `gains` and `lags` for those of all
-    pressure readings; by default inertia,
-          damping, offset, weight and dry friction of the mechanism, the lags and the zeros
+          from its values
+    free  paths of its parameters, `zeros`, `gains` and `lags` for those of all pressure readings;
+          by default inertia, damping, offset, weight and dry friction of the mechanism, the lags
+          and the zeros
 
     The objective is the robust error of the free run over windows, with exact gradients. Gains and
     inertia together are separated by forces alone that do not grow with the pressure, such as that

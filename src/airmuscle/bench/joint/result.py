@@ -40,16 +40,21 @@ class ArmFit(Reported):
     arm          the arm along measured pressures, with the identified parameters
     inspection   of all episodes
     pairs        muscles, from 1, that raise and lower each angle; muscle 2j and 2j + 1 of `arm` are
-    the pair of joint j errors       (N, rows, J) [rad] of the free run on the episodes left out;
-    `episode` (N,) their numbers by_baseline  errors of the same windows by the name of the baseline
+                 the pair of joint j
+    errors       (N, rows, J) [rad] of the free run on the episodes left out; `episode` (N,) their
+                 numbers
+    by_baseline  errors of the same windows by the name of the baseline
     band         (rows, J) half-width of the band of the free run that holds 95 % of these errors
-    [rad] estimates    parameters with their standard errors remarks      what the record does not
-    separate, and what the fit left out fitted       number of the episodes, the first ones, of the
-    fit regulators   of the muscles of `arm`, between command and pressure; empty where the episodes
-    have no commands commanded    errors as `errors`, of the free run from the commands alone, or
-    None covariance   (P, P) of `estimates` [SI] along what the record separates; with others the
-    arm moves alike gain         errors of the physics alone and of the hybrid law, where one was
-    asked for, or None
+                 [rad]
+    estimates    parameters with their standard errors
+    remarks      what the record does not separate, and what the fit left out
+    fitted       number of the episodes, the first ones, of the fit
+    regulators   of the muscles of `arm`, between command and pressure; empty where the episodes
+                 have no commands
+    commanded    errors as `errors`, of the free run from the commands alone, or None
+    covariance   (P, P) of `estimates` [SI] along what the record separates; with others the arm
+                 moves alike
+    gain         errors of the physics alone and of the hybrid law, where one was asked for, or None
     """
 
     arm: PressureDriven

@@ -41,7 +41,7 @@ class RowReader:
     units.
 
     mapping  columns, units, constants and `skip_rows` of the stream; nothing else of a mapping
-    applies to one
+             applies to one
 
     `skipped` counts rows that could not be read, such as damaged lines. `notes` are those of
     `read_csv` on units.

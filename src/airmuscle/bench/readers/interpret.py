@@ -43,8 +43,7 @@ def interpret(
     overrides the file.
 
     constants  constants of this table, by default those of the mapping; the name of a quantity,
-    `length`, gives a
-               column with this value in every row
+               `length`, gives a column with this value in every row
 
     Raises ColumnError or UnitError; the message names file, row, value and remedy.
     """

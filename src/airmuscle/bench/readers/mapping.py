@@ -75,27 +75,29 @@ class ColumnMapping:
     the file.
 
     columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`;
-    `specimen` for
-               the names of the specimens, each of which is a recording; an empty text excludes the
-               column
+               `specimen` for the names of the specimens, each of which is a recording; an empty
+               text excludes the column
     units      units by quantity or heading: {"pressure": "kPa(a)"}
     resting_length, ambient, displacement_zero  constants of the runs, lengths [m] and a pressure
-    [Pa], or texts with a
-               unit: the length L0 without pressure and load, which allows conversion between length
-               and contraction; the ambient pressure, which is subtracted from absolute pressures;
-               and the reading of a displacement at the resting length
+                                                [Pa], or texts with a unit: the length L0 without
+                                                pressure and load, which allows conversion between
+                                                length and contraction; the ambient pressure, which
+                                                is subtracted from absolute pressures; and the
+                                                reading of a displacement at the resting length
     specimen   name of the specimen
     constants  further constants of the runs; a quantity, {"length": "7.3 cm"}, was held and becomes
-    a column file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in
-    FileNamePattern delimiter, decimal  of text files skip_rows  number of lines above the headings
-    of a text file or worksheet; by default they are detected, or found
-               by the headings that `columns` names
+               a column
+    file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in
+               FileNamePattern
+    delimiter, decimal  of text files
+    skip_rows  number of lines above the headings of a text file or worksheet; by default they are
+               detected, or found by the headings that `columns` names
     sheet      worksheet of an Excel file
     group      group of a TDMS or MDF file, struct of a MAT file
     time       RecordedTime(ordered=True), UniformTime() for stamps that the logger rounded, or
-    NoTime() missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with
-    the numbers and texts that
-               stand for missing values, such as -999
+               NoTime()
+    missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with the
+               numbers and texts that stand for missing values, such as -999
     drop_outliers  whether the rows of suspected outliers are left out
     """
 

@@ -60,8 +60,9 @@ def read(
     SI units; `-` is a table of text on the standard input, which may be a pipe.
 
     mapping       what the files do not state: a ColumnMapping, `ColumnMapping(resting_length="300
-    mm")`, or a TOML file downsampling  reduction of very long files, which a note reports progress
-    called with the name of a file and the fraction that has been read
+                  mm")`, or a TOML file
+    downsampling  reduction of very long files, which a note reports
+    progress      called with the name of a file and the fraction that has been read
 
     The extension gives the format: text (CSV), LVM, Excel, OpenDocument, MAT, TDMS, MDF, Parquet or
     HDF5. A load in kg becomes a force with standard gravity. Files whose units contradict each

@@ -23,8 +23,8 @@ class ExtendedKalmanFilter(StateEstimator):
     """Extended Kalman filter of a plant; its fields are those of StateEstimator.
 
         prediction   x^- = x + h phi(h A) f(x, u),   P^- = F P F^T + Q h,   F = exp(A h),   phi(z) =
-        (exp(z) - 1)/z correction   S = C P^- C^T + R,   K = P^- C^T S^-1,   x = x^- + K (y -
-        o(x^-)),
+                     (exp(z) - 1)/z
+        correction   S = C P^- C^T + R,   K = P^- C^T S^-1,   x = x^- + K (y - o(x^-)),
                      P = (I - K C) P^- (I - K C)^T + K R K^T
 
     f rates, o outputs of the plant, A and C their derivatives at the estimate, u inputs held over
@@ -61,7 +61,7 @@ class ExtendedKalmanFilter(StateEstimator):
         not for control.
 
             x_k^s = x_k + G (x_(k+1)^s - x_(k+1)^-),   G = P_k F_k^T (P_(k+1)^-)^-1,   backwards
-            from the last row
+                                                       from the last row
 
         For a linear plant it is the estimate with the least squares of all noise.
         Reference: Rauch, Tung and Striebel (1965).
@@ -149,10 +149,12 @@ class UnscentedKalmanFilter(StateEstimator):
     """Unscented Kalman filter of a plant; its first fields are those of StateEstimator.
 
         sigma points  X_0 = x,   X_i = x +- gamma (column i of L),   L L^T = P,   gamma^2 = alpha^2
-        (n + kappa) weights       W_i = 1/(2 gamma^2),   W_0 = 1 - n/gamma^2 of the mean,   W_0 + 1
-        - alpha^2 + beta of covariances prediction    x^- = sum W_i g(X_i),   P^- = sum W_i (g(X_i)
-        - x^-)(g(X_i) - x^-)^T + Q h correction    sigma points of x^- and P^-, Y_i = o(X_i),   S =
-        cov(Y, Y) + R,   K = cov(X, Y) S^-1,
+                      (n + kappa)
+        weights       W_i = 1/(2 gamma^2),   W_0 = 1 - n/gamma^2 of the mean,   W_0 + 1 - alpha^2 +
+                      beta of covariances
+        prediction    x^- = sum W_i g(X_i),   P^- = sum W_i (g(X_i) - x^-)(g(X_i) - x^-)^T + Q h
+        correction    sigma points of x^- and P^-, Y_i = o(X_i),   S = cov(Y, Y) + R,   K = cov(X,
+                      Y) S^-1,
                       x = x^- + K (y - y^-),   P = P^- - K S K^T
 
     g is the exponential Euler step of ExtendedKalmanFilter. No derivative of the outputs is used.

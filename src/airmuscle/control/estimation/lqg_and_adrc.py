@@ -143,8 +143,9 @@ def disturbance_observer(
     measurement.
 
     sampled     matrices of states (n, n), inputs (n, m), disturbances (n, d) and measured columns
-    (p, n) noise       covariance (n + d, n + d) of the process noise of a sample deviations
-    standard deviations (p,) of the measured columns
+                (p, n)
+    noise       covariance (n + d, n + d) of the process noise of a sample
+    deviations  standard deviations (p,) of the measured columns
     """
     a, b, by_disturbance, c = sampled
     n, d = by_disturbance.shape
@@ -214,16 +215,18 @@ def design_lqg(
     sample time [s].
 
     measured, controlled    columns that the observer uses, and those with a set point; controlled
-    ones are measured permitted               maximum permitted deviation of states and inputs, for
-    Bryson's rule: weight 1/d^2; every
-                            input needs one, a state without one has the weight 0
+                            ones are measured
+    permitted               maximum permitted deviation of states and inputs, for Bryson's rule:
+                            weight 1/d^2; every input needs one, a state without one has the weight
+                            0
     permitted_integral      the same for the integral of the error of every controlled column [unit
-    s] disturbed               instead of integrals: states to whose rate an unknown constant is
-    added, which the observer
-                            estimates ("speed.disturbance") and the command compensates; the set
-                            point has a gain
+                            s]
+    disturbed               instead of integrals: states to whose rate an unknown constant is added,
+                            which the observer estimates ("speed.disturbance") and the command
+                            compensates; the set point has a gain
     process_noise           standard deviation of states after 1 s of noise, also of disturbances;
-    others have none measurement_noise       standard deviation of every measured column
+                            others have none
+    measurement_noise       standard deviation of every measured column
 
     The plant is discretised exactly for held inputs; cost and process noise are discretised to
     first order in the sample time. The gains are those of the discrete algebraic Riccati equations.
@@ -323,10 +326,11 @@ def design_adrc(
     gain                 b_0, n-th derivative of the measured column by the command
     bandwidth            omega_c [rad/s] of the controller: poles of the closed loop at -omega_c
     observer_bandwidth   omega_o [rad/s] of the observer of y, its derivatives and f: poles at
-    exp(-omega_o h) operating_point      measured column and command that belong together
+                         exp(-omega_o h)
+    operating_point      measured column and command that belong together
 
         u = (k_1 (r - x_1) - k_2 x_2 - ... - k_n x_n - f)/b_0,    k_i coefficients of (s +
-        omega_c)^n
+            omega_c)^n
 
     Raises ParameterError for another order, a gain of 0, or a bandwidth that is not positive.
     References: Han (2009); Gao (2003) for the bandwidths as parameters.

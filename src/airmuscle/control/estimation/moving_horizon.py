@@ -51,7 +51,7 @@ class MovingHorizonEstimator(ShortRepr):
     noise, within bounds.
 
         min  |x_0 - x^-|_(P^-1)^2 + sum_k |w_k|_(Q^-1)^2 + sum_k |y_k - o(x_k)|_(R^-1)^2   over x_0,
-        w_0 ... w_(N-1)
+             w_0 ... w_(N-1)
              x_(k+1) = g(x_k, u_k) + w_k,    x_min <= x_k <= x_max
 
     g step, o outputs of the plant, Q and R noise of the extended Kalman filter `filter`; x^- and P

@@ -81,7 +81,7 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
 
         f(x_s, u_s, d) = 0,   min |z(x_s) - r|^2 w + |u_s - u_0|_R^2                       target
         min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho |s|^2           over u_0
-        ... u_(N-1), s >= 0
+             ... u_(N-1), s >= 0
              x_(k+1) = Phi(x_k, u_k, d),   u_min <= u_k <= u_max,   y_min - s <= y(x_k) <= y_max + s
 
     f rates of the plant with the estimated disturbances d, Phi classical Runge-Kutta steps over a
@@ -96,14 +96,19 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
     after its end the present input; `notes` states how often.
 
     estimator    ExtendedKalmanFilter or UnscentedKalmanFilter without parameters, with the sample
-    time of the loop first        estimate before the first sample, as `estimator.start` gives
+                 time of the loop
+    first        estimate before the first sample, as `estimator.start` gives
     operating_inputs   values of all inputs of the plant at the first estimate; those not commanded
-    are held there controlled   columns with a set point commanded    inputs that the controller
-    commands permitted    maximum permitted deviation of states and commanded inputs; every
-    commanded input needs one limits       minimum and maximum of columns, such as {"pressure": (0,
-    5e5)} slack_weight weight of the squared violation relative to the size of its range; infinity
-    makes the limits hard horizon      number N of samples substeps     Runge-Kutta steps of a
-    sample
+                       are held there
+    controlled   columns with a set point
+    commanded    inputs that the controller commands
+    permitted    maximum permitted deviation of states and commanded inputs; every commanded input
+                 needs one
+    limits       minimum and maximum of columns, such as {"pressure": (0, 5e5)}
+    slack_weight weight of the squared violation relative to the size of its range; infinity makes
+    the limits hard
+    horizon      number N of samples
+    substeps     Runge-Kutta steps of a sample
 
     Raises ParameterError for unknown names, numbers that are not positive, or limits without a
     range. Reference: Rawlings, Mayne and Diehl (2017), chapters 1, 2 and 8.
@@ -228,9 +233,11 @@ class FiniteControlSet(EstimatingController):
     estimator       ExtendedKalmanFilter or UnscentedKalmanFilter, with the sample time of the loop
     first           estimate before the first sample, as `estimator.start` gives
     modes           inputs by name, such as ({"fill": 0, "discharge": 0}, {"fill": 1, "discharge":
-    0}, ...) permitted       permitted deviation of every controlled column, which is the set
-    point's name switching_cost  cost of the change of one input relative to one sample with the
-    permitted deviation (chosen) horizon         number N of samples
+                    0}, ...)
+    permitted       permitted deviation of every controlled column, which is the set point's name
+    switching_cost  cost of the change of one input relative to one sample with the permitted
+                    deviation (chosen)
+    horizon         number N of samples
 
     Raises ParameterError for unknown names, modes without a common set of inputs, or too many
     sequences. Reference: Qi, Bone and Zhang (2019).

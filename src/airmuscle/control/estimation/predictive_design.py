@@ -50,25 +50,27 @@ def design_predictive(
     samples.
 
     measured, controlled    columns that the observer uses, and those with a set point; controlled
-    ones are measured disturbed               states to whose rate an unknown disturbance is added:
-    as many as measured columns permitted               maximum permitted deviation of states and
-    inputs, for Bryson's rule: weight 1/d^2; every
-                            input needs one, a state without one has the weight 0
+                            ones are measured
+    disturbed               states to whose rate an unknown disturbance is added: as many as
+                            measured columns
+    permitted               maximum permitted deviation of states and inputs, for Bryson's rule:
+                            weight 1/d^2; every input needs one, a state without one has the weight
+                            0
     process_noise           standard deviation of states after 1 s of noise, also of disturbances
-    ("speed.disturbance") measurement_noise       standard deviation of every measured column limits
-    minimum and maximum of columns without direct feedthrough, such as {"pressure": (0, 5e5)}
+                            ("speed.disturbance")
+    measurement_noise       standard deviation of every measured column
+    limits                  minimum and maximum of columns without direct feedthrough, such as
+                            {"pressure": (0, 5e5)}
     slack_weight            weight of the squared violation of a limit relative to the size of its
-    range; infinity makes
-                            the limits hard
+                            range; infinity makes the limits hard
     blocks                  numbers of samples over which the planned inputs are held, one after the
-    other (move
-                            blocking); together the horizon, which is their sum where they are given
+                            other (move blocking); together the horizon, which is their sum where
+                            they are given
     max_rate                maximum rate of inputs, in their units over 1 s
     bounded                 greatest size of a disturbance of the rates of states, any value at each
-    sample: all limits
-                            are narrowed by what it reaches under the regulator until then, so that
-                            a plan that keeps them is followed by another one. Errors of the
-                            observer and a terminal set are left out
+                            sample: all limits are narrowed by what it reaches under the regulator
+                            until then, so that a plan that keeps them is followed by another one.
+                            Errors of the observer and a terminal set are left out
 
     Plant and disturbances are discretised exactly for held inputs. Raises ParameterError for an
     unknown name, a number that is not positive, set points that the inputs cannot keep, columns

@@ -48,7 +48,7 @@ class PredictiveProgram:
 
     inputs      values of all inputs of the plant; the commanded ones are replaced
     weights, terminal    (n, n) of the states of each sample and of the last one; those of the
-    inputs are 1
+                         inputs are 1
     """
 
     def __init__(self, controller: Any, inputs: Sequence[float]) -> None:

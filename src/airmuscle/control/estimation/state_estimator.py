@@ -88,15 +88,15 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     measured           columns of the plant, such as ("left.pressure", "right.pressure")
     process_noise      standard deviation of estimated states after 1 s of white noise; others have
-    none measurement_noise  standard deviation of every measured column parameters
-    parameters of the plant that are estimated as further states, such as "mechanism.mass"
+                       none
+    measurement_noise  standard deviation of every measured column
+    parameters         parameters of the plant that are estimated as further states, such as
+                       "mechanism.mass"
     disturbances       states to whose rate an unknown constant is added and estimated, such as
-    "speed"; the estimated
-                       state is "speed.disturbance", in the unit of the rate
+                       "speed"; the estimated state is "speed.disturbance", in the unit of the rate
     gate               probability with which a true measurement is used; beyond that quantile of
-    the chi-squared
-                       distribution of its normalised square an innovation is an outlier, which
-                       corrects nothing
+                       the chi-squared distribution of its normalised square an innovation is an
+                       outlier, which corrects nothing
 
     Parameters and disturbances follow a random walk by their process noise. Calls from several
     threads are permitted. Raises ParameterError for an unknown name or a number that is not

@@ -85,7 +85,7 @@ class Multirate(EnclosingLaw):
     commands.
 
         Cascade(Multirate(PID("position", "pressure", ...), 10), PID("pressure", ...), (0.0,),
-        (5e5,))
+            (5e5,))
 
     in a loop of 1 kHz has a pressure control of 1 kHz and a position control of 100 Hz. n `every`;
     the law sees the sample time n h. Its first sample is that of the loop. Reference: Franklin,

@@ -27,7 +27,7 @@ class HysteresisOperator:
     either side. The inverse is x = sum w'_i P_r'i[S'(y)], with
 
         w'_0 = 1/w_0,   w'_i = -w_i/(W_i W_(i-1)),   W_i = w_0 + ... + w_i,   r'_i = sum_(j <= i)
-        w_j (r_i - r_j)
+                        w_j (r_i - r_j)
 
     and the same formula for the weights and thresholds of S' on each side; play i of the inverse
     starts at z'_i = sum_(j <= i) w_j z_i + sum_(j > i) w_j z_j. Plays start at 0 here. Input and

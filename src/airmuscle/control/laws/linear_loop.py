@@ -40,12 +40,17 @@ class Margins:
     """Distances of a stable loop from instability; L is the open loop, f frequencies [Hz].
 
     gain          smallest factor above 1 by which the gain may rise, 1/|L| where L is negative;
-    infinite: any lower_gain    greatest factor below 1 to which the gain may fall; 0: any
-    gain_frequency    [Hz] of the smallest factor; NaN where there is none phase         smallest
-    angle to -1 [rad] where |L| = 1; infinite where there is no such frequency phase_frequency
-    [Hz] of that; NaN where there is none delay         smallest further dead time [s] at which the
-    loop becomes unstable, phase/(2 pi f); infinite: any peak          sensitivity peak, the
-    greatest |1/(1 + L)|; its reciprocal is the distance of L from -1 peak_frequency    [Hz]
+                  infinite: any
+    lower_gain    greatest factor below 1 to which the gain may fall; 0: any
+    gain_frequency    [Hz] of the smallest factor; NaN where there is none
+    phase         smallest angle to -1 [rad] where |L| = 1; infinite where there is no such
+                  frequency
+    phase_frequency   [Hz] of that; NaN where there is none
+    delay         smallest further dead time [s] at which the loop becomes unstable, phase/(2 pi f);
+                  infinite: any
+    peak          sensitivity peak, the greatest |1/(1 + L)|; its reciprocal is the distance of L
+                  from -1
+    peak_frequency    [Hz]
     """
 
     gain: float
@@ -316,14 +321,13 @@ def linearise_loop(
     """A control loop linearised at a state, by exact derivatives of plant and law.
 
     inputs         of the plant at the working point; those of the control_state or 0 unless given.
-    The memory of the
-                   law (if that does not suffice, its set points) is changed so that it commands
-                   them
+                   The memory of the law (if that does not suffice, its set points) is changed so
+                   that it commands them
     control_state  of a run that ends there (`Solution.control_state`): the memory of the law;
-    otherwise it is that
-                   after the first sample, in which integrals are where the law starts them
+                   otherwise it is that after the first sample, in which integrals are where the law
+                   starts them
     delay          dead time [s] between command and input, of all inputs or by name, such as that
-    of the computer
+                   of the computer
 
     Sensors have neither noise nor steps. A driver counts as its mean: the opening is the command.
     Set points that are measured columns are their values. Raises ParameterError for a controller

@@ -111,9 +111,11 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     cost.
 
         x^_k = x^-_k + L (y_k - y_0 - C x^-_k),   x^ = (x, d)                      observer with
-        disturbances d x_s = A x_s + B u_s + B_d d,   C_z x_s = r - z_0
-        target, the smallest one min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho
-        |s|^2    over u_0 ... u_(N-1) and s >= 0
+                                                  disturbances d
+        x_s = A x_s + B u_s + B_d d,   C_z x_s = r - z_0                            target, the
+                                       smallest one
+        min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho |s|^2    over u_0 ...
+             u_(N-1) and s >= 0
              u_min + b_k <= u_k <= u_max - b_k,   z_min + c_k - s <= C_l x_k <= z_max - c_k + s,
              |u_k - u_(k-1)| <= R h,   u_k constant over each block of samples
 

@@ -93,7 +93,7 @@ def benchmark_contender(
     """A contender with one search for each seed: tuned, commissioned on each truth, and its runs.
 
     tuned_as  the results, with the same seeds, of the contender whose gains it takes; otherwise
-    that one is tuned here
+              that one is tuned here
     """
     progress = progress or (lambda text, done, total: None)
     tunings = [(each.tuning, each.restarts) for each in tuned_as] or search_gains(

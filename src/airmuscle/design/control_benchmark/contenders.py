@@ -86,10 +86,10 @@ class SensedController(Controller):
     sensors     of all columns that controller and actuation measure
     controller  commands half the pressure difference, both pressures, or the valves
     actuation   law from these commands, as set points `commanded.<input>`, to the valves, which
-    remembers them as they
-                are attained: the controller goes on as if it had commanded those
+                remembers them as they are attained: the controller goes on as if it had commanded
+                those
     ranges      minimum and maximum [SI] of the controller's commands; those of the plant unless
-    given
+                given
     """
 
     sensors: WithSensors
@@ -157,20 +157,18 @@ class Contender:
 
     name     for tables
     law      a ControlLaw, which is compiled with the plant, or another Controller, which is called
-    at each sample. It
-             commands half the pressure difference (`difference`), both pressures (`left.pressure`,
-             `right.pressure`) or the valves. It may measure the angle, the angular speed and both
-             pressures. Its set points are names of TaskSignals: `angle`, `angular_speed`,
-             `angular_acceleration`, `mean_pressure`, `stiffness`, `feed_forward`,
+             at each sample. It commands half the pressure difference (`difference`), both pressures
+             (`left.pressure`, `right.pressure`) or the valves. It may measure the angle, the
+             angular speed and both pressures. Its set points are names of TaskSignals: `angle`,
+             `angular_speed`, `angular_acceleration`, `mean_pressure`, `stiffness`, `feed_forward`,
              `feed_forward_rate`
     bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without
-    bounds, and with a law
-             that commands the valves, nothing is tuned
+             bounds, and with a law that commands the valves, nothing is tuned
     commissioned  the same of the gains that are sought afterwards on each truth, by the same
-    routine and number of runs
-             for all contenders; none: the contender is not commissioned
+                  routine and number of runs for all contenders; none: the contender is not
+                  commissioned
     tuned_as  a contender whose tuned gains it takes, by the ends of their paths, in place of its
-    own tuning
+              own tuning
     """
 
     name: str

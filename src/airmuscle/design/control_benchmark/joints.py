@@ -48,15 +48,20 @@ class BenchmarkJoint(ShortRepr):
     model           the plant as the controllers know it: feed-forward, inverse, tuning
     family          perturbed models with their names, for which controllers are tuned
     truths          on which they are judged, of other classes of characteristic, valve, friction
-    and gas sensors         sensors of the columns that controllers may measure, with their dead
-    time sample_time     [s] mean_pressure   mean gauge pressure of the pair [Pa] min_pressure,
-    max_pressure    range of the commanded pressures [Pa] drivers         of the valves as assumed
-    in tuning switching       whether the valves are on/off valves objective       of tuning: rms
-    error [degree] over the family with weights of air [kg/s] and travel [strokes/s] valve
-    description of the valves with their size pressure_gains  range of the gain of the inner
-    pressure control [1/Pa] (chosen) tuning_tasks    for which controllers are tuned
+                    and gas
+    sensors         sensors of the columns that controllers may measure, with their dead time
+    sample_time     [s]
+    mean_pressure   mean gauge pressure of the pair [Pa]
+    min_pressure, max_pressure    range of the commanded pressures [Pa]
+    drivers         of the valves as assumed in tuning
+    switching       whether the valves are on/off valves
+    objective       of tuning: rms error [degree] over the family with weights of air [kg/s] and
+                    travel [strokes/s]
+    valve           description of the valves with their size
+    pressure_gains  range of the gain of the inner pressure control [1/Pa] (chosen)
+    tuning_tasks    for which controllers are tuned
     commissioning_tasks    for which they are commissioned on a truth; the default tuning tasks
-    unless given
+                           unless given
     """
 
     name: str

@@ -359,15 +359,15 @@ def benchmark_controllers(
     joint               model, family, truths, sensors
     tasks               STANDARD_TASKS unless given
     seeds               of the searches and of the noise: one search each, which `search_gains` may
-    restart sets_per_gain       sets of gains that a search evaluates at most for each gain; it ends
-    before where it has
-                        converged. 0: none is tuned
+                        restart
+    sets_per_gain       sets of gains that a search evaluates at most for each gain; it ends before
+                        where it has converged. 0: none is tuned
     commissioning_runs  runs of each contender on a truth for the group `commissioned`; 0: there is
-    none progress            called with the name of the present step, the number done and their
-    number workers             number of processes, for several of which a script needs `if __name__
-    == "__main__":`, or an
-                        executor: a contender with all its searches is a task. The result does not
-                        depend on it
+                        none
+    progress            called with the name of the present step, the number done and their number
+    workers             number of processes, for several of which a script needs `if __name__ ==
+                        "__main__":`, or an executor: a contender with all its searches is a task.
+                        The result does not depend on it
 
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does
     not suit the joint.

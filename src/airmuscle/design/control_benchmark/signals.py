@@ -191,15 +191,20 @@ class TrackingMetrics:
     """Metrics of one run of a task; NaN where a metric does not exist for the task.
 
     rmse, max_error    root mean square and largest magnitude of the error r - y [degree], from the
-    task's begin on itae                integral of (t - t_begin) |e| [degree s^2] settling
-    time from the event until the error remains within 0.5 degrees [s]; infinite if it does not
-    overshoot           largest excess over the final set point [%] of the motion's change steady
-    mean magnitude of the error over the last 0.3 s [degree]; NaN for a sine air                 air
-    drawn from the supply, as litres of reference atmosphere per second [l/s (ANR)] strokes
-    opening travel of all valves [full strokes/s]; for on/off valves openings and closings
+                       task's begin on
+    itae                integral of (t - t_begin) |e| [degree s^2]
+    settling            time from the event until the error remains within 0.5 degrees [s]; infinite
+                        if it does not
+    overshoot           largest excess over the final set point [%] of the motion's change
+    steady              mean magnitude of the error over the last 0.3 s [degree]; NaN for a sine
+    air                 air drawn from the supply, as litres of reference atmosphere per second [l/s
+                        (ANR)]
+    strokes             opening travel of all valves [full strokes/s]; for on/off valves openings
+                        and closings
     valve_life          of the busiest valve at this rate and 5e8 full strokes, one closing for each
-    opening [h] stiffness_error     rms of the stiffness of the truth over that wanted, less 1 [%],
-    over the last 0.3 s
+                        opening [h]
+    stiffness_error     rms of the stiffness of the truth over that wanted, less 1 [%], over the
+                        last 0.3 s
     """
 
     rmse: float = _metric("rms error", "rad", "deg")

@@ -138,11 +138,11 @@ class ControlTask:
     duration   of the run [s]
     begin      from which on the errors are judged [s]
     event      time of a step, a disturbance or the end of a motion [s], from which settling is
-    counted; None: no
-               settling
+               counted; None: no settling
     torque     points (time [s], torque [N m]) of the external torque, linear between them
     stiffening points (time [s], pressure [Pa]) that are added to the mean pressure of the pair,
-    linear between them stuck      a valve that sticks
+    linear between them
+    stuck      a valve that sticks
     """
 
     name: str

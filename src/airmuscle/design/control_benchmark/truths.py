@@ -112,8 +112,9 @@ class BenchmarkTruth(ShortRepr):
 
     name         of the truth in tables
     plant        with classes of characteristic, friction, valve and gas that neither the model nor
-    its family has drivers      of the valves extra_delay  dead time of all sensors that nobody
-    knows, in samples, beside the stated one
+                 its family has
+    drivers      of the valves
+    extra_delay  dead time of all sensors that nobody knows, in samples, beside the stated one
     """
 
     name: str
@@ -129,14 +130,18 @@ def random_truth(seed: int, conductance: float, *, switching: bool = False) -> B
     more than 3:
 
         characteristic   Sarosi2012 (two fits) or TonduLopez2000 (end correction 1.1 to 1.35, radius
-        9.5 to 10.5 mm) friction         LuGre (static friction up to 40 % more), BoucWen or
-        MaxwellSlip, 4 to 25 N for each muscle valve            SubsonicIndexValve (b 0.2 to 0.45, m
-        0.45 to 0.65) or IsentropicNozzle, flow factor 0.55 to 1.1 gas              EnergyBalance
-        (0.3 to 3 W/K), WallHeatTransfer (10 to 60 W/(m2 K)) or Isothermal tube             none, or
-        0.2 to 1 m with an inner diameter of 4 to 6 mm joint            inertia 0.8 to 1.6, weight
-        0.6 to 1.5, offset of the pulleys 0.9 to 1.1 of the model's damper           150 to 400 N
-        s/m dead time        0 to 2 samples more than stated; on/off valves 1 to 2 ms in place of 1
-        ms
+                         9.5 to 10.5 mm)
+        friction         LuGre (static friction up to 40 % more), BoucWen or MaxwellSlip, 4 to 25 N
+                         for each muscle
+        valve            SubsonicIndexValve (b 0.2 to 0.45, m 0.45 to 0.65) or IsentropicNozzle,
+                         flow factor 0.55 to 1.1
+        gas              EnergyBalance (0.3 to 3 W/K), WallHeatTransfer (10 to 60 W/(m2 K)) or
+                         Isothermal
+        tube             none, or 0.2 to 1 m with an inner diameter of 4 to 6 mm
+        joint            inertia 0.8 to 1.6, weight 0.6 to 1.5, offset of the pulleys 0.9 to 1.1 of
+                         the model's
+        damper           150 to 400 N s/m
+        dead time        0 to 2 samples more than stated; on/off valves 1 to 2 ms in place of 1 ms
     """
     random = np.random.default_rng(seed)
     friction = _friction(random)

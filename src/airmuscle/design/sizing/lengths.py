@@ -248,7 +248,8 @@ class JointSearch:
     requirement.
 
         n r (F_max(eps_c) - F_min(eps_e)) >= S_F M,   n r (F_max(eps_e) - F_min(eps_c)) >= S_F (M +
-        M_J), eps_c - eps_e = r Theta/L,   2 r >= 1.1 D(eps_c)
+                                                      M_J),
+        eps_c - eps_e = r Theta/L,   2 r >= 1.1 D(eps_c)
 
     at either end of the range; eps_c, eps_e contraction of the contracted and the extended muscle,
     F_max capacity, F_min force at the least pressure, M_J torque that accelerates the inertia,

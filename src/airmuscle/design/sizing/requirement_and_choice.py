@@ -213,12 +213,13 @@ class MuscleDesign(ShortRepr):
     """Design of one requirement: end points of a muscle, pulley radius and force reserve.
 
     extended    end point at which the muscle is long: start of the lift, stretched muscle of the
-    joint contracted  end point at which the muscle is short reserve     least capacity divided by
-    the need, minus 1, along the stroke of a lift and at the ends of the range of
-                a joint; at least the safety factor minus 1
+                joint
+    contracted  end point at which the muscle is short
+    reserve     least capacity divided by the need, minus 1, along the stroke of a lift and at the
+                ends of the range of a joint; at least the safety factor minus 1
     radius      pulley radius [m] of a joint; None for a lift
     radii       minimum and maximum pulley radius [m] of a muscle that is a tenth longer; None for a
-    lift
+                lift
     """
 
     extended: EndPoint

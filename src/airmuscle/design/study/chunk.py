@@ -175,7 +175,8 @@ def run_study(
     runs.
 
     folder    None: nothing is saved, for an executor that keeps all results, as that of a shared
-    folder does executor  any executor of concurrent.futures; by default this process itself
+              folder does
+    executor  any executor of concurrent.futures; by default this process itself
     progress  called with the number of completed runs and the total number of runs
 
     The result does not depend on the executor. Completed chunks are saved, even if the study is

@@ -39,9 +39,10 @@ class StudyResult(Reported):
     """The results of all runs of a study.
 
     scalars          scalar metrics (N, k), in the order of `study.scalars`; NaN if a run does not
-    have the metric time_series      time series by name (N, T), at the times
-    `study.time_series[name].times` failure_reasons  reason of each failed run (N,); empty for other
-    runs nominal          scalar metrics of the nominal scenario, without variations
+                     have the metric
+    time_series      time series by name (N, T), at the times `study.time_series[name].times`
+    failure_reasons  reason of each failed run (N,); empty for other runs
+    nominal          scalar metrics of the nominal scenario, without variations
     """
 
     study: Study

@@ -1,13 +1,13 @@
 """Variance-based sensitivity indices (Sobol indices) of a study, as table and as bars.
 
 First order   S_i = V(E(f | x_i)) / V(f)              fraction of the variance removed if x_i were
-known total         T_i = 1 - V(E(f | x_others)) / V(f)     fraction that remains if only x_i were
-unknown
+              known
+total         T_i = 1 - V(E(f | x_others)) / V(f)     fraction that remains if only x_i were unknown
 
 estimated from the runs A, B and A with column i from B (the design Saltelli), with f centred about
 its mean:
     S_i = mean(f_B (f_ABi - f_A)) / V,   T_i = mean((f_A - f_ABi)^2) / (2 V),   V = variance of f_A
-    and f_B together.
+                                         and f_B together.
 The T_i are not negative, and their sum is at least 1; the sum of the S_i is at most 1; T_i - S_i is
 the contribution of the interactions of x_i with other parameters. Estimates of small S_i may be
 negative.

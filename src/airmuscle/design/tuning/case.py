@@ -120,8 +120,7 @@ class LoopCase(ShortRepr):
     plant, loop      any plant, and the loop that closes it
     initial_state    a value for each state [SI]; the equilibrium at ambient pressure unless given
     controller_path  place of the tuned controller within `loop.controller`, such as `law` for a
-    WithSensors around it;
-                     empty if it is the controller itself
+                     WithSensors around it; empty if it is the controller itself
 
     Cases with the same loop object and plants of one structure are simulated in one batch.
     """

@@ -30,8 +30,7 @@ class TrackingIndex(abc.ABC):
     the plant.
 
     scales  column and the size [SI] by which its error is divided. Without scales the only set
-    point that is a column
-            of the plant is used, and the index has its unit
+            point that is a column of the plant is used, and the index has its unit
     begin   the error before this time [s] from the start of the run is not counted
 
     With several columns, the magnitude of the error at one instant is sqrt(sum (e/scale)^2). The
@@ -147,11 +146,11 @@ class CaseMetrics(ShortRepr):
 
     index        tracking index; infinite where a run failed
     air          air drawn by the muscles [kg/s]: sum of the increments of their air masses from
-    sample to sample,
-                 divided by the duration. Air that passes through a leak is not in it
+                 sample to sample, divided by the duration. Air that passes through a leak is not in
+                 it
     travel       travel of the commands in strokes, the ranges of their inputs, summed over the
-    inputs [strokes/s]; an
-                 on/off valve makes one stroke at each opening and each closing
+                 inputs [strokes/s]; an on/off valve makes one stroke at each opening and each
+                 closing
     completed    whether the run reached its end with finite columns
     """
 

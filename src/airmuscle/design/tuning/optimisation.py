@@ -137,18 +137,21 @@ def tune(
 
     cases       the family: LoopCase with the same controller; the first one is the nominal case
     bounds      minimum and maximum [SI] of each gain by its path in the controller; see `GainRange`
-    for the scale duration    of each run [s] index       tracking index of a run, evaluated at the
-    sampling instants objective   from the metrics (E, M) of E sets of gains in M cases to values
-    (E,); smaller is better budget      maximum number of simulated loops: sets of gains times cases
-    seed        of the optimiser; the same seed gives the same result on any number of cores start
-    sets of gains for the first generation, such as those of tuning rules; the present gains of the
-                controller are always among them if they are within the bounds, so that the result
-                is never worse
+                for the scale
+    duration    of each run [s]
+    index       tracking index of a run, evaluated at the sampling instants
+    objective   from the metrics (E, M) of E sets of gains in M cases to values (E,); smaller is
+                better
+    budget      maximum number of simulated loops: sets of gains times cases
+    seed        of the optimiser; the same seed gives the same result on any number of cores
+    start       sets of gains for the first generation, such as those of tuning rules; the present
+                gains of the controller are always among them if they are within the bounds, so that
+                the result is never worse
     start_time, integrator  as in simulate_batch
     progress    called with the number of loops simulated so far, and the budget
     workers     number of processes, for several of which a script needs `if __name__ ==
-    "__main__":`, or an executor;
-                by default this process, which uses all cores. The result does not depend on it
+                "__main__":`, or an executor; by default this process, which uses all cores. The
+                result does not depend on it
 
     The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every
     controller. The first generation are Sobol points, from whose best one a descent begins; further

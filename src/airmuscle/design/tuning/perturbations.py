@@ -42,10 +42,12 @@ class Perturbations:
     """Perturbations of the nominal plant, each of which gives one case; all defaults are chosen.
 
     loads     factors of the load: mass, inertia, weight torque, payload and force of the mechanism
-    together supplies  factors of the supply pressure leak      conductance of a leak at every
-    muscle, as a share of the largest conductance of its circuit; 0: none delay     dead time of all
-    measurements, in samples; 0: none draws     number of random draws of fitted parameters, from
-    their covariance in the muscle files
+              together
+    supplies  factors of the supply pressure
+    leak      conductance of a leak at every muscle, as a share of the largest conductance of its
+              circuit; 0: none
+    delay     dead time of all measurements, in samples; 0: none
+    draws     number of random draws of fitted parameters, from their covariance in the muscle files
     """
 
     loads: tuple[float, ...] = (0.5, 2.0)
@@ -87,12 +89,12 @@ def perturbed_family(
     """The nominal case and one case for each perturbation.
 
     initial_state   function from a perturbed plant to its initial state; None is equilibrium at
-    ambient pressure uncertainties   of the fitted parameters of each muscle, as
-    `load(name).uncertainty`. Muscles with equal
-                    uncertainty have equal deviations, because their parameters come from one fit
+                    ambient pressure
+    uncertainties   of the fitted parameters of each muscle, as `load(name).uncertainty`. Muscles
+                    with equal uncertainty have equal deviations, because their parameters come from
+                    one fit
     fitted          of the parameters of an identified plant, as `load_scenario(path).uncertainty`;
-    draws of them are
-                    limited to the declared ranges
+                    draws of them are limited to the declared ranges
     seed            of the random draws
 
     A perturbation that the plant does not have, such as the load of an isometric muscle, is stated

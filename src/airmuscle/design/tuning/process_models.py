@@ -126,8 +126,7 @@ def first_order_of_step(
     time, output  rows (N,); the last tenth of the output is its final value
     step          size of the step [u]
     step_time     time of the step [s]; the mean of the rows until then is the initial value. By
-    default the first row
-                  is that of the step, and the initial value is this row alone
+                  default the first row is that of the step, and the initial value is this row alone
 
     T = 1.5 (t_63 - t_28), L = t_63 - T. Raises ParameterError for an output that does not settle or
     does not change.
@@ -174,8 +173,9 @@ def ultimate_point(
     function.
 
     time, output  rows (N,) of the oscillation; its last half counts, which must contain two periods
-    or more amplitude     d, half the difference between both commands of the relay [u] hysteresis
-    e, half the width of the relay's hysteresis [y]
+                  or more
+    amplitude     d, half the difference between both commands of the relay [u]
+    hysteresis    e, half the width of the relay's hysteresis [y]
 
     a is half the range of the periodic waveform, so that the noise of the rows does not enlarge it.
     The describing function supposes a sine. For first order with dead time L and time constant T,

@@ -35,9 +35,11 @@ class Tuning(Reported):
 
     cases, ranges    for which and within which the gains were sought
     index, scales    tracking index, and the controlled columns of the nominal case with their
-    scales criterion        the objective, a function of CaseMetrics history          every set of
-    gains that was simulated start            1 if the history begins with the present gains of the
-    controller, otherwise 0 converged        whether the two best descents of the search agree
+                     scales
+    criterion        the objective, a function of CaseMetrics
+    history          every set of gains that was simulated
+    start            1 if the history begins with the present gains of the controller, otherwise 0
+    converged        whether the two best descents of the search agree
     interrupted      whether the user stopped the search
     """
 

@@ -48,7 +48,7 @@ def ziegler_nichols(point: UltimatePoint, *, derivative: bool = True) -> RuleSet
     """Settings of a PID or PI controller from the ultimate point (Ziegler and Nichols 1942):
 
         K = 0.6 K_u,  T_i = T_u/2,  T_d = T_u/8      PID;        K = 0.45 K_u,  T_i = T_u/1.2
-        PI
+                      PI
 
     They aim at a decay of 1/4 for each period, and are the fastest and least damped of the rules.
     """
@@ -63,7 +63,7 @@ def tyreus_luyben(point: UltimatePoint, *, derivative: bool = True) -> RuleSetti
     """Settings of a PID or PI controller from the ultimate point (Tyreus and Luyben 1992):
 
         K = K_u/2.2,  T_i = 2.2 T_u,  T_d = T_u/6.3      PID;        K = K_u/3.2,  T_i = 2.2 T_u
-        PI
+                      PI
 
     They are slower and better damped than those of Ziegler and Nichols.
     """
@@ -102,7 +102,8 @@ def amigo_pi(model: ProcessModel) -> RuleSettings:
     """AMIGO settings of a PI controller (Åström and Hägglund 2004):
 
         K = 0.15/K_p + (0.35 - L T/(L + T)^2) T/(K_p L),    T_i = 0.35 L + 13 L T^2/(T^2 + 12 L T +
-        7 L^2) K = 0.35/(K_v L),    T_i = 13.4 L                   integrator
+                                                            7 L^2)
+        K = 0.35/(K_v L),    T_i = 13.4 L                   integrator
 
     Raises ParameterError for a model without dead time.
     """
@@ -124,7 +125,8 @@ def amigo_pid(model: ProcessModel) -> RuleSettings:
     """AMIGO settings of a PID controller (Åström and Hägglund 2004):
 
         K = (0.2 + 0.45 T/L)/K_p,    T_i = (0.4 L + 0.8 T)/(L + 0.1 T) L,    T_d = 0.5 L T/(0.3 L +
-        T) K = 0.45/(K_v L),    T_i = 8 L,    T_d = 0.5 L      integrator
+                                     T)
+        K = 0.45/(K_v L),    T_i = 8 L,    T_d = 0.5 L      integrator
 
     The set-point weight is 0 for L/(L + T) up to 0.5, otherwise 1. Raises ParameterError for a
     model without dead time.

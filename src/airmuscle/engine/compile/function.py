@@ -58,8 +58,9 @@ class AugmentedRates:
     disturbances of rates.
 
     rates(z, u, c, f, A)      f (n,) rates with f_i + d_i where there is a disturbance, A = df/dz
-    (n, N) measured(z, u, c, y, C)   measured columns (p,) and dy/dz (p, N) outputs(z, u, c, o)
-    all outputs (k,)
+                              (n, N)
+    measured(z, u, c, y, C)   measured columns (p,) and dy/dz (p, N)
+    outputs(z, u, c, o)       all outputs (k,)
 
     `constants` is the array c. Parameters and disturbances have no rates: they are constant but for
     noise.

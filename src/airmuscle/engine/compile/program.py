@@ -59,8 +59,8 @@ class RunCache:
     default_state  the default initial state (n,), once it has been found
     checked_state  the last initial state that was checked and found possible
     checked_input  the last segments of inputs that were found within their ranges, what output
-    times a run with them
-                   asked for, and these times, if nobody can write to the arrays
+                   times a run with them asked for, and these times, if nobody can write to the
+                   arrays
     sources        sources of the models and of an integrator, by the integrator
     integrators    integrators bound to the system, by their integrator
     holders        the same for steps with held inputs

@@ -78,8 +78,9 @@ class ControlLoop(ShortRepr):
     setpoint      an InputSignal whose names are the controller's set points,
                   `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
     other_inputs  an InputSignal for the inputs that the controller does not command; zero by
-    default drivers       between commands and openings, as in WithDrivers; the command of a driver
-    is within 0 and 1
+                  default
+    drivers       between commands and openings, as in WithDrivers; the command of a driver is
+                  within 0 and 1
 
     Between two samples a command is held. It is limited to the range that the plant declares for
     its input.

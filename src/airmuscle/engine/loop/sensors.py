@@ -39,7 +39,7 @@ class ColumnSensor(SignalRelated):
     order.
 
         y_k = y_(k-1) + (1 - exp(-h/T)) (x_k - y_(k-1)),   z_k = q floor((y_k + sigma n_k)/q + 1/2),
-        output z_(k-d)
+                                                           output z_(k-d)
 
     x column, h sample time, n_k normal deviates. The lag starts at the first measurement, and the
     first value is delivered until the delay has passed. A parameter that is 0 disables its part.

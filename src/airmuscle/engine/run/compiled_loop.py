@@ -77,7 +77,7 @@ class CompiledRun:
     compiled       the plant, whose structure is that of the loop's plant
     initial_state  (n,)
     parameters     of the control law (P,), an array of this run; those of the loop's controller
-    unless given
+                   unless given
     """
 
     def __init__(

@@ -206,7 +206,7 @@ class Integrator(abc.ABC):
     """A numerical method for ordinary differential equations.
 
     printed_step  module of the kernels with the step that exported programs print; empty: there is
-    none
+                  none
     """
 
     printed_step: ClassVar[str] = ""

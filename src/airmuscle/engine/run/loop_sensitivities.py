@@ -66,11 +66,10 @@ def differentiate_loop(
     parameters.
 
     columns   paths of parameters of the plant (`mechanism.mass`) or of the control law
-    (`controller.gain`); a tuple of
-              paths varies together
+              (`controller.gain`); a tuple of paths varies together
     scales    size of a change of each column [SI], for the error control of the derivatives
     observed  states and outputs whose derivatives are wanted; all unless given. Those that are
-    measured are added
+              measured are added
 
     Between two samples the derivatives obey the variational equation of the plant with v_k =
     du/dtheta_k held; at a sample those of commands and memory follow from those of the measurements
@@ -113,7 +112,7 @@ def tracking_sensitivity(
     sensitivities.
 
         J = sqrt((1/T) integral e^2 dt),   dJ/dtheta_k = -(1/(J T)) integral e dy/dtheta_k dt,   e =
-        r - y
+                                           r - y
 
     r set point, y the column, from `begin` [s] on, by the trapezoidal rule between the rows.
     Without any error the gradient is not defined and NaN. Raises ParameterError for a recording

@@ -195,12 +195,11 @@ def simulate(
     input          an InputSignal such as a Schedule, or a ControlLoop
     initial_state  values by state; by default a Plant's equilibrium at ambient pressure
     output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10
-    ms. The instants of
-                   the input are always among the rows, with the inputs that begin there
+                   ms. The instants of the input are always among the rows, with the inputs that
+                   begin there
     integrator     Rodas4(rtol=1e-6) by default
     complete       whether a run that ends early raises SimulationError (its `.recording` holds what
-    was computed);
-                   otherwise that part is returned, with the reason in its notes
+                   was computed); otherwise that part is returned, with the reason in its notes
 
     The short form of `solve(Problem(...)).recording`. The result does not depend on `output_times`.
     Raises ParameterError for an input or state that the plant does not have.

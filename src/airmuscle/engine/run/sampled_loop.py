@@ -46,11 +46,15 @@ class SampledLoop:
 
     instants         (K + 1,) start of the run, sampling instants, end of the run [s]
     sampled          whether the first interval begins with a sample: not when a run continues
-    between two samples inputs           segments of all inputs, split at the instants; commanded
-    inputs are filled in during the run first_segments   (K + 1,) the first segment of each interval
-    setpoint_values  (K, s) set points at the start of every interval times            output times;
-    drivers add instants first_rows       (K + 1,) the first output time of each interval
-    input_names      of the plant ranges           minimum and maximum of every commanded input
+                     between two samples
+    inputs           segments of all inputs, split at the instants; commanded inputs are filled in
+                     during the run
+    first_segments   (K + 1,) the first segment of each interval
+    setpoint_values  (K, s) set points at the start of every interval
+    times            output times; drivers add instants
+    first_rows       (K + 1,) the first output time of each interval
+    input_names      of the plant
+    ranges           minimum and maximum of every commanded input
     """
 
     loop: ControlLoop
@@ -286,8 +290,9 @@ class DriverTable:
 
     kinds (D, 2)      index of the input, and DriverKind
     settings, states, kept (D, 4)   settings; states at the end of the present and of the last
-    completed interval columns, scratch, counts, begins    workspace of the kernel called  whether
-    the drivers are called from Python, in the signals of the kernel
+                                    completed interval
+    columns, scratch, counts, begins    workspace of the kernel
+    called  whether the drivers are called from Python, in the signals of the kernel
     """
 
     def __init__(

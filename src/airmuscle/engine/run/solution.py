@@ -260,8 +260,7 @@ class Solution(NotebookDisplay):
     diagnostics    what the reader must know: assumptions, extrapolation, an early end
     final_time     [s], and
     final_state    by state: the end of the run, or where it failed; of a control loop the last
-    sampling instant from
-                   which the run can be continued
+                   sampling instant from which the run can be continued
     control_state  of a control loop, for a Problem that continues the run
     """
 

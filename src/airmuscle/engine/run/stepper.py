@@ -44,13 +44,14 @@ class Stepper:
     plant           any System: a Plant, or a user-defined one
     initial_state   values by state; by default a Plant's equilibrium at ambient pressure
     integrator      Rodas4(rtol=1e-6) by default; RungeKutta4(step) takes the same time for every
-    step start_time      [s] check_validity  whether a step that leaves a validity range, a rating
-    of a muscle, or the range of a geometry
-                    raises SimulationError; otherwise only impossible states do
+                    step
+    start_time      [s]
+    check_validity  whether a step that leaves a validity range, a rating of a muscle, or the range
+                    of a geometry raises SimulationError; otherwise only impossible states do
 
     state_names, input_names, output_names   order of the arrays
     state (n,), inputs (m,), outputs (k,)    present values [SI]; `state` may be written to, for
-    instance by an observer
+                                             instance by an observer
 
     Equal steps from equal states give equal results to the last bit. A step allocates no arrays. A
     Stepper is for one thread at a time; a copy, also a pickled one, goes on from the present state
@@ -133,7 +134,7 @@ class Stepper:
         `outputs` itself.
 
         inputs  (m,) in the order of `input_names`, or by name: a mapping keeps the present values
-        of the other inputs
+                of the other inputs
 
         Raises ParameterError for a number of inputs, an input or a time step that is impossible,
         SimulationError where the step fails or leads to an impossible state. The state is then that

@@ -21,7 +21,8 @@ class WithSensitivities(SensitivitySystem):
     derivatives.
 
         s_k' = (df/dx) s_k + (df/du) v_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + (dy/du) v_k +
-        dy/dtheta_k, y' = (dy/dx) f
+                                                           dy/dtheta_k,
+        y' = (dy/dx) f
 
     A column is a group of leaf paths that share one value (`("circuit.fill.conductance",
     "circuit.discharge.conductance")`), or an empty group for something that acts on the start

@@ -30,8 +30,9 @@ class TableReader:
 
     classes  the allowed classes by name, for the outermost table; by default all registered models
     known    what the readers of fields declared with `custom_field` are given, such as a unit or a
-    plant named    readers of parts that may be named instead of described, by their class signals
-    for controllers: the PlantSignals that make what a table does not state, or None
+             plant
+    named    readers of parts that may be named instead of described, by their class
+    signals  for controllers: the PlantSignals that make what a table does not state, or None
     """
 
     classes: Mapping[str, type[Any]] | None = None

@@ -106,9 +106,9 @@ def fitted_entry(
     without its checks.
 
     error_ratio  rms error of rows left out of the fit over that of its own rows, by which the band
-    is widened recordings   of the fit, whose specimens, resting lengths and rates the band holds
-    for errors       of specimens left out of the fit, for the band of a specimen that was not
-    measured
+                 is widened
+    recordings   of the fit, whose specimens, resting lengths and rates the band holds for
+    errors       of specimens left out of the fit, for the band of a specimen that was not measured
     """
     texts = {quantity.name: value_text(quantity) for quantity in result.goodness()}
     names = list_files([f.name for f in files])

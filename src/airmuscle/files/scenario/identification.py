@@ -103,7 +103,7 @@ def build_experiment(
     shared     tables with the plant and the input of all records
     recording  if it was read before; then the table needs no file
     predicted  whether the record is predicted: its ambient air replaces that of the plant, which
-    was found elsewhere
+               was found elsewhere
     """
     row: RecordTable = values.table_reader(plant).build(table, location, kind=RecordTable)
     given = dict(

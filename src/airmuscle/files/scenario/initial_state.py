@@ -2,9 +2,11 @@
 name.
 
 initial_state = { pressure = "2 bar" }                                   equilibrium with all
-muscles at this pressure initial_state = { "left.pressure" = "1 bar", "right.pressure" = "3 bar" }
-equilibrium with each at its own initial_state = { pressure = "2 bar", angle = "5 deg" }
-a state at rest that need not be an equilibrium
+    muscles at this pressure
+initial_state = { "left.pressure" = "1 bar", "right.pressure" = "3 bar" }   equilibrium with each at
+    its own
+initial_state = { pressure = "2 bar", angle = "5 deg" }                  a state at rest that need
+    not be an equilibrium
 """
 
 import functools

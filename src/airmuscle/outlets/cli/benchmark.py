@@ -79,9 +79,10 @@ def benchmark(
     Examples:
       airmuscle benchmark --out benchmark
       airmuscle benchmark --controller PID --controller "feed-forward + PID" --task "sine 1 Hz"
-      --trials 10 airmuscle benchmark --valves on-off --truths 2 --budget 40 airmuscle benchmark
-      --controller PID --controller examples/joint_cascade.toml --runs 0 airmuscle benchmark --join
-      /shared/benchmark    (on each machine)
+          --trials 10
+      airmuscle benchmark --valves on-off --truths 2 --budget 40
+      airmuscle benchmark --controller PID --controller examples/joint_cascade.toml --runs 0
+      airmuscle benchmark --join /shared/benchmark    (on each machine)
     """
     joint = request.valves(TRUTH_SEEDS[: request.truths])
     trials = request.trials

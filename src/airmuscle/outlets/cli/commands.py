@@ -286,5 +286,6 @@ def airmuscle(version: Version = False, completion: Shell = None) -> None:
       airmuscle reproduce --out report
       airmuscle evaluate dmsp-20-300 --pressure "3 bar" --force "100 N" --out chart
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out
-      fit airmuscle simulate scenario.toml --out run
+          fit
+      airmuscle simulate scenario.toml --out run
     """

@@ -131,15 +131,19 @@ def export(
     Examples:
       airmuscle export examples/fill_discharge.toml --to c --out fill_c
       airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out
-      fill_m airmuscle export dmsp-20-300 --law --to js --out law_js airmuscle export dmsp-20-300
-      --to torch --out actuator airmuscle export joint-dmsp-20-matrix --to mjcf --out robot
-      airmuscle export examples/pressure_loop.toml --to c --out loop_c airmuscle export
-      examples/pressure_loop.toml --controller --to c --out controller airmuscle export
-      examples/pressure_loop.toml --controller --to c --precision float --build --processor
-      cortex-m4 airmuscle export examples/pressure_loop.toml --controller --to arduino --precision
-      float --out pressure_loop airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out
-      fill.fmu airmuscle export examples/pressure_loop.toml --controller --to fmu --out
-      controller.fmu airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
+          fill_m
+      airmuscle export dmsp-20-300 --law --to js --out law_js
+      airmuscle export dmsp-20-300 --to torch --out actuator
+      airmuscle export joint-dmsp-20-matrix --to mjcf --out robot
+      airmuscle export examples/pressure_loop.toml --to c --out loop_c
+      airmuscle export examples/pressure_loop.toml --controller --to c --out controller
+      airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build
+          --processor cortex-m4
+      airmuscle export examples/pressure_loop.toml --controller --to arduino --precision float --out
+          pressure_loop
+      airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
+      airmuscle export examples/pressure_loop.toml --controller --to fmu --out controller.fmu
+      airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
     """
     request = (
         request

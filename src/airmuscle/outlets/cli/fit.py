@@ -49,17 +49,21 @@ def fit(
     \b
     Examples:
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out
-      fit airmuscle fit bench.csv --characteristic ContractileSurface --braid "radius=10 mm,
-      angle=24.4 deg" airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix
-      wall_thickness airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4
-      --robust "10 N" airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000
-      --profile weak airmuscle fit bench.csv --characteristic ContractileSurface --shape
-      --free-contraction "3 bar=18 %" airmuscle fit runs/*.xlsx --mapping rig.toml --compare
-      --leave-out run airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both
-      --length-error "20 cm" airmuscle fit muscles/*.csv --mapping rig.toml --compare --join
-      /shared/fit    (on each machine) airmuscle fit log_held*.csv --file-name "held{length [mm]}mm"
-      --time uniform --resting-length "200 mm" --compare airmuscle evaluate fit/muscle.toml
-      --pressure "3 bar" --force "100 N"
+          fit
+      airmuscle fit bench.csv --characteristic ContractileSurface --braid "radius=10 mm, angle=24.4
+          deg"
+      airmuscle fit bench.csv --characteristic dmsp-20-300 --unit pressure=bar --fix wall_thickness
+      airmuscle fit dmsp-20-300 --characteristic ContractileSurface --degree 4 --robust "10 N"
+      airmuscle fit runs/*.csv --characteristic dmsp-20-300 --bootstrap 1000 --profile weak
+      airmuscle fit bench.csv --characteristic ContractileSurface --shape --free-contraction "3
+          bar=18 %"
+      airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
+      airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both --length-error "20 cm"
+      airmuscle fit muscles/*.csv --mapping rig.toml --compare --join /shared/fit    (on each
+          machine)
+      airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length
+          "200 mm" --compare
+      airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     processes = (execution.workers, execution.dask, execution.join)
     if processes != (None, None, None) and not (request.compare or request.bootstrap):

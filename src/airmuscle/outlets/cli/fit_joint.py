@@ -34,7 +34,7 @@ def fit_joint_command(
       airmuscle fit-joint episodes/ --mapping arm.toml --inspect
       airmuscle fit-joint episodes.npz --mapping arm.toml --out arm
       airmuscle fit-joint episodes --mapping arm.toml --known joint.toml --free mechanism.inertia
-      --free zeros
+          --free zeros
     """
     if request.inspect:
         echo(str(inspect_requested(source, request)))

@@ -81,7 +81,8 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
     Examples:
       airmuscle fit-live --follow log.csv --max-pressure "6 bar" --max-force "1 kN" --out live
       cat /dev/ttyUSB0 | airmuscle fit-live --follow - --column "1=pressure [kPa]" --column
-      "2=contraction [%]" --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
+          "2=contraction [%]"
+      --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
     """
     pressures = request.min_pressure, request.max_pressure
     limits = ValidityRange(*pressures, request.min_contraction, request.max_contraction)

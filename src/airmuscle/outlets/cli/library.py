@@ -134,9 +134,10 @@ def evaluate(
       airmuscle evaluate dmsp-20-300 --pressure "3 bar" --force "100 N"
       airmuscle evaluate dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
       airmuscle evaluate tondu-lopez --diameter "30 mm" --resting-length "200 mm" --pressure "3 bar"
-      --force "100 N" airmuscle evaluate saga2007 --set characteristic.slope_factor=2 --pressure "1
-      bar" --contraction "5 %" airmuscle evaluate my/muscle.toml --pressure "400 kPa" --contraction
-      0.1 --json
+          --force "100 N"
+      airmuscle evaluate saga2007 --set characteristic.slope_factor=2 --pressure "1 bar"
+          --contraction "5 %"
+      airmuscle evaluate my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
     found = evaluate_entry(variant.load(name), point.given)
     chapter = found.chapter()

@@ -50,7 +50,7 @@ def simulate(
       airmuscle simulate examples/fill_discharge.toml --out run
       airmuscle simulate joint-dmsp-20-matrix --out run
       airmuscle simulate examples/fill_discharge.toml --set "mechanism.mass=12 kg" --set
-      run.duration=10 --out run
+          run.duration=10 --out run
     """
     loaded = (
         changed_scenario(scenario, dict(request.set)) if request.set else load_scenario(scenario)

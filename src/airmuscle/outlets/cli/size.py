@@ -24,9 +24,11 @@ def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -
     \b
     Examples:
       airmuscle size --load "20 kg" --stroke "40 mm" --supply "6 bar" --max-length "400 mm" --out
-      lift airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar"
-      --sort length airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2"
-      --supply "6 bar" --max-count 1
+          lift
+      airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar" --sort
+          length
+      airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2" --supply "6 bar"
+          --max-count 1
     """
     if out is not None:
         check_writable(out)

@@ -136,7 +136,8 @@ def tune(
     Examples:
       airmuscle tune examples/pressure_loop.toml --rules --out tuning
       airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s"
-      --budget 20000 airmuscle tune lift.toml --join /shared/tuning    (on each machine)
+          --budget 20000
+      airmuscle tune lift.toml --join /shared/tuning    (on each machine)
     """
     loaded = load_scenario_loop(scenario)
     target = save or scenario.with_name(f"{scenario.stem}-tuned.toml")

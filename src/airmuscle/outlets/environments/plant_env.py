@@ -39,9 +39,10 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
     """One plant with a task.
 
     task           an EnvironmentTask; observations and actions are listed by its `observations` and
-    `actions` randomisation  distributions of parameters, drawn anew at every reset; () for the
-    nominal plant integrator     RungeKutta4(1e-3) by default; the period of the task is a whole
-    number of its steps
+                   `actions`
+    randomisation  distributions of parameters, drawn anew at every reset; () for the nominal plant
+    integrator     RungeKutta4(1e-3) by default; the period of the task is a whole number of its
+                   steps
 
     Actions are limited to -1 to 1 and held for one period. An episode is terminated where the task
     ends it, or where the state becomes impossible (not finite, an air mass below zero): the
@@ -204,8 +205,8 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
     """A single environment whose observations pass through sensors: noise, steps, and a dead time.
 
     noise, resolution  standard deviation and step of the observations, one for all or one for each
-    (k,), in their units delay              periods by which observations are late; until then the
-    first one is repeated
+                       (k,), in their units
+    delay              periods by which observations are late; until then the first one is repeated
 
     The noise is drawn from the generator of the environment, which `reset(seed=...)` seeds.
     Observations remain within their limits. Raises ParameterError for a number that is negative or

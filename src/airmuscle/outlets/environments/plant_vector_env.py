@@ -34,8 +34,10 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
     randomisation      distributions of parameters, drawn anew for every episode of each plant
     max_episode_steps  periods after which an episode is truncated
     integrator         RungeKutta4(1e-3) by default; the period of the task is a whole number of its
-    steps precision          Double() or Single() cores              threads; all cores of this
-    process unless given autoreset_mode     NEXT_STEP or SAME_STEP of gymnasium.vector.AutoresetMode
+                       steps
+    precision          Double() or Single()
+    cores              threads; all cores of this process unless given
+    autoreset_mode     NEXT_STEP or SAME_STEP of gymnasium.vector.AutoresetMode
 
     Plant i is what `PlantEnv` with the seed `seed + i` is, to the rounding of the lanes. An episode
     that is over begins anew in the next step (NEXT_STEP): the action of that step is ignored, its
@@ -297,10 +299,10 @@ def roll_out(
     i`.
 
     policy   function of a module, or an object that can be pickled, called with the observations of
-    many episodes; that
-             of an episode must not depend on the others
+             many episodes; that of an episode must not depend on the others
     workers  processes (for several, a script needs `if __name__ == "__main__":`) or an executor;
-    the result is the same options  integrator and precision of `PlantVectorEnv`
+             the result is the same
+    options  integrator and precision of `PlantVectorEnv`
 
     Raises ParameterError for impossible options or actions.
     """

@@ -104,11 +104,9 @@ class FitUncertainty(ShortRepr, Randomisation):
     file or a scenario.
 
     uncertainty  `am.load(PATH).uncertainty` of a muscle file, or `load_scenario(PATH).uncertainty`
-    of the scenario of
-                 an identified plant (fit-joint, fit-dynamic, campaign)
+                 of the scenario of an identified plant (fit-joint, fit-dynamic, campaign)
     muscles      of a muscle file, indices of the muscles of the plant to which it applies; all have
-    the same draw,
-                 because it is the common law that is uncertain
+                 the same draw, because it is the common law that is uncertain
 
     Draws are limited to the declared ranges. Raises ParameterError where the fit states no
     covariance.

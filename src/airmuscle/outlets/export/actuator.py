@@ -3,11 +3,11 @@ and its speed.
 
 start(q, c, x)       states x at q = (gauge pressure [Pa], length [m])
 step(x, z, c, h, y)  states y after a time h [s] under z = (command, length [m], speed [m/s]): the
-command is held,
-                     the length moves at its speed; classical Runge-Kutta method, as `simulate` with
-                     RungeKutta4(h)
+                     command is held, the length moves at its speed; classical Runge-Kutta method,
+                     as `simulate` with RungeKutta4(h)
 observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validity range of the
-muscle, else 0) prepare(p, c)        c, what these need of the parameters
+                     muscle, else 0)
+prepare(p, c)        c, what these need of the parameters
 """
 
 import dataclasses
@@ -39,7 +39,8 @@ class ActuatorModel:
 
     part       the plant with length and speed of the muscle as inputs
     controls   inputs that the command opens: one, or two of which a negative command opens the
-    second step       the longest step of the integrator [s]
+               second
+    step       the longest step of the integrator [s]
     """
 
     part: Plant

@@ -79,7 +79,7 @@ class BuiltProgram:
 
     code_size   [bytes] machine code and constants; None where the program `size` is missing
     stack_size  [bytes] of all functions together, without those of the C library; None where it is
-    not known
+                not known
     """
 
     output: str

@@ -70,7 +70,8 @@ class SolverText(NamedTuple):
 
     places     printed functions, and their calls with their workspace, for a template
     constants  first step (0: to be found), distance within which a time belongs to a step, relative
-    tolerance, tableau implicit   whether the step needs the Jacobian
+               tolerance, tableau
+    implicit   whether the step needs the Jacobian
     """
 
     places: dict[str, str]
@@ -127,7 +128,7 @@ class ExportedLoop:
 
     controller  the control law; the plant is in the system of the program
     others      segments of the inputs that are not commanded; an end near a sampling instant is at
-    it
+                it
     """
 
     controller: PrintedController

@@ -68,7 +68,8 @@ class WrittenFmu:
     """An FMU that has been written.
 
     platforms  the folders of its binaries, such as `linux64`; none for an FMU that contains sources
-    only remark     why there is no binary; empty if there is one
+               only
+    remark     why there is no binary; empty if there is one
     """
 
     path: Path
@@ -82,14 +83,18 @@ class FmuPackage:
 
     name          identifier of the model
     provenance    lines of the comment at the beginning of each file, of which the first is the
-    title token         text that an importer passes on, so that description and binary belong
-    together dependencies  the value references of the states and inputs on which an unknown
-    depends, by its value reference indicators    number of event indicators experiment    the
-    default one: startTime and stopTime [s], tolerance or stepSize of a sampled controller [s]
+                  title
+    token         text that an importer passes on, so that description and binary belong together
+    dependencies  the value references of the states and inputs on which an unknown depends, by its
+                  value reference
+    indicators    number of event indicators
+    experiment    the default one: startTime and stopTime [s], tolerance or stepSize of a sampled
+                  controller [s]
     sources       C sources and headers by name, without those of the standard and of its functions
     has_states    whether it has states with derivatives, also adjoint ones, and can be used in
-    Model Exchange related       inputs.csv and results.csv, data of run.exp and the manifest of
-    FMI-LS-REF 1.0.0-alpha.1; or none
+                  Model Exchange
+    related       inputs.csv and results.csv, data of run.exp and the manifest of FMI-LS-REF
+                  1.0.0-alpha.1; or none
     """
 
     name: str

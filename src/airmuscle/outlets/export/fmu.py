@@ -48,13 +48,15 @@ def write_fmu(
     """Write a system as an FMU, with its sources and a binary for this machine.
 
     problem  a system with its initial state, the inputs at its start, and the integrator of
-    Co-Simulation fmi      version of the standard, 2 or 3 name     identifier of the model; by
-    default the title tunable  paths of the parameters that are variables of the FMU; the others
-    become constants. By default all that act
-             on the run, which validity ranges and ratings do not
+             Co-Simulation
+    fmi      version of the standard, 2 or 3
+    name     identifier of the model; by default the title
+    tunable  paths of the parameters that are variables of the FMU; the others become constants. By
+             default all that act on the run, which validity ranges and ratings do not
     binary   False: sources only. Without a C compiler the FMU contains sources only, which `remark`
-    states platforms  instead of this machine, platforms for which zig compiles the binaries; it
-    needs the package ziglang
+             states
+    platforms  instead of this machine, platforms for which zig compiles the binaries; it needs the
+               package ziglang
 
     The FMU contains no Python. It states terminals (FMI 3.0) and, as the layered standard
     FMI-LS-REF describes them, the inputs of the problem and its run by the library as reference

@@ -41,9 +41,8 @@ def write_controller_fmu(
     """Write the control law of a problem as an FMU for Co-Simulation, without the plant.
 
     problem  a plant with a ControlLoop, whose sample time, ranges and set points at its start are
-    those of the FMU;
-             drivers between commands and openings are not in the FMU, which its documentation
-             states
+             those of the FMU; drivers between commands and openings are not in the FMU, which its
+             documentation states
 
     Inputs are the measured columns and `setpoint.NAME`, outputs the commands; all parameters of the
     law are tunable. At a sampling instant the commands follow from the inputs at once; the step

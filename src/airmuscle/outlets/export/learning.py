@@ -129,7 +129,7 @@ class ExportedActuator:
     """An actuator ready for a stack.
 
     identified, root  parameters with an uncertainty, by path, and the root (K, K) of their
-    covariance [SI]
+                      covariance [SI]
     """
 
     name: str
@@ -289,8 +289,9 @@ def write_actuator(
     stack        TorchStack(), WarpStack(precision) or OnnxStack(precision)
     muscle       name of the muscle, if the plant has several, each with a circuit of its own
     step         the longest step of the integrator [s]; by default 1 ms, or less where the plant is
-    faster uncertainty  of the parameters of the muscle, as its file states it, from which
-    `randomise` draws
+                 faster
+    uncertainty  of the parameters of the muscle, as its file states it, from which `randomise`
+                 draws
 
     Raises ParameterError for a plant that cannot be exported, and FileError.
     """

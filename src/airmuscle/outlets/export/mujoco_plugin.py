@@ -99,9 +99,11 @@ class MuscleActuator(ShortRepr):
 
         tendon, joint  the transmission, one of the two
         gear           length of the transmission per length of the tendon, or per angle of the
-        joint [m/rad] rest_length    length of the transmission [m] at which the muscle has its
-        resting length; that length by default parameters     parameters of this actuator by path,
-        such as {"muscle.force": 600.0}, in SI units
+                       joint [m/rad]
+        rest_length    length of the transmission [m] at which the muscle has its resting length;
+                       that length by default
+        parameters     parameters of this actuator by path, such as {"muscle.force": 600.0}, in SI
+                       units
 
         Raises ParameterError without a library, for an unsuitable MuJoCo, and for a wrong
         transmission or parameter.

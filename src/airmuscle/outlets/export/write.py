@@ -201,12 +201,13 @@ def write_program(
     """Write a system and its run as a program in another language; returns the paths of its files.
 
     problem  a system with its input signals or a control loop, initial state, output times and
-    integrator target   C99(), JavaScript() or Octave() name     name of the files, and beginning of
-    the names in them; by default the title tunable  paths of the parameters that the program can
-    change, those of a controller with `controller.` before them;
-             all by default, the others become constants
+             integrator
+    target   C99(), JavaScript() or Octave()
+    name     name of the files, and beginning of the names in them; by default the title
+    tunable  paths of the parameters that the program can change, those of a controller with
+             `controller.` before them; all by default, the others become constants
     columns  states, inputs, outputs and columns of a controller that the run writes after time; all
-    by default
+             by default
 
     The files depend on the arguments and the version of airmuscle alone. Raises ParameterError for
     what cannot be exported, which it names, and FileError.
@@ -322,14 +323,14 @@ def write_controller(
     files.
 
     problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of
-    the replay.
-             Simulated sensors and faults (`WithSensors`, `WithStuckValve`) belong to the plant and
-             are left out, at any depth of the law; the readings of sensors around the whole law are
-             the data of the replay
+             the replay. Simulated sensors and faults (`WithSensors`, `WithStuckValve`) belong to
+             the plant and are left out, at any depth of the law; the readings of sensors around the
+             whole law are the data of the replay
     tunable  paths of the parameters that remain variables; none by default: all are constants of
-    the program precision  Double(), or Single() for a processor that computes with floats alone
+             the program
+    precision  Double(), or Single() for a processor that computes with floats alone
     arduino  whether the files are an Arduino library with an example sketch, in place of the
-    program of the replay
+             program of the replay
 
     The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of
     the commands are constants. The program `main.c` replays the measurements of the run. In double

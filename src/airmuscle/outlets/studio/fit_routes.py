@@ -5,9 +5,11 @@ identifier, which only the page that started it knows, and the page may be close
 POST /api/fit/file?set=ID&name=NAME   a measurement file; without a set a new one is begun
 POST /api/fit/remove                  {"set": ID, "name": NAME}
 POST /api/fit/read                    {"set": ID, "settings": {...}}: columns, runs, problems and
-points POST /api/fit/start                   the same: the identifier of a task GET
-/api/fit/task/ID                 state and progress POST /api/fit/task/ID/cancel GET
-/api/fit/task/ID/FILE            result.json, report.html, muscle.toml, report.zip
+                                      points
+POST /api/fit/start                   the same: the identifier of a task
+GET  /api/fit/task/ID                 state and progress
+POST /api/fit/task/ID/cancel
+GET  /api/fit/task/ID/FILE            result.json, report.html, muscle.toml, report.zip
 """
 
 import collections

@@ -59,7 +59,8 @@ class FitSettings:
     """What the user states about the files, which rows are used, and what is fitted.
 
     columns  heading with quantity and unit by the heading in the file; an empty text excludes the
-    column facts    resting_length, length and specimen by the name of a file
+             column
+    facts    resting_length, length and specimen by the name of a file
     """
 
     texts: Mapping[str, str]

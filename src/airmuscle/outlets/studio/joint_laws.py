@@ -55,8 +55,9 @@ class JointController:
 
     law       commands the valves
     averaged  the same law without modulation, whose derivatives exist; `law` itself for other
-    valves balance   value in the memory of `averaged` that balances the joint at rest bias
-    path in `averaged` of the first command of that integrator; empty if it begins at zero
+              valves
+    balance   value in the memory of `averaged` that balances the joint at rest
+    bias      path in `averaged` of the first command of that integrator; empty if it begins at zero
     """
 
     key: str
@@ -75,8 +76,8 @@ class ValveSet:
     inner      pressure control; None for regulators
     switching  whether the valves are on/off valves
     offsets    commands at which the joint is linearised, by input; relative to the pressure [Pa]
-    for regulators limits     range of the set points of the pressures [Pa] in which the offsets are
-    possible
+               for regulators
+    limits     range of the set points of the pressures [Pa] in which the offsets are possible
     """
 
     pressures: tuple[str, str]

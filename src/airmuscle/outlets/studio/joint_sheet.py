@@ -5,14 +5,15 @@ The functions write into arrays that they are given; c is what `prepare(p, c)` m
 parameters:
 
     sample(y, r, m, T, l, h, c, u, n)   measurements, set points, memory, sample time [s], ranges of
-    the commands:
-                                        commands and later memory
+                                        the commands: commands and later memory
     slopes(y, r, m, T, l, h, c, f, D)   the same with f = (u, n), and D = df/d(y, m), row by row
     linear(x, u, c, f, A, B, C)         rates f, df/dx, df/du, and the derivatives of columns by x,
-    row by row pair(x, f)                          x = (angle, p_1, p_2), f = PAIR cut_segments(...)
-    the kernel of `driven_inputs`, with its arguments needed(x, f)                        x =
-    (angle, angular speed, angular acceleration, p_1, p_2), f = torque that the
-                                        muscles must give, with that of their dampers
+                                        row by row
+    pair(x, f)                          x = (angle, p_1, p_2), f = PAIR
+    cut_segments(...)                   the kernel of `driven_inputs`, with its arguments
+    needed(x, f)                        x = (angle, angular speed, angular acceleration, p_1, p_2),
+                                        f = torque that the muscles must give, with that of their
+                                        dampers
 """
 
 import dataclasses

@@ -12,7 +12,8 @@ of the parameters:
     pressure(x, c, f)       x = (eps, F), f = (p, dp/deps, dp/dF)
     limits(c, f)            f = search ranges of pressure, contraction and force
     outline(x, c, f)        x = (eps, t), f = (axial position, radius), t from -1 to 1 along a
-    segment volume(x, c, f)         x = (eps),    f = (V, dV/deps)
+                            segment
+    volume(x, c, f)         x = (eps),    f = (V, dV/deps)
 
 A direction that the law does not give in closed form is missing; the page searches for its root.
 """

@@ -48,13 +48,17 @@ class LinearModel:
 
     A, B, C, D      (n, n), (n, m), (k, n), (k, m)
     states, inputs, outputs    names, in the order of rows and columns; the states are among the
-    outputs units           unit of every name state, input_values, output_values    the operating
-    point rates           (n,) rates of the states there: all zero at an equilibrium system
-    the system that was linearised stiffness       of a Plant: its stiffness at constant pressure
-    and with closed valves; None for another system delays          dead time [s] of inputs by name,
-    before they act; none unless given (`with_delay`) kinks           states and inputs by which the
-    derivatives of the rates are those of one side alone: even small
-                    oscillations about the operating point do not obey the model
+                               outputs
+    units           unit of every name
+    state, input_values, output_values    the operating point
+    rates           (n,) rates of the states there: all zero at an equilibrium
+    system          the system that was linearised
+    stiffness       of a Plant: its stiffness at constant pressure and with closed valves; None for
+                    another system
+    delays          dead time [s] of inputs by name, before they act; none unless given
+                    (`with_delay`)
+    kinks           states and inputs by which the derivatives of the rates are those of one side
+                    alone: even small oscillations about the operating point do not obey the model
     """
 
     A: Array
@@ -192,10 +196,10 @@ class LinearModel:
         `control`.
 
         sample_time  of a discrete model [s], exact for held inputs and their delays; None: a
-        continuous one nonlinear    instead a control.NonlinearIOSystem of the system itself, with
-        the same names: its states, inputs
-                     and outputs are absolute values, not deviations from the operating point,
-                     without delays
+                     continuous one
+        nonlinear    instead a control.NonlinearIOSystem of the system itself, with the same names:
+                     its states, inputs and outputs are absolute values, not deviations from the
+                     operating point, without delays
         pade         order of the Pade approximations of delays in the continuous model
         """
         if not nonlinear:

@@ -221,7 +221,7 @@ def sampled(model: Any, sample_time: float, *, before: bool = False) -> SampledM
     parts of a sample.
 
     before  whether outputs are those just before a sample, on which its input has no influence even
-    without a delay
+            without a delay
 
     A delay tau = d h + theta, 0 <= theta < h, of an input u is
 

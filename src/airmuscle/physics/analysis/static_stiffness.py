@@ -28,8 +28,7 @@ class Stiffness(ShortRepr):
     muscles      of every muscle by name, -dF/deps [N]
     per_metre    of every muscle by name, dF/dL [N/m]
     coordinates  of every coordinate, -dQ/dq [N/m, N m/rad], including the change of the moment arms
-    of the muscles,
-                 without the springs and weights of the mechanism
+                 of the muscles, without the springs and weights of the mechanism
     """
 
     muscles: Mapping[str, StiffnessPair]
@@ -41,8 +40,7 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
     """Both stiffnesses of a plant at a state: exact derivatives of its laws.
 
         k_p = -dF/deps,   k_m = k_p - (dF/dp) (dp/deps),   dp/deps of the gas without flow and heat
-        transfer
-                                                          (polytropic: -n p_abs/V dV/deps)
+                          transfer (polytropic: -n p_abs/V dV/deps)
 
     With closed valves, the pressure increases when a muscle is stretched, so that the muscle is
     stiffer. Isothermal and polytropic gases follow their process; a FirstLawGas, the default, is

@@ -40,8 +40,9 @@ class JointPoints(ShortRepr):
     constant_pressure  stiffness -dQ/dtheta of the muscles at constant pressure [N m/rad]
     shut_valves        the same with closed valves, at constant air mass [N m/rad]
     cocontraction      part of the torques of the two muscles that cancels [N m]: the smaller of
-    their magnitudes stable             1 where the joint is stable at constant pressure, with its
-    weights and springs, else 0
+                       their magnitudes
+    stable             1 where the joint is stable at constant pressure, with its weights and
+                       springs, else 0
     """
 
     angle: Array

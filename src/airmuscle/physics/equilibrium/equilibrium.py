@@ -78,9 +78,9 @@ def find_equilibria(
     coordinates.
 
     pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each;
-    also texts with a unit air_mass   alternatively: mass of the air [kg] with closed valves; the
-    gas law determines the pressure at the
-               temperature of the air at rest
+               also texts with a unit
+    air_mass   alternatively: mass of the air [kg] with closed valves; the gas law determines the
+               pressure at the temperature of the air at rest
     inputs     0 by default, so that a latch is open
 
     Walls, series springs, tubes and tanks are in steady state, friction and creep relaxed. `stable`

@@ -94,7 +94,7 @@ class AntagonisticJoint(DampedCoordinate):
 
         r_1 = r f(theta),                   r_2 = r f(-theta)
         eps_1 = eps_0 + r F(theta)/L0_1,    eps_2 = eps_0 + r F(-theta)/L0_2,    F(theta) = integral
-        of f from 0
+                                            of f from 0
 
     theta joint angle; the first muscle increases it, the second decreases it. f profile of the
     pulleys, mirrored for the second muscle (f = 1 for circular pulleys), eps_0 contraction of both
@@ -182,7 +182,7 @@ class Lever(DampedCoordinate):
     """Lever: (J + m b^2) phi'' = sum F_i d(L0_i eps_i)/dphi - m g b cos phi - d phi'.
 
         eps_i = 1 - sqrt((a_i cos phi - a_i)^2 + (h_i - a_i sin phi)^2)/L0_i,   h_i = L0_i (1 -
-        eps_0i)
+            eps_0i)
 
     phi angle from the horizontal, a_i lever arm of muscle i, whose fixed end is vertically above
     its attachment point at phi = 0. A muscle on a negative arm acts in the opposite direction. J

@@ -51,7 +51,7 @@ class EndStops(CoordinateWrapper):
     """Two Hunt-Crossley contacts that add a generalised force Q to one coordinate q (base class).
 
         Q = R (F(delta_low) - F(delta_high)),   delta_low = max(R (q_low - q), 0),   delta_high =
-        max(R (q - q_high), 0)
+                                                max(R (q - q_high), 0)
 
     F contact force at the contact depth delta; R lever arm of the contact, 1 for a coordinate in
     metres.

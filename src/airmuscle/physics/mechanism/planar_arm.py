@@ -189,7 +189,7 @@ class PlanarArm(Arm):
 
         phi_i = theta_1 + ... + theta_i,   Q_i of the link angles = tau_i - tau_(i+1)
         sum_j A_ij cos(phi_i - phi_j) phi_j'' + A_ij sin(phi_i - phi_j) phi_j'^2 = Q_i - g B_i sin
-        phi_i
+            phi_i
 
     theta_i angle of joint i, the angle of link i relative to link i-1; phi_i angle of link i from
     the vertical, 0 where it hangs downwards. A_ii = I_i + m_i l_ci^2 + M_i l_i^2 with the mass M_i

@@ -95,8 +95,8 @@ class SerialArm(Arm):
     """Serial arm of n links in space: M(theta) theta'' + h(theta, theta') = J^T F - b theta'.
 
         M_ij = sum_k m_k (a_i x (c_k - o_i)) . (a_j x (c_k - o_j)) + I_k a_i . a_j,   k >= max(i,
-        j),   M_ii also + J_i h_i  = sum_k m_k (a_i x (c_k - o_i)) . (A_k - g) + I_k a_i . alpha_k,
-        k >= i
+            j),   M_ii also + J_i
+        h_i  = sum_k m_k (a_i x (c_k - o_i)) . (A_k - g) + I_k a_i . alpha_k,         k >= i
 
     a_i axis, o_i origin of joint i, c_k centre of mass of link k, all in the frame of the base,
     whose z axis points upwards; A_k acceleration of the centre and alpha_k angular acceleration of

@@ -219,7 +219,7 @@ class MusclesInSeries(MechanismWrapper):
     acts on `inner`.
 
         L_i eps_i = x_i - x_(i-1),   x_0 = 0,   x_n = L eps(q) of the inner mechanism, with L = sum
-        L_i
+                                     L_i
 
     x_i displacement of node i towards the first fitting from the position at which all muscles have
     their resting lengths, m_i node mass, d damping coefficient of the nodes. The chain acts on the

@@ -135,7 +135,7 @@ def open_plant(plant: Plant, shortenings: Sequence[float] = ()) -> Plant:
     muscles as outputs.
 
     shortenings  of the muscles [m], from their resting lengths, in states without inputs; 0 by
-    default
+                 default
 
     With one muscle the inputs are `shortening` and `shortening_speed`, and the output is `force`;
     with several, the name of the muscle precedes them. Raises ParameterError for another number of

@@ -4,18 +4,15 @@ valves.
 The flow laws use C [m3/(s Pa)]. The functions of each pair are inverse to each other.
 
     nominal flow    volume flow at the reference atmosphere of ISO 8778 from 6 to 5 bar gauge,
-    ambient pressure 1 bar:
-                    Q = C p1 phi(p2/p1), p1 = 7 bar, p2 = 6 bar absolute; reproduces SMC's tables of
-                    C, b and Q exactly
+                    ambient pressure 1 bar: Q = C p1 phi(p2/p1), p1 = 7 bar, p2 = 6 bar absolute;
+                    reproduces SMC's tables of C, b and Q exactly
     Kv              m3/h of water at a pressure difference of 1 bar (IEC 60534). Kv corresponds to
-    an area A by
-                    Q = A sqrt(2 dp/rho), and air near equal pressures flows through the same area:
-                    C rho0 sqrt(R T0) = A sqrt(1 - b)
+                    an area A by Q = A sqrt(2 dp/rho), and air near equal pressures flows through
+                    the same area: C rho0 sqrt(R T0) = A sqrt(1 - b)
     Cv              US gallons per minute of water at 1 psi; Kv = 0.865 Cv (IEC 60534)
     effective area  S of the loss-free nozzle with the same choked flow: C rho0 = S 0.6847/sqrt(R
-    T0), which is the
-                    rule S [mm2] = 5.0 C [dm3/(s bar)] of JIS B 8390 and of the catalogues of CKD
-                    and SMC
+                    T0), which is the rule S [mm2] = 5.0 C [dm3/(s bar)] of JIS B 8390 and of the
+                    catalogues of CKD and SMC
     diameter        of a round hole, S = c_d pi d^2/4 with its discharge coefficient c_d
 
 All conversions but that of the effective area need b. A data sheet with only Kv or the nominal flow
@@ -213,7 +210,8 @@ def in_series(*valves: Valve) -> Valve:
 
         C1 <= b1 C2    the first chokes     C = C1
         else           the second chokes    C = C2 s,  s = (b1 + sqrt(b1^2 + A (1 - 2 b1)))/A,  A =
-        1 + k^2 (1 - b1)^2 b = 1 - C^2 ((1 - b1)/C1^2 + (1 - b2)/C2^2)
+                       1 + k^2 (1 - b1)^2
+        b = 1 - C^2 ((1 - b1)/C1^2 + (1 - b2)/C2^2)
 
     s solves C2 s = C1 sqrt(1 - ((s - b1)/(1 - b1))^2). The order matters: C = 1 and 2 with b = 0.3
     give 0.97 in one order and 0.92 in the other. Of any number of valves, C is the largest flow

@@ -241,7 +241,7 @@ class Polytropic(BarotropicGas):
     """Polytropic gas: p / rho^n is constant and equal to that of the ambient air.
 
         p = p_amb (m R T_amb / (p_amb V))^n,   so that   p' = n (R T m' - p V') / V   with T = p V /
-        (m R)
+                                               (m R)
 
     n -> 1 is isothermal, n = 1.4 adiabatic. The process passes through ambient pressure and
     temperature; air that has cooled at a higher pressure is not described.

@@ -41,7 +41,7 @@ class ProportionalValve(ValvePair):
     """5/3 proportional directional valve for one muscle (second port plugged) or two muscles.
 
         opening of fill = clip((s - o)/(1 - o), 0, 1),   opening of discharge = clip((-s - o)/(1 -
-        o), 0, 1)
+                                                         o), 0, 1)
 
     s spool position from -1 to 1 at the first port, -s at the second; o overlap as a fraction of
     the stroke (negative for underlap, with leakage at the centre). Fill and discharge have separate
@@ -158,7 +158,8 @@ class PressureRegulator(ValvePair):
         delay      d_1' = 4 (p_c - d_1)/L,   d_i' = 4 (d_(i-1) - d_i)/L,  i = 2, 3, 4
         sensor     y' = (p - y)/T_f
         error      e = d_4 - y,   i' = k_i e a,   a = clip(2 - |e + i|/B, 0, 1) if e (e + i) > 0,
-        otherwise 1 pilot      v = clip((e + i)/B, -1, 1) + o clip(2 e/epsilon - 1, -1, 1)
+                   otherwise 1
+        pilot      v = clip((e + i)/B, -1, 1) + o clip(2 e/epsilon - 1, -1, 1)
                    w' = 2 (v - w)/T_p,   x' = 2 (w - x)/T_p
         fill       opening clip(x - o, 0, 1) + l clip((x + o)/(2 o), 0, 1)
         discharge  opening clip(-x - o, 0, 1) + l clip((o - x)/(2 o), 0, 1)

@@ -183,7 +183,7 @@ class DistributedTube(TubeModel):
     states.
 
         m_i' = q_(i-1) - q_i,   q_i' = (A/dx) (p_i - p_(i+1)) - f q_i,   f = 32 mu/(rho D^2) max(1,
-        Re/1187)^(3/4)
+                                Re/1187)^(3/4)
 
     q_0 flow from the valve, q_n flow into the muscle, p_(n+1) pressure in the muscle; dx = L/n, A =
     pi D^2/4, Re = |q| D/(A mu), rho mean density of both sides. The friction f is that of

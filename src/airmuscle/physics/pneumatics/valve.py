@@ -94,8 +94,8 @@ class SubsonicIndexValve(Orifice):
         phi = 1                                                       choked, p2/p1 <= b
         phi = (1 - ((p2/p1 - b)/(1 - b - dp_c/p1))^2)^m               subsonic
         phi = k (p1 - p2 - dp_c)/p1                                   within (1 - r) p1 above the
-        cracking pressure phi = 0                                                       closed, p1 -
-        p2 <= dp_c
+            cracking pressure
+        phi = 0                                                       closed, p1 - p2 <= dp_c
 
     p1 larger, p2 smaller absolute pressure; the sign of the flow is that of their difference. The
     cracking pressure applies in both directions (for one direction only, use CheckValve around this

@@ -44,11 +44,13 @@ def identify_campaign(
     the damping to releases. A stage that the records do not allow is left out with its reason.
 
     geometry  the geometry of the muscle; by default the volume follows from the static law and
-    fills at several lengths progress  called with the name of the stage and the completed fraction
-    of the campaign finished  called with the name and the result of each stage as it ends known
-    results of finished stages by name, from an interrupted call with the same recordings and
-    geometry workers   number of processes, as in `compare`: of the fits of loops and of the
-    candidates of the static law
+              fills at several lengths
+    progress  called with the name of the stage and the completed fraction of the campaign
+    finished  called with the name and the result of each stage as it ends
+    known     results of finished stages by name, from an interrupted call with the same recordings
+              and geometry
+    workers   number of processes, as in `compare`: of the fits of loops and of the candidates of
+              the static law
 
     Raises IdentificationError where no record can be used.
     """

@@ -179,7 +179,7 @@ def fit_fill_stage(
 
     geometry  the given geometry of the muscle; then the conductance follows from it
     change    the change of the volume with contraction; then fills at several lengths determine the
-    volume at rest
+              volume at rest
     """
     if not records:
         return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)

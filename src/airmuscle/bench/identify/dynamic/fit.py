@@ -130,7 +130,7 @@ def fit_tube(
 
     plant   a plant with a `Tube`, initial values
     fitted  the fit of a plant whose pressure sensor is in the first segment, `tube.pressure` or
-    `tube1.pressure`
+            `tube1.pressure`
 
     Several segments have the flow law of friction, a critical ratio of 0, for which the division of
     a `Tube` is exact; the number is no further unknown. One with which no fit is found is left out.

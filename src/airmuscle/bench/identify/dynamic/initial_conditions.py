@@ -46,7 +46,7 @@ class InitialConditions:
     stationary  states whose time derivative is zero
     equal       pairs of outputs that are equal
     settled     states of supplies and regulators in the steady state that follows from their
-    parameters
+                parameters
     """
 
     known: Mapping[str, float]

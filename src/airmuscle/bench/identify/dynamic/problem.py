@@ -2,7 +2,7 @@
 problem it solves.
 
     (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the maximum norms of the columns of J so
-    far
+                               far
 
 An unknown on its bound, with a gradient that points beyond it, is fixed for that step. An unknown
 that the step would move beyond a bound is set to that bound, and the step of the others is computed

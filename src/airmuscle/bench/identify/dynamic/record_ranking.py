@@ -127,8 +127,8 @@ def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> Record
     that only the candidate opens.
 
     pair  names of two estimates; by default the most correlated pair of a valve parameter
-    (conductance, critical ratio)
-          and a parameter of the wall or the gas (heat transfer, exponent, volume)
+          (conductance, critical ratio) and a parameter of the wall or the gas (heat transfer,
+          exponent, volume)
 
     Raises ParameterError for names that the fit lacks, IdentificationError without a pair.
     """

@@ -133,12 +133,12 @@ def fit_regulator(
 
     supply_pressure  gauge pressure of the supply [Pa]
     volume           air volume behind the regulator [m3]; a record determines only conductance over
-    volume, so that an
-                     unknown volume may stay at its default (chosen)
+                     volume, so that an unknown volume may stay at its default (chosen)
     noise            standard deviation of the pressure sensor [Pa]
     initial          regulator from which the search starts, by default from the slopes of the
-    records free             the fitted parameters, of `COMMANDS` starts, seed     greatest number
-    of searches, and the seed of their initial guesses
+                     records
+    free             the fitted parameters, of `COMMANDS`
+    starts, seed     greatest number of searches, and the seed of their initial guesses
 
     A command holds its value until the next row. What the records do not determine is named with
     the command that would. Raises ColumnError for a missing column, IdentificationError for a

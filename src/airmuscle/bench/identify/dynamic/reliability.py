@@ -188,8 +188,9 @@ def describe_bounds(
 
     jacobian  of the residuals by the scaled unknowns, shape (R, P)
     inverse   (J^T J)^-1 of the unknowns that are not on a bound, in their order; NaN where
-    undetermined scales    magnitudes of the unknowns [SI], shape (P,) origins   values from which
-    the unknowns are counted [SI], shape (P,)
+              undetermined
+    scales    magnitudes of the unknowns [SI], shape (P,)
+    origins   values from which the unknowns are counted [SI], shape (P,)
     """
     inner = np.flatnonzero(~on_bound)
     notes = []

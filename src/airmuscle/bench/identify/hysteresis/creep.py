@@ -250,9 +250,10 @@ def creep_elements(
     creep.
 
     step            shortening of the muscle [m] by the fast change before the hold, negative for an
-    elongation stiffness       static stiffness K [N/m] of the relaxed muscle at constant pressure;
-    needed for a hold under a load resting_length  [m]; needed for a hold under a load, whose creep
-    is a contraction
+                    elongation
+    stiffness       static stiffness K [N/m] of the relaxed muscle at constant pressure; needed for
+                    a hold under a load
+    resting_length  [m]; needed for a hold under a load, whose creep is a contraction
 
     The fast change must be quick compared with the time constants, and the muscle taut. Raises
     ParameterError for a missing or invalid value, IdentificationError for creep in the wrong

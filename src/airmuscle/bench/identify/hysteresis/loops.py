@@ -212,14 +212,12 @@ def fit_hysteresis(
 
     friction       the law with its initial parameters, see `initial_friction_laws`
     static_curve   the force without friction; its coefficients are fitted with the friction, and
-    once more without it
-                   for a fair comparison
+                   once more without it for a fair comparison
     friction_path  the displacement along which the friction slides
     fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive
-    force. The path
-                   includes all rows from the first, where the bristles are relaxed
+                   force. The path includes all rows from the first, where the bristles are relaxed
     repeat         a second run of the same loop with its mask, for the repeatability and the error
-    on other data
+                   on other data
 
     Raises IdentificationError where there are too few rows or the path is constant.
     """

@@ -66,13 +66,11 @@ def predict_static(
     half_width      half width of the stated 95 % band of the quantity [SI]
     validity_range  range of the measurements of the law; rows outside it are counted in a note
     rates           maximum rates of contraction [1/s] and pressure [Pa/s] of these measurements, by
-    quantity; a record
-                    that is faster is named in a note
+                    quantity; a record that is faster is named in a note
     band            where the band comes from, or why there is none
     notes           further notes on the record
     differences     what differs from the muscle of the fit, such as "another specimen": named as
-    likely reason where
-                    far fewer than 95 % of the rows are within the band
+                    likely reason where far fewer than 95 % of the rows are within the band
 
     Rows without tension are compared where the predicted force exceeds the half width, or 0 without
     one. Raises ColumnError for a recording without these columns or without tension.
@@ -238,14 +236,12 @@ class PlantUncertainty(ShortRepr):
     """The uncertainty of an identified plant.
 
     deviations  standard deviation of the residuals of each observed quantity [SI], with the model
-    error that the
-                records of the fit showed
+                error that the records of the fit showed
     parameters  the fitted parameters; several paths have one common value
     covariance  their covariance matrix [SI], shape (P, P)
     records     number of records of the fit; None if it is not known
     factors     half width of the band in standard deviations, from records that were predicted by
-    the others; with
-                `records`, a quantity without a factor has no band
+                the others; with `records`, a quantity without a factor has no band
     ranges      ends of the measured quantities in the records of the fit [SI]
     rates       their maximum rates of change [SI per s]
     """
@@ -302,20 +298,16 @@ def predict_dynamic(
     conditions.
 
     plant        the identified plant; that of the experiment replaces it, for example one in other
-    ambient air, which a
-                 note states
+                 ambient air, which a note states
     observed     the quantities to predict, outputs of the plant that the recording has, each with
-    the standard
-                 deviation of its sensor [SI], which weights the estimation of `own`; 0 where it is
-                 not known
+                 the standard deviation of its sensor [SI], which weights the estimation of `own`; 0
+                 where it is not known
     uncertainty  of the plant; the half width of the 95 % band is k sqrt(g^T C g + s^2) with the
-    sensitivities g to the
-                 fitted parameters, their covariance C, the standard deviation s of the residuals
-                 and its factor k
+                 sensitivities g to the fitted parameters, their covariance C, the standard
+                 deviation s of the residuals and its factor k
     own          unknowns that are estimated from the record itself before the prediction:
-    StartTime(margin),
-                 CommandInstants(margin), InitialValue(name, margin) or paths, such as a supply
-                 pressure
+                 StartTime(margin), CommandInstants(margin), InitialValue(name, margin) or paths,
+                 such as a supply pressure
     method       by default Rodas4(rtol=1e-6)
 
     Raises IdentificationError where the simulation fails, ParameterError for unknown names.

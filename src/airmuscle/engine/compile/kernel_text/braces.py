@@ -131,8 +131,9 @@ class CKernels(BraceKernels):
     """Kernels in C; the first result is that of the function, the others are written to pointers.
 
     shapes  sizes of the arrays of several dimensions, by the names of the arguments: ("",
-    "CAPACITY") prefix  beginning of the names of the functions of the system number  type of all
-    numbers, double or float
+            "CAPACITY")
+    prefix  beginning of the names of the functions of the system
+    number  type of all numbers, double or float
     """
 
     reserved = frozenset(_C_KEYWORDS.split())

@@ -18,8 +18,7 @@ class MatlabKernels(KernelPrinter):
     array) of tables.
 
     shapes  sizes of arrays, by the names of the arguments: a loop over all elements of arrays of
-    one size, which are
-            columns, is printed as operations on whole arrays
+            one size, which are columns, is printed as operations on whole arrays
     """
 
     reserved = frozenset(_KEYWORDS.split())

@@ -43,7 +43,8 @@ def choose_mode(
     modes            (M, m) inputs; changes (M, M) cost of the change from one mode to another
     states           (K + 1, N): the first row is the state now; costs (K + 1,)
     sequence         (K + 1,): the first is the mode before now; best (K + 1,): the cost in [0], the
-    modes after it count            (2,): steps that were computed, and sequences that were complete
+                     modes after it
+    count            (2,): steps that were computed, and sequences that were complete
     y, slopes        (p,), (p, N); f, a, work as in `predict_extended`: workspace
 
     A sequence whose cost exceeds the best one so far is not continued. Of equal sequences the first

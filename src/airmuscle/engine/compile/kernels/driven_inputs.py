@@ -96,7 +96,8 @@ def apply_drivers(kinds, settings, states, later, columns, counts, scratch, star
 
     kinds (D, 2)  input and kind of each driver, in the order of the signal
     states        of each driver; `later` receives those at the end of the signals, and may be the
-    same array ulp           distance from the end of the signals to the next floating-point number
+                  same array
+    ulp           distance from the end of the signals to the next floating-point number
     scratch       (2, 3, capacity): workspace
     """
     for d in range(kinds.shape[0]):

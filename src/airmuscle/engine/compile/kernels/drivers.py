@@ -44,8 +44,8 @@ def pulse_width_modulation(settings, state, later, signal, count, start, ulp, re
 
     settings  frequency, smallest pulse
     state     origin of the carrier, periods begun, end of the last pulse; `later` receives it at
-    the end of the signal ulp       distance from the end of the signal to the next floating-point
-    number
+              the end of the signal
+    ulp       distance from the end of the signal to the next floating-point number
     """
     end = signal[0, count - 1]
     frequency = settings[0]

@@ -58,8 +58,9 @@ def end_step(
 
     lower, upper  (n,): limits of the states; low, high (k,): limits of the outputs
     state, inputs, outputs  take `end`, `given`, `values` where all are within their limits, or
-    `always` (1,) is not 0 Returns 0 where all numbers are within their limits, else 1 + the index
-    of the first, states before outputs.
+                            `always` (1,) is not 0
+    Returns 0 where all numbers are within their limits, else 1 + the index of the first, states
+    before outputs.
     """
     n = end.shape[0]
     defect = 0
@@ -182,9 +183,9 @@ def record(
     that is not finite.
 
     function(x, u, c, o)  address of the outputs at W rows: `outputs` of a program, or its
-    `row_outputs` begin, ends, values, slopes  beginning of the first segment, and as in `rodas4`;
-    of a row where two segments meet
-                 the inputs are those that begin there
+                          `row_outputs`
+    begin, ends, values, slopes  beginning of the first segment, and as in `rodas4`; of a row where
+                                 two segments meet the inputs are those that begin there
     columns      (r,) numbers of the columns whose range is wanted: of a state i, of an output n + i
     lower, upper (r,): smallest and largest value of each of these columns
     x, u, o      (W, n), (W, m), (W, k): workspace

@@ -116,9 +116,9 @@ def fixed_step(step, c, y, ends, values, slopes, times, rows, length, clock, cou
 
     step(x, u, c, w, h, y)  address of the printed step; `c` what it needs of the parameters
     ends, values, slopes, clock, count, budget  as in `rodas4`; clock[1] counts the steps of the
-    current segment work  (n + m,): the caller owns it, because an array that a kernel makes and
-    then knows by address alone is
-          freed before its last use
+                                                current segment
+    work  (n + m,): the caller owns it, because an array that a kernel makes and then knows by
+          address alone is freed before its last use
     """
     n = y.shape[0]
     new = work[:n]

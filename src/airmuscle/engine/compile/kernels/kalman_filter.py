@@ -161,7 +161,7 @@ def predict_unscented(
     sizes    (N,) magnitudes of the states
     weights  (3,): of the mean of the central point, of its covariance, of all other points
     points   (2 N + 1, N): the sigma points; root (N, N), f (n,), a (n, N), work (5, n, N + 1):
-    workspace
+             workspace
     """
     n = f.shape[0]
     total = x.shape[0]

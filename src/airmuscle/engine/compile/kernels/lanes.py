@@ -271,15 +271,16 @@ def lanes(
     INTERRUPTED.
 
     prepare(p, c), step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions,
-    W lanes each p, c, y, other, u, base, w, h, o  (k, W) arrays of the printed numbers, each
-    beginning at a multiple of 64 bytes;
-                          p and y are given, the rest is room
+        W lanes each
+    p, c, y, other, u, base, w, h, o  (k, W) arrays of the printed numbers, each beginning at a
+                                      multiple of 64 bytes; p and y are given, the rest is room
     ends, values, slopes  (S,), (S, m), (S, m): segments of all systems, one after the other
     first, last           (W,): the segments of each lane are first .. last - 1
     times, chosen         (T,) instants in rising order, (C,) columns: states, then outputs, then
-    inputs rows, final, status   (C, W, T), (W, n), (W,): what is found stop                  (1,):
-    the caller sets it to something else than 0 to end this early segment .. start      (W,):
-    workspace
+                          inputs
+    rows, final, status   (C, W, T), (W, n), (W,): what is found
+    stop                  (1,): the caller sets it to something else than 0 to end this early
+    segment .. start      (W,): workspace
     """
     n, width = y.shape
     moving = False
@@ -356,8 +357,8 @@ def lane_blocks(step, outputs, x, u, c, w, h, other, o, span, steps):
 
     step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each
     x, u, c, o  (B, n, W), (B, m, W), (B, C, W), (B, k, W): states, inputs, what `prepare` left,
-    outputs of each block w, h, other  (m, W), (1, W), (n, W): zeros, the length of a step, and
-    workspace
+                outputs of each block
+    w, h, other  (m, W), (1, W), (n, W): zeros, the length of a step, and workspace
     """
     at_w = pointer(w)
     at_h = pointer(h)

@@ -221,19 +221,20 @@ def loop_lanes(
     """Run the loops of W systems from sample to sample; DONE or INTERRUPTED.
 
     prepare, step, outputs  as in `lanes`; sample(measured, setpoints, memory, low, high, period,
-    parameters, command,
+                            parameters, command,
                             later)  address of the controller in W lanes
     p .. period             (k, W) arrays of the printed numbers, each beginning at a multiple of 64
-    bytes; p, y, u (the
-                            inputs before the first sample), memory, parameters, low, high and
-                            period are given
+                            bytes; p, y, u (the inputs before the first sample), memory, parameters,
+                            low, high and period are given
     edges (K + 1,), setpoints (K, s, W), first (K + 1,)  intervals, and the first segment of each
     starts, ends (S,), values, slopes (S, m, W)  segments of the inputs; the commands are written
-    into them times, row_segment      (T,) instants in rising order, and the segment from which the
-    inputs of each are shown chosen, rows            (C,) columns: states, then outputs, then
-    inputs; (C, W, T) samples, commands       (K, .., W) measurements and commands of every interval
+                                                 into them
+    times, row_segment      (T,) instants in rising order, and the segment from which the inputs of
+                            each are shown
+    chosen, rows            (C,) columns: states, then outputs, then inputs; (C, W, T)
+    samples, commands       (K, .., W) measurements and commands of every interval
     bounds, status, stop    (n,); (W,) DONE, or NOT_FINITE for a lane whose run failed somehow; as
-    in `lanes`
+                            in `lanes`
     """
     n, width = y.shape
     needs_outputs = False

@@ -87,7 +87,8 @@ def exponential_step(rates, c, sizes, x, u, h, f, a, m, square, cube, e, other):
     increment of state k.
 
     rates(x, u, c, f, a)   its address: f (n,), a = df/dx (n, N); the N - n states at the end have
-    no rates m, square, cube, other (n, N + 1): workspace
+                           no rates
+    m, square, cube, other (n, N + 1): workspace
 
     exp of the matrix ((h A, h f), (0, 0)), scaled by the magnitudes `sizes` (N,) of the states: a
     Taylor polynomial of a matrix whose norm was halved to less than 1/8, then squared.

@@ -228,10 +228,12 @@ def pair_solutions(
     into `counts` (N,).
 
     first, second  addresses of functions in lanes, (t, x) -> (q, k, dq/dx, dk/dx, s); s > 0 at a
-    solution levels         (G, LANES): boundaries of the cells in x and in y, in ascending order;
-    after the last one repeated arguments (3, LANES), values and other_values (5, LANES): aligned
-    workspace; ends (2, 3, 2, C), cells (C^2 + LANES,) A count above R says that there were more
-    solutions; equal ones are not removed.
+                   solution
+    levels         (G, LANES): boundaries of the cells in x and in y, in ascending order; after the
+                   last one repeated
+    arguments (3, LANES), values and other_values (5, LANES): aligned workspace; ends (2, 3, 2, C),
+    cells (C^2 + LANES,) A count above R says that there were more solutions; equal ones are not
+    removed.
     """
     size = ends.shape[3]
     t = arguments[0]

@@ -201,7 +201,8 @@ def shortest_vector(
 
     tolerances  (4,) by FEASIBLE, ACCURATE, DEPENDENT, POSITIVE
     active   (r,): 1.0 at the upper limit, -1 at the lower, 0 at none: the first guess, and the
-    result order, multipliers, change, rest (n,), factor (n, n): workspace
+             result
+    order, multipliers, change, rest (n,), factor (n, n): workspace
 
     Dual active-set method: w = -m^T multipliers fulfils the limits of the active rows; the row that
     is violated most becomes active, and one whose multiplier changes its sign is released. Every
@@ -315,13 +316,16 @@ def predictive_sample(
     status of the program.
 
     y, r              measured columns (p,) and set points (q,); low, high: limits of the inputs
-    (m,) by_output, gain, transition, by_input   (p, N), (N, p), (N, N), (N, m) of the observer rest
-    (m, N + q + m) the inputs of the target by the point m, of_input, scale, fixed_low, fixed_high,
-    by_point   rows (r, n) of length 1, input or -1, scale, limits plan_by_w, plan_by_point    (N_h
-    m, n), (N_h m, N + q + m); tolerances those of `shortest_vector` predicted, plan, active
-    (N,), (N_h m,), (r,); inputs (m,) those of the last sample counts            (2,): samples since
-    the plan was found, -1 without one; failures so far Without a solution the next input of the
-    last plan is applied, after its end that of the target.
+                      (m,)
+    by_output, gain, transition, by_input   (p, N), (N, p), (N, N), (N, m) of the observer
+    rest              (m, N + q + m) the inputs of the target by the point
+    m, of_input, scale, fixed_low, fixed_high, by_point   rows (r, n) of length 1, input or -1,
+                                                          scale, limits
+    plan_by_w, plan_by_point    (N_h m, n), (N_h m, N + q + m); tolerances those of
+                                `shortest_vector`
+    predicted, plan, active    (N,), (N_h m,), (r,); inputs (m,) those of the last sample
+    counts            (2,): samples since the plan was found, -1 without one; failures so far
+    Without a solution the next input of the last plan is applied, after its end that of the target.
     """
     find_point(y, r, by_output, gain, predicted, inputs, innovation, point)
     find_limits(low, high, of_input, scale, fixed_low, fixed_high, by_point, point, lower, upper)

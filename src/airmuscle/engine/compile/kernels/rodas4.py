@@ -432,10 +432,13 @@ def rodas4(
 
     stage .. df_dt  addresses of the printed functions; `c` what they need of the parameters
     ends, values, slopes  (S,), (S, m), (S, m): end of each segment, inputs at its start, their
-    slopes clock  (3,): time, next step (0: to be found), start of the current segment count  (4,):
-    segment, next row, steps, rejected steps budget  steps after which the kernel pauses, so that
-    its caller can be interrupted; call again to go on work  (11 n + 2 m + jacobian_size +
-    factor_size,): of the caller; a kernel's own would be freed before its last use
+                          slopes
+    clock  (3,): time, next step (0: to be found), start of the current segment
+    count  (4,): segment, next row, steps, rejected steps
+    budget  steps after which the kernel pauses, so that its caller can be interrupted; call again
+            to go on
+    work  (11 n + 2 m + jacobian_size + factor_size,): of the caller; a kernel's own would be freed
+          before its last use
     """
     f0, ft, x, yn, g, k, u, w, jacobian, factors = workspace(
         work, y.shape[0], values.shape[1], jacobian_size

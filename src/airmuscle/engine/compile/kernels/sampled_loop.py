@@ -318,20 +318,24 @@ def sampled_loop(
     """Run the intervals until the end, an event, or the step limit of one call; a status.
 
     integrate, slots, places, clock, count, y  entry point of the integrator, its slots, the places
-    in them of ends,
-                  values, slopes, times and rows; its clock, counts and state
+                                               in them of ends, values, slopes, times and rows; its
+                                               clock, counts and state
     outputs, c, o, measured_at  printed outputs; where each measured column stands among states and
-    outputs sample(measured, setpoints, memory, low, high, period, parameters, command, memory)
-    address of the controller; 0:
-                  the kernel pauses at each sample, and its caller writes the commands
+                                outputs
+    sample(measured, setpoints, memory, low, high, period, parameters, command, memory)  address of
+        the controller; 0: the kernel pauses at each sample, and its caller writes the commands
     edges (K + 1,), ulps (K + 1,), setpoints (K, s)  intervals; samples begin with number
-    `first_sample` ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  segments and output
-    times, and the first of each interval kinds .. begins  drivers (D, ..) and their workspace
-    memory (2, ..)  of the last completed interval, and of the present one kept, kept_applied,
-    kept_states  state, inputs and drivers at the end of the last completed interval new_ends ..
-    rows  buffers: segments, times and rows of the run, with the instants that drivers add samples
-    (K, ..), commands (K, ..)  measurements and commands of every interval progress      see
-    `kernel_layout.Progress`
+                                                     `first_sample`
+    ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  segments and output times, and the
+        first of each interval
+    kinds .. begins  drivers (D, ..) and their workspace
+    memory (2, ..)  of the last completed interval, and of the present one
+    kept, kept_applied, kept_states  state, inputs and drivers at the end of the last completed
+                                     interval
+    new_ends .. rows  buffers: segments, times and rows of the run, with the instants that drivers
+                      add
+    samples (K, ..), commands (K, ..)  measurements and commands of every interval
+    progress      see `kernel_layout.Progress`
     """
     intervals = edges.shape[0] - 1
     driven = kinds.shape[0]

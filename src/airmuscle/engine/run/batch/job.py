@@ -38,7 +38,7 @@ class BatchJob:
 
     template  a problem with the plant, for which loops are prepared; None without loops
     loops     one for all plants, or one for each; their controllers `laws`, where their parameters
-    differ
+              differ
 
     Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of
     rows `reached` (N,), and `reasons`, which say why plants failed.

@@ -73,8 +73,7 @@ class LaneArrays(abc.ABC):
     addresses.
 
     more  sizes of further arrays after those of the step: parameters, what it needs of them, states
-    (two), inputs,
-          their start and slopes, length, outputs
+          (two), inputs, their start and slopes, length, outputs
     """
 
     def __init__(self, job: BatchJob, precision: Precision, more: tuple[int, ...] = ()) -> None:

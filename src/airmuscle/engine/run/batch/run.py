@@ -44,26 +44,25 @@ def simulate_batch(
     not stop the others.
 
     plant           any System: a Plant, a user-defined one, or WithSensitivities(...), whose
-    derivatives are then
-                    computed in the same pass
+                    derivatives are then computed in the same pass
     variations      values (N,) by the path of a parameter, as `airmuscle.core.tree.leaves` names it
-    (`mechanism.mass`) input           an InputSignal or a ControlLoop for all, or one for each.
-    With one ControlLoop for all `variations`
-                    may name parameters of its controller, if it is a ControlLaw: `controller.gain`
+                    (`mechanism.mass`)
+    input           an InputSignal or a ControlLoop for all, or one for each. With one ControlLoop
+                    for all `variations` may name parameters of its controller, if it is a
+                    ControlLaw: `controller.gain`
     initial_states  by state a number for all or a column (N,); by default each Plant's equilibrium
-    at ambient pressure output_times    as in `simulate`; with one input for all its instants are
-    among the rows integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps,
-    exactly as in `simulate`. With an
-                    integrator of fixed step, RungeKutta4(1e-3), sixteen plants are computed
-                    together, much faster; so are loops of control laws without drivers whose
-                    sampling instants are the same
+                    at ambient pressure
+    output_times    as in `simulate`; with one input for all its instants are among the rows
+    integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps, exactly as in
+                    `simulate`. With an integrator of fixed step, RungeKutta4(1e-3), sixteen plants
+                    are computed together, much faster; so are loops of control laws without drivers
+                    whose sampling instants are the same
     keep            columns to be kept (N, T): states, outputs, inputs, those of a loop such as
-    `command.fill`; all
-                    unless given, () for final states alone
+                    `command.fill`; all unless given, () for final states alone
     into            folder for the columns, one .npy file each; without it they are held in memory
     precision       Double() or Single()
     cores           threads; all cores of this process unless given. The result does not depend on
-    it
+                    it
 
     Raises ParameterError for an impossible path, value, initial state, input or column; the row is
     named. An interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants

@@ -31,8 +31,8 @@ class BatchStepper:
     cores       threads; all cores of this process unless given. The result does not depend on it
 
     states, inputs, parameters, outputs   (B, k, W): blocks of W lanes; plant i is lane i % W of
-    block i // W. The
-                last block is filled up with further plants, whose numbers are not used
+                                          block i // W. The last block is filled up with further
+                                          plants, whose numbers are not used
 
     Nothing is checked between steps: a state that is impossible becomes a number that is not
     finite. `close` ends the threads. Raises ParameterError for a number of plants or an integrator

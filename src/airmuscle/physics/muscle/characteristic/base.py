@@ -84,7 +84,7 @@ class Characteristic(QuantityMethods, abc.ABC):
         structures.
 
         surface  a surface of a total degree with coefficients of zero, for laws that contain
-        another one
+                 another one
 
         Empty for a law without `guess`. Raises IdentificationError as `guess`.
         """

@@ -88,7 +88,7 @@ class ExactMeridian(RubberLaw, PressureLaw):
     N: fibre tension; phi: slope angle; r: radius. With r = R - (R - r_0) v^2, C = F/(pi p) + r^2,
     z = R + r - (2 t/p)(alpha (R + r - 2 r_0)/(2 r_0) + beta), n = C + (R - r) z, per segment:
         l_0 = 4 sqrt(R - r_0) Int_0^1 n/sqrt(z (n + C)) dv,   l = 4 sqrt(R - r_0) Int_0^1 C/sqrt(z
-        (n + C)) dv.
+            (n + C)) dv.
     R: maximum radius; r_0: end radius; t: wall thickness; sigma = alpha (r - r_0)/r_0 + beta: hoop
     stress. The two unknowns (R and p, or R and F) are computed by Newton's method. If z is not
     positive, the tube would contract below r_0, where the rubber line is not defined, and there is

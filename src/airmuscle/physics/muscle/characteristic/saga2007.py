@@ -59,7 +59,7 @@ class Saga2007(RubberLaw, PressureLaw):
     accuracy at small contraction; A_1 = Int r dx; H = Int sigma (12); r_0 = d_0/2; t wall
     thickness; m fibres; M sum of their sines (15). In full:
         P = [2 m t (alpha l^2 + 6 a beta d_0) + 12 d_0 M F/q]/(d_0 [w m (l^2 + 6 a d_0) - 3 pi M
-        d_0^2/q]).
+            d_0^2/q]).
     Interpretations: w = 2 as printed in (17), 1 as required by (16); q = 1 as printed in (7), (8),
     (14), (18), 2 from the end slope of (2); M printed, corrected or uniform; H along the axis as
     printed, or along the arc. The default is as printed (w = 2, q = 1, axis) with the corrected

@@ -56,7 +56,7 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
     """Straight-fibre muscle with a circular meridian, by virtual work.
 
         F = (p dV/deps - dU/deps)/l_0,   U = 2 pi t [alpha Q/(2 r_0) + beta G],   sin(psi)/psi = 1 -
-        eps
+                                         eps
 
     Per segment of fibre length l_0 and end radius r_0: V volume, G = Int (r - r_0) ds, Q = Int (r -
     r_0)^2 ds of the circular arc with half angle psi, all in closed form. Volume and force follow

@@ -26,7 +26,7 @@ def element_rate(deflection: Value, limit: Value, transition: Value, speed: Valu
     sliding.
 
     d(delta)/dt = v (1 - s),  s = (|delta|/Delta - 1 + eta)/eta limited to 0..1 if v increases
-    |delta|, else s = 0.
+                              |delta|, else s = 0.
     """
     forward = (deflection / limit - 1.0 + transition) / transition
     backward = (-deflection / limit - 1.0 + transition) / transition

@@ -181,8 +181,8 @@ class PleatedTube(FibreTube):
     the fibre.
 
         l_0 = (R/sqrt mu) F,  l = (R/sqrt mu)(2 E - F),  eps = 2 (1 - E/F),  F/p = pi R^2 (1 - 2
-        mu)/(2 mu) V = (pi R^3/(3 mu^1.5)) [(1 - mu) F - (1 - 2 mu) E + 2 mu sin(theta_0)
-        cos(theta_0) D_0]
+                              mu)/(2 mu)
+        V = (pi R^3/(3 mu^1.5)) [(1 - mu) F - (1 - 2 mu) E + 2 mu sin(theta_0) cos(theta_0) D_0]
 
     R: maximum radius; F, E: incomplete elliptic integrals F(theta_0 | mu), E(theta_0 | mu) with
     parameter mu = R^2/(2 (R^2 + A)), A = F/(pi p), cos(theta_0) = r_0/R, D_0 = sqrt(1 - mu sin^2
