@@ -108,7 +108,7 @@ def test_each_segment_is_a_recording_and_one_can_be_selected(tmp_path):
     for each in recordings:
         same(each)
     same(*read(path, ColumnMapping(group="2")))
-    with pytest.raises(FileError, match=r"bench\.lvm: no segment '4'; it has 1, 2, 3"):
+    with pytest.raises(FileError, match=r"bench\.lvm: no segment '4'; the segments are 1, 2, 3"):
         read(path, ColumnMapping(group="4"))
 
 

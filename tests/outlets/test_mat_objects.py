@@ -98,7 +98,7 @@ def test_a_damaged_file_has_no_objects(tmp_path):
 def test_an_object_alone_is_named_with_the_command_that_exports_it(tmp_path, class_name, export):
     path = with_objects(tmp_path / "run.mat", {"T": class_name}, {})
     with pytest.raises(FileError, match=rf"T is a MATLAB {class_name}\).*{export}"):
-        read_mat_tables.__wrapped__(path, None)
+        read_mat_tables(path)
 
 
 @pytest.mark.usefixtures("without_package")
@@ -106,7 +106,7 @@ def test_an_object_beside_vectors_is_a_note_and_no_column(tmp_path):
     path = with_objects(
         tmp_path / "run.mat", {"T": "table"}, {"force_N": FORCE, "pressure_kPa": 10 * FORCE}
     )
-    (table,) = read_mat_tables.__wrapped__(path, None)
+    (table,) = read_mat_tables(path)
     assert table.headings == ("force_N", "pressure_kPa")
     assert "Not read: T is a MATLAB table." in table.notes[-1]
 

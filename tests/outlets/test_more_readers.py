@@ -158,7 +158,7 @@ def test_hdf5_groups_matrices_and_records_are_runs(tmp_path: Path):
     for recording in recordings:
         same(recording)
     same(read(path, ColumnMapping(group="/rig/run1"))[0])
-    assert "no group '/rig/run2'" in refusal(FileError, path, group="/rig/run2")
+    assert "no group 'rig/run2'" in refusal(FileError, path, group="/rig/run2")
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,13 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import raw_columnar, raw_mat, raw_mdf_tdms_ros, read_contents
+from airmuscle.bench.readers import (
+    Selection,
+    raw_hdf5,
+    raw_mat,
+    raw_mdf,
+    read_contents,
+)
 from airmuscle.bench.readers import time_base as pieces
 from airmuscle.errors import AirmuscleError, ColumnError
 
@@ -107,19 +113,27 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
         (
             "run.h5",
             hdf5,
-            lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/log", d),
+            lambda path, d: raw_hdf5.read_hdf5_tables(path, Selection("/log", downsampling=d)),
         ),
-        ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/", d)),
+        (
+            "run.h5",
+            hdf5,
+            lambda path, d: raw_hdf5.read_hdf5_tables(path, Selection("/", downsampling=d)),
+        ),
         (
             "run.mat",
             mat_7_3,
-            lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d),
+            lambda path, d: raw_mat.read_mat_tables(path, Selection("run", downsampling=d)),
         ),
-        ("run.mat", mat_5, lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d)),
+        (
+            "run.mat",
+            mat_5,
+            lambda path, d: raw_mat.read_mat_tables(path, Selection("run", downsampling=d)),
+        ),
         (
             "run.mf4",
             mdf,
-            lambda path, d: raw_mdf_tdms_ros.read_mdf_tables.__wrapped__(path, None, d),
+            lambda path, d: raw_mdf.read_mdf_tables(path, Selection(downsampling=d)),
         ),
     ],
 )
@@ -187,7 +201,9 @@ def test_lengths_that_the_reduction_would_hide_are_refused(tmp_path):
         file["time_s"] = TIME[:10_000]
         file["force_N"] = FORCE[:9_999]
     with pytest.raises(ColumnError, match=r"different lengths \(9999, 10000 rows\)"):
-        raw_columnar.read_hdf5_tables.__wrapped__(tmp_path / "run.h5", None, Decimation(1000))
+        raw_hdf5.read_hdf5_tables(
+            tmp_path / "run.h5", Selection(None, downsampling=Decimation(1000))
+        )
 
 
 @pytest.mark.parametrize("write", [mat_7_3, mat_5])
@@ -201,11 +217,11 @@ def test_a_damaged_large_file_is_an_error_and_no_crash(tmp_path, write):
 MEASURE = """
 import sys, resource, pathlib
 from airmuscle.bench import Decimation
-from airmuscle.bench.readers.raw_mat import read_mat_tables
+from airmuscle.bench.readers import Selection, read_mat_tables
 path = pathlib.Path(sys.argv[1])
-read_mat_tables.__wrapped__(pathlib.Path(sys.argv[2]), None, (), Decimation(1000))
+read_mat_tables(pathlib.Path(sys.argv[2]), Selection(downsampling=Decimation(1000)))
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-(table,) = read_mat_tables.__wrapped__(path, None, (), Decimation(10_000))
+(table,) = read_mat_tables(path, Selection(downsampling=Decimation(10_000)))
 print(len(table.rows), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
 

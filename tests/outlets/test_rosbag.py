@@ -143,7 +143,7 @@ def test_one_topic_can_be_chosen(bag):
     (run,) = read(bag, ColumnMapping(group="/arm/joints"))
     assert list(run) == ["time", "arm.joints.position.elbow", "arm.joints.position.wrist"]
     assert len(run) == 11
-    with pytest.raises(FileError, match="there is no topic nothing"):
+    with pytest.raises(FileError, match="no topic 'nothing'; the topics are"):
         read(bag, ColumnMapping(group="nothing"))
 
 

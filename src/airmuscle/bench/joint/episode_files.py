@@ -34,8 +34,9 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, ColumnError, FileError, alternatives, check_known, counted, quantity
+from ..readers.arrays import Arrays
 from ..readers.file_kind import read_toml
-from .episode_formats import Arrays, find_episode_files, read_arrays
+from .episode_formats import find_episode_files, read_arrays
 from .episodes import Episode, Episodes, join, speed_of
 
 TABLES = ("angles", "speeds", "pressures", "commands", "arm")
@@ -99,6 +100,13 @@ class EpisodeMapping:
     starts: str | None = None
     pairs: tuple[tuple[int, int], ...] = ()
     axes: tuple[tuple[int, int, int], ...] = ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns and arrays that are used."""
+        quantities = (self.angles, self.pressures, self.speeds, self.commands)
+        named = [name for each in quantities if each is not None for name in each.columns]
+        return (*named, *(name for name in (self.time, self.starts) if name is not None))
 
 
 def read_episode_mapping(path: str | Path) -> EpisodeMapping:
@@ -208,7 +216,7 @@ def read_episodes(source: str | Path, mapping: str | Path | EpisodeMapping) -> E
 
 
 def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
-    tables, notes = read_arrays(path, mapping.sample_time)
+    tables, notes = read_arrays(path, mapping.sample_time, mapping.columns)
     runs = []
     times = []
     for number, arrays in enumerate(tables):

@@ -1,5 +1,5 @@
-"""Formats of episodes: NPZ, CSV, JSON, HDF5, Parquet, ROS bags and RLDS-like steps, as arrays by
-name.
+"""Files of episodes: one file or bag for each, or one for all, of every format of the readers, and
+the proposal of a mapping file.
 
 An array inside another table has a dotted name: the steps of an RLDS episode have
 `observation.angle` and `action`, the messages of a bag `joint_states.position.elbow`. A row of an
@@ -8,25 +8,20 @@ array is a step.
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError, FileError
-from ..readers.channels import RawTable
-from ..readers.raw_csv import read_csv_table
-from ..readers.raw_mdf_tdms_ros import read_rosbag_tables
-from ..readers.separate_process import import_lab_package, reading
+from ...core import ColumnError, FileError
+from ..readers.arrays import Arrays, arrays_of_table
+from ..readers.formats import EPISODE_EXTENSIONS, TEXT, format_of
+from ..readers.selection import Selection
 from .episode_inspection import TURN
 
-Arrays = Mapping[str, Array]
 METADATA = "metadata.yaml"
 MAX_GAP = 5.0
 """Greatest interval of two messages of a bag, in rows, that is interpolated (chosen)."""
-STEPS = "steps"
-"""The table of an RLDS episode whose name is left out."""
 TFRECORD = (
     "TFRecord files are not read. Write each episode with the package that made them:"
     " numpy.savez('1.npz', **{'observation.angle': angles, 'action': actions}), one array (rows,"
@@ -40,9 +35,7 @@ def find_episode_files(path: Path) -> list[Path]:
     """
     if not path.is_dir() or _is_bag(path):
         return [path]
-    found = sorted(
-        each for each in path.iterdir() if each.suffix.lower() in SUPPORTED or _is_bag(each)
-    )
+    found = sorted(each for each in path.iterdir() if _is_episode(each))
     if not found:
         steps = any(".tfrecord" in each.name for each in path.iterdir())
         raise FileError(
@@ -51,35 +44,42 @@ def find_episode_files(path: Path) -> list[Path]:
     return found
 
 
+def _is_episode(path: Path) -> bool:
+    named = path.suffix.lower() in EPISODE_EXTENSIONS and not path.name.startswith(".")
+    return (named and path.is_file()) or _is_bag(path)
+
+
 def _is_bag(path: Path) -> bool:
     return path.is_dir() and (path / METADATA).exists()
 
 
 def read_arrays(
-    path: Path, sample_time: float | None = None
+    path: Path, sample_time: float | None = None, columns: Sequence[str] = ()
 ) -> tuple[list[Arrays], tuple[str, ...]]:
     """The arrays of every episode in a file or a bag, which is interpolated to multiples of the
-    sample time [s] or its median interval, and notes on their reading. Raises FileError or
-    ColumnError."""
-    if _is_bag(path) or path.suffix == ".bag":
-        return _read_bag(path, sample_time)
+    sample time [s] or its median interval, and notes on their reading. Of a bag, the messages of
+    the `columns` decide which rows there are. Raises FileError or ColumnError.
+    """
+    if _is_bag(path) or path.suffix.lower() == ".bag":
+        return _read_bag(path, sample_time, columns)
     if ".tfrecord" in path.name:
         raise FileError(f"{path}: {TFRECORD}")
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
+    form = format_of(path)
+    if form is TEXT and path.suffix.lower() not in EPISODE_EXTENSIONS:
         raise FileError(f"{path}: no format of episodes; {FORMATS}")
-    with reading(path, path.suffix[1:].upper()):
-        return reader(path), ()
+    return form.read_arrays(path), ()
 
 
-def _read_bag(path: Path, sample_time: float | None) -> tuple[list[Arrays], tuple[str, ...]]:
+def _read_bag(
+    path: Path, sample_time: float | None, mapped: Sequence[str]
+) -> tuple[list[Arrays], tuple[str, ...]]:
     file = (
         path
         if path.is_file()
         else min(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
     )
-    (table,) = read_rosbag_tables(file)
-    columns = _columns_of(table)
+    (table,) = format_of(file).read_tables(file, Selection(columns=tuple(mapped)))
+    columns = arrays_of_table(table)
     time = columns.pop("time", np.zeros(0))
     intervals = np.diff(time)
     step = sample_time or (float(np.median(intervals)) if len(intervals) else 0.0)
@@ -99,121 +99,7 @@ def _read_bag(path: Path, sample_time: float | None) -> tuple[list[Arrays], tupl
     return [arrays], (*table.notes, *([note] if uneven > 100.0 * step else []))
 
 
-def _numbers(path: Path, name: str, values: Any) -> Array:
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise ColumnError(
-            f"{path}: '{name}' is no array of numbers; its rows must have the same length."
-        ) from None
-
-
-def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """The arrays of nested tables with dotted names; a list of objects, such as steps, becomes
-    columns.
-    """
-    for key, value in table.items():
-        name = f"{prefix}{key}".replace("/", ".").removeprefix(f"{STEPS}.")
-        if isinstance(value, list) and value and isinstance(value[0], Mapping):
-            value = {
-                n: [each[n] for each in value] for n in value[0] if all(n in each for each in value)
-            }
-        if isinstance(value, Mapping):
-            yield from _flat(value, "" if name == STEPS else f"{name}.")
-        else:
-            yield name, value
-
-
-def _read_npz(path: Path) -> list[Arrays]:
-    with np.load(path, allow_pickle=False) as file:
-        return [
-            dict(
-                _flat(
-                    {
-                        n: np.asarray(file[n], dtype=float)
-                        for n in file.files
-                        if file[n].dtype.kind in "fiub"
-                    }
-                )
-            )
-        ]
-
-
-def _read_json(path: Path) -> list[Arrays]:
-    text = path.read_text(encoding="utf-8")
-    by_line = path.suffix == ".jsonl"
-    content = (
-        list(map(json.loads, filter(str.strip, text.splitlines()))) if by_line else json.loads(text)
-    )
-    tables = content.get("episodes", [content]) if isinstance(content, dict) else content
-    if (
-        not isinstance(tables, list)
-        or not tables
-        or not all(isinstance(table, dict) for table in tables)
-    ):
-        raise FileError(
-            f"{path}: an object of lists is expected, or a list of such objects, one for each"
-            " episode."
-        )
-    if "observation" in tables[0]:  # a list of steps, which have no lists of rows
-        tables = [{STEPS: tables}]
-    return [
-        {n: _numbers(path, n, v) for n, v in _flat(table) if isinstance(v, list)}
-        for table in tables
-    ]
-
-
-def _read_text(path: Path) -> list[Arrays]:
-    return [_columns_of(read_csv_table(path))]
-
-
-def _columns_of(table: RawTable) -> dict[str, Array]:
-    """The columns of numbers of a table."""
-    return {
-        n: c
-        for n, c in zip(table.headings, table.columns, strict=True)
-        if isinstance(c, np.ndarray)
-    }
-
-
-def _read_hdf5(path: Path) -> list[Arrays]:
-    h5py = import_lab_package("h5py", path)
-
-    def contents(group: Any) -> dict[str, Any]:
-        items = {n: d if hasattr(d, "dtype") else contents(d) for n, d in group.items()}
-        return {n: d for n, d in items.items() if isinstance(d, dict) or d.dtype.kind in "fiub"}
-
-    with h5py.File(path) as file:
-        tables = contents(file)
-        inner = [
-            v
-            for n, v in sorted(tables.items())
-            if isinstance(v, dict) and n not in (STEPS, "observation")
-        ]
-        return [
-            {n: np.asarray(d, dtype=float) for n, d in _flat(each)} for each in inner or [tables]
-        ]
-
-
-def _read_parquet(path: Path) -> list[Arrays]:
-    table = import_lab_package("pyarrow.parquet", path).read_table(str(path))
-    columns = {n: table.column(n).to_pylist() for n in table.column_names}
-    return [{n: _numbers(path, n, v) for n, v in _flat(columns) if v and not isinstance(v[0], str)}]
-
-
-READERS = {
-    ".npz": _read_npz,
-    ".json": _read_json,
-    ".jsonl": _read_json,
-    ".csv": _read_text,
-    ".txt": _read_text,
-    ".h5": _read_hdf5,
-    ".hdf5": _read_hdf5,
-    ".parquet": _read_parquet,
-}
-"""Readers by the extension; each returns the arrays of every episode in the file."""
-SUPPORTED = (*READERS, ".bag")
-FORMATS = f"supported are {', '.join(SUPPORTED)}, and folders of ROS 2 bags."
+FORMATS = f"supported are {', '.join(EPISODE_EXTENSIONS)}, and folders of ROS 2 bags."
 
 
 # Proposal of a mapping file, from the names and the sizes of the arrays

@@ -19,6 +19,7 @@ from .raw_mat import read_mat_tables as read_mat_tables
 from .reader import check_bench as check_bench
 from .reader import read as read
 from .reader import read_csv as read_csv
+from .selection import Selection as Selection
 from .separate_process import call_in_separate_process as call_in_separate_process
 from .separate_process import is_installed as is_installed
 from .time_base import BlockMeans as BlockMeans

@@ -37,6 +37,18 @@ _SIGNATURES = (
     (b"PAR1", "a Parquet file"),
     (b"\x93NUMPY", "a NumPy file"),
 )
+_NO_DATA = (
+    (
+        b"version https://git-lfs.github.com/spec/",
+        "a pointer of Git LFS in place of the data. Fetch them in the repository: git lfs pull",
+    ),
+    (
+        b"<!doctype html",
+        "a page of HTML, such as the answer of a failed download. Download it again",
+    ),
+    (b"<html", "a page of HTML, such as the answer of a failed download. Download it again"),
+)
+"""First bytes, in lower case, of what is stored under the name of a file of data by mistake."""
 _BYTE_ORDER_MARKS = (b"\xff\xfe", b"\xfe\xff", b"\0\0\xfe\xff")
 _CONTROL = bytes(set(range(32)) - {*b"\t\n\v\f\r\x1a\x1b"})
 _KINDS = (
@@ -117,6 +129,15 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
         RecursionError,
     ) as error:  # an integer of thousands of digits, or brackets in brackets
         raise FileError(f"{origin}: cannot be read ({error}).") from None
+
+
+def check_is_data(path: Path) -> None:
+    """Raise FileError for a file that another program wrote in place of the data."""
+    with readable(path), path.open("rb") as file:
+        beginning = file.read(64).lstrip(b"\xef\xbb\xbf \t\r\n").lower()
+    for signature, what in _NO_DATA:
+        if beginning.startswith(signature):
+            raise FileError(f"{path.name}: the file is {what}.")
 
 
 def check_text_file(path: Path) -> None:

@@ -47,8 +47,9 @@ from .constants import SPECIMEN, check_constants, collect_constants, held_value,
 from .file_kind import read_toml
 from .header import FileNamePattern, bare_heading
 from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
+from .selection import Selection
 from .text_format import TextFormat
-from .time_base import TIME_BASES, RecordedTime, TimeBase
+from .time_base import TIME_BASES, Decimation, Downsampling, RecordedTime, TimeBase
 
 STATED = ("resting_length", "ambient", "displacement_zero", "specimen")
 """Constants of a run that are fields of a mapping."""
@@ -93,7 +94,8 @@ class ColumnMapping:
     skip_rows  number of lines above the headings of a text file or worksheet; by default they are
                detected, or found by the headings that `columns` names
     sheet      worksheet of an Excel file
-    group      group of a TDMS or MDF file, struct of a MAT file
+    group      groups of a TDMS, MDF or HDF5 file, structs of a MAT file, topics of a bag, by their
+    names; several are separated by commas
     time       RecordedTime(ordered=True), UniformTime() for stamps that the logger rounded, or
                NoTime()
     missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with the
@@ -156,6 +158,11 @@ class ColumnMapping:
         return TextFormat(
             self.delimiter, self.decimal, len(names) < len(self.columns), names, self.skip_rows
         )
+
+    def selection(self, downsampling: Downsampling = Decimation()) -> Selection:
+        """What is read from a file, and in which reduction."""
+        columns = tuple(map(str, self.columns))
+        return Selection(self.group, self.sheet, columns, self.text_format, downsampling)
 
     def constants_of(self, path: Path | None = None) -> dict[str, float | str]:
         """The constants of one file: those in its name take precedence over those of all files."""

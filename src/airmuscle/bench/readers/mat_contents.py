@@ -23,7 +23,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from ...core import Array, FileError
-from .raw_columnar import check_no_external_links, check_own_values
+from .raw_hdf5 import check_no_external_links, check_own_values
 from .separate_process import import_lab_package, is_installed
 from .time_base import Downsampling, Reduction, check_reduced_lengths
 

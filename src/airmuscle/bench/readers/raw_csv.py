@@ -18,6 +18,7 @@ from .channels import Cells, RawTable, numbers_if_all
 from .file_kind import check_beginning, check_text_file, readable
 from .header import COMMA_NUMBER, POINT_NUMBER
 from .missing_values import MAX_LISTED
+from .selection import Selection
 from .text_format import (
     NumberedLines,
     TextFormat,
@@ -32,6 +33,10 @@ from .time_base import Decimation, Downsampling, downsample
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 
 
+Progress = Callable[[str, float], None]
+"""Called with the name of a file and the fraction that has been read, 0 to 1."""
+
+
 def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> RawTable:
     """Read the table in a text file. Raises FileError or ColumnError."""
     if not isinstance(path, str | Path):
@@ -39,6 +44,16 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
     path = Path(path)
     check_text_file(path)
     return _parse_text(path.name, read_text(path), text_format)
+
+
+def read_text_tables(
+    path: Path, selection: Selection = Selection(), progress: Progress | None = None
+) -> tuple[RawTable, ...]:
+    """The table of a text file, a large one in chunks. Raises FileError or ColumnError."""
+    check_text_file(path)
+    if is_large_file(path):
+        return (read_large_csv(path, selection.text_format, selection.downsampling, progress),)
+    return (read_csv_table(path, selection.text_format),)
 
 
 def _parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
@@ -171,9 +186,6 @@ LARGE_FILE_BYTES = 32_000_000
 """Files larger than this are read in chunks (chosen: a smaller file fits any memory as a whole)."""
 _HEADER_BYTES = 65_536
 _CHUNK_ROWS = 100_000
-
-Progress = Callable[[str, float], None]
-"""Called with the name of a file and the fraction that has been read, 0 to 1."""
 
 
 def is_large_file(path: Path) -> bool:

@@ -12,12 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import ColumnError, FileError, abridged, check_known
+from ...core import ColumnError, FileError, abridged
 from .channels import Cells, Channel, RawTable, merge_channels
-from .raw_csv import parse_columns, read_csv_table, read_text
+from .raw_csv import parse_columns, read_text
+from .selection import Selection
 from .text_format import NumberedLines, TextFormat, TextHeader, check_cell_sizes, has_content
 
-_FIRST = "LabVIEW Measurement"
+LVM_BEGINNING = b"LabVIEW Measurement"
+"""First bytes of a file; one of numbers alone has no header, whatever its extension."""
 _END = "***End_of_Header***"
 _X = "X_Value"
 _SPECIAL = re.compile(r"\*\*\*Start_Special\*\*\*.*?\*\*\*End_Special\*\*\*", re.DOTALL)
@@ -26,19 +28,10 @@ Tags = Mapping[str, Sequence[str]]
 """The lines of a header by their first cells; a value is below the column that it describes."""
 
 
-def is_lvm(path: Path) -> bool:
-    """Whether a file has the header of LabVIEW; a file of numbers alone has none, whatever its
-    extension.
+def read_lvm_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
+    """Read one table from each segment, or from those of the numbers in `selection.group`. Raises
+    FileError or ColumnError.
     """
-    with path.open("rb") as file:
-        return file.read(len(_FIRST)) == _FIRST.encode()
-
-
-def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> tuple[RawTable, ...]:
-    """Read one table from each segment, or from that of the number `group`; the table of any other
-    text file. Raises FileError or ColumnError."""
-    if not is_lvm(path):
-        return (read_csv_table(path, text_format),)
     text = _SPECIAL.sub(lambda block: "\n" * block[0].count("\n"), read_text(path))
     lines = list(enumerate(re.split(r"\r\n|\n|\r", text), 1))
     ends = [k for k, (_, line) in enumerate(lines) if line.startswith(_END)]
@@ -57,13 +50,13 @@ def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> t
     segments = {
         str(i): (lines[a : b + 1], lines[b + 1 : c]) for i, (a, b, c) in enumerate(places, 1)
     }
-    check_known(
-        f"{path.name}: no segment", [] if group is None else group, segments, "it has", FileError
-    )
+    selected = selection.groups(path.name, "segment", segments)
     file_tags = _tags(lines[: ends[0]], delimiter)
     decimal = next(iter(file_tags.get("Decimal_Separator", [])[1:]), None) or None
     form = dataclasses.replace(
-        text_format, delimiter=delimiter, decimal=text_format.decimal or decimal
+        selection.text_format,
+        delimiter=delimiter,
+        decimal=selection.text_format.decimal or decimal,
     )
     return tuple(
         _table(
@@ -73,7 +66,7 @@ def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> t
             form,
         )
         for i, (head, body) in segments.items()
-        if group in (None, i)
+        if i in selected
     )
 
 

@@ -8,15 +8,15 @@ writes `data` and `colheaders`), and the structure with time that Simulink saves
 timetables with the package mat-io.
 """
 
-import inspect
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...core import ColumnError, FileError, Hint, alternatives
+from ...core import ColumnError, FileError, Hint
 from ...recording.columns import parse_heading
+from .arrays import Arrays, episodes_of, flat
 from .channels import Channel, RawTable, merge_channels
 from .mat_contents import (
     READABLE,
@@ -26,32 +26,24 @@ from .mat_contents import (
     read_contents,
     read_objects,
 )
-from .raw_columnar import read_hdf5_tables
-from .separate_process import in_separate_process, reading
-from .time_base import Decimation, Downsampling, Reduction
+from .raw_hdf5 import read_hdf5_arrays, read_hdf5_tables
+from .selection import Selection
+from .separate_process import reading
+from .time_base import ALL_ROWS, Decimation, Reduction
 
 
-@in_separate_process("scipy")
-def read_mat_tables(
-    path: Path,
-    group: str | None = None,
-    columns: Sequence[str] = (),
-    downsampling: Downsampling = Decimation(),
-) -> tuple[RawTable, ...]:
-    """Read one table from each struct with vectors, or from the named struct. Raises FileError or
-    ColumnError.
+def read_mat_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
+    """Read one table from each struct with vectors, or from the selected structs. Raises FileError
+    or ColumnError.
 
-    If the vectors of a struct differ in length, those of the length of the mapped `columns` are
+    If the vectors of a struct differ in length, those of the length of the mapped columns are
     read, or without any those of the length of the known quantities. A long variable is reduced
     while it is read.
     """
     with reading(path, "MATLAB"):
         if is_plain_hdf5(path):
-            plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(
-                path, group, downsampling
-            )
-            return plain
-        contents = read_contents(path, downsampling)
+            return read_hdf5_tables(path, selection)
+        contents = read_contents(path, selection.downsampling)
         objects = find_objects(path)
         tables = read_objects(path, objects)
     unread = [each for each in objects if each.name not in tables]
@@ -60,13 +52,8 @@ def read_mat_tables(
         name: value for name, value in contents.variables.items() if name not in opaque
     } | tables
     groups = dict(_find_groups("", variables))
-    if group is not None and group not in groups:
-        names = [name or "(no struct)" for name in groups]
-        raise FileError(
-            f"{path.name}: no struct '{group}' with"
-            f" vectors{alternatives(group, names, 'the structs are')}"
-        )
-    selected = groups if group is None else {group: groups[group]}
+    names = selection.groups(path.name, "struct", groups)
+    selected = {name: groups[name] for name in names}
     if not selected:
         raise FileError(
             f"{path.name}: no vector of numbers (the file contains "
@@ -79,14 +66,34 @@ def read_mat_tables(
         for name in groups
     }
     made = {
-        name: _make_table(origins[name], fields, constants, columns)
+        name: _make_table(origins[name], fields, constants, selection.columns)
         for name, fields in selected.items()
     }
-    whole = Reduction(downsampling)
+    whole = Reduction(selection.downsampling)
     return tuple(
         contents.reductions.get(name, whole).noted(table).noted(*notes)
         for name, table in made.items()
     )
+
+
+def read_mat_arrays(path: Path) -> list[Arrays]:
+    """The arrays of numbers of every episode: those of each struct, also in an array of structs, or
+    the variables outside any. Raises FileError or ColumnError.
+    """
+    with reading(path, "MATLAB"):
+        if is_plain_hdf5(path):
+            return read_hdf5_arrays(path)
+        contents = read_contents(path, Decimation(ALL_ROWS))
+        tables = read_objects(path, find_objects(path))
+    return [
+        {
+            name: np.asarray(values, dtype=float)
+            for name, values in flat(episode)
+            if isinstance(values, np.ndarray | np.number | float | int)
+            and np.asarray(values).dtype.kind in "biuf"
+        }
+        for episode in episodes_of(dict(contents.variables) | tables)
+    ]
 
 
 def _remedy(unread: Sequence[MatlabObject]) -> str:

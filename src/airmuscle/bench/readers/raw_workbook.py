@@ -11,7 +11,8 @@ import numpy as np
 from ...core import ColumnError, FileError, check_known, listed
 from . import header
 from .channels import Cells, RawTable, numbers_if_all
-from .separate_process import import_lab_package, in_separate_process, reading
+from .selection import Selection
+from .separate_process import import_lab_package, reading
 from .text_format import TextFormat
 from .time_base import seconds_from_clock
 
@@ -20,14 +21,10 @@ Rows = list[tuple[int, list[Any]]]
 """Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
-@in_separate_process("python_calamine")
-def read_workbook_tables(
-    path: Path, sheet: str | None = None, text_format: TextFormat = TextFormat()
-) -> tuple[RawTable, ...]:
+def read_workbook_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
     """Read one table from each worksheet that contains one, or from the named worksheet.
 
-    text_format  the place of the headings; delimiter and decimal sign do not apply
-
+    Delimiter and decimal sign of the text format do not apply.
     Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no
     cells. Raises FileError or ColumnError.
     """
@@ -40,7 +37,7 @@ def read_workbook_tables(
         ]
         check_known(
             f"{path.name}: no sheet",
-            [] if sheet is None else sheet,
+            [] if selection.sheet is None else selection.sheet,
             names,
             "the sheets are",
             FileError,
@@ -48,7 +45,7 @@ def read_workbook_tables(
         cells = {
             name: book.get_sheet_by_name(name).to_python(skip_empty_area=False)
             for name in names
-            if sheet in (None, name)
+            if selection.sheet in (None, name)
         }
     found = {
         name: [(i, row) for i, row in enumerate(rows, 1) if header.count_cells(row)]
@@ -64,7 +61,8 @@ def read_workbook_tables(
         )
     origins = [f"{path.name}, sheet '{name}'" if len(sheets) > 1 else path.name for name in sheets]
     return tuple(
-        _parse_table(*each, text_format) for each in zip(origins, sheets.values(), strict=True)
+        _parse_table(*each, selection.text_format)
+        for each in zip(origins, sheets.values(), strict=True)
     )
 
 

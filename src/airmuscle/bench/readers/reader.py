@@ -5,7 +5,7 @@ gives the format.
 import dataclasses
 import glob
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ...core import FileError, ParameterError, abridged, printable
@@ -14,39 +14,17 @@ from ..checks import warn_of_suspicious_values
 from ..segment.outliers import without_outliers
 from .channels import RawTable
 from .constants import split_specimens
-from .file_kind import check_text_file
+from .formats import EXTENSIONS, TEXT, format_of
 from .interpret import interpret
 from .mapping import ColumnMapping, apply_mapping, read_mapping
 from .plausibility import check_unit_consistency
-from .raw_columnar import read_hdf5_tables, read_parquet_tables
-from .raw_csv import Progress, is_large_file, read_csv_table, read_large_csv, read_text_stream
-from .raw_lvm import is_lvm, read_lvm_tables
-from .raw_mat import read_mat_tables
-from .raw_mdf_tdms_ros import read_mdf_tables, read_rosbag_tables, read_tdms_tables
-from .raw_workbook import read_workbook_tables
+from .raw_csv import Progress, read_csv_table, read_text_stream, read_text_tables
 from .time_base import Decimation, Downsampling, downsample
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
-WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 STANDARD_INPUT = Path("-")
-TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".lvm")
-_BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
-    **dict.fromkeys(
-        WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)
-    ),
-    ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
-    **dict.fromkeys((".h5", ".hdf5"), lambda path, m, d: read_hdf5_tables(path, m.group, d)),
-    ".mat": lambda path, m, d: read_mat_tables(path, m.group, tuple(map(str, m.columns)), d),
-    ".tdms": lambda path, m, d: read_tdms_tables(path, m.group),
-    **dict.fromkeys((".mf4", ".mdf"), lambda path, m, d: read_mdf_tables(path, m.group, d)),
-    **dict.fromkeys(
-        (".bag", ".db3", ".mcap"), lambda path, m, d: read_rosbag_tables(path, m.group)
-    ),
-}
-EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
-"""Extensions of the supported files."""
 
 
 def read(
@@ -183,16 +161,11 @@ def read_tables(
         return (
             read_text_stream(sys.stdin.buffer, "standard input", mapping.text_format, downsampling),
         )
-    suffix = path.suffix.lower()
-    if suffix in _BINARY_READERS:
-        return tuple(
-            downsample(table, downsampling)
-            for table in _BINARY_READERS[suffix](path, mapping, downsampling)
-        )
-    check_text_file(path)
-    if is_large_file(path) and not is_lvm(path):
-        return (read_large_csv(path, mapping.text_format, downsampling, progress),)
-    return tuple(
-        downsample(each, downsampling)
-        for each in read_lvm_tables(path, mapping.group, mapping.text_format)
+    selection = mapping.selection(downsampling)
+    form = format_of(path)
+    tables = (
+        read_text_tables(path, selection, progress)
+        if form is TEXT
+        else form.read_tables(path, selection)
     )
+    return tuple(downsample(table, downsampling) for table in tables)

@@ -3,27 +3,28 @@ in native code.
 """
 
 import contextlib
-import functools
 import importlib
 import importlib.util
-import inspect
+import math
+import os
+import re
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple
 
-from ...core import AirmuscleError, FileError
+from ...core import AirmuscleError, FileError, ParameterError, abridged
 from ...engine.processes import Worker, WorkerError
 from .file_kind import check_regular_file
-
-Result = TypeVar("Result")
-Given = ParamSpec("Given")
 
 
 def is_installed(name: str) -> bool:
     """Whether a package is installed; it is not imported."""
-    return importlib.util.find_spec(name) is not None
+    try:
+        return importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):  # of a part of a package that is not installed
+        return False
 
 
 def import_lab_package(name: str, path: Path) -> Any:
@@ -50,7 +51,7 @@ def reading(path: Path, format_name: str) -> Iterator[None]:
     check_regular_file(path)
     try:
         yield
-    except AirmuscleError:
+    except (AirmuscleError, MemoryError):  # the latter is named by `too_large`
         raise
     except Exception as reason:  # each package raises its own exceptions for a damaged file
         detail = " ".join(str(reason).split())[:120] or type(reason).__name__
@@ -70,57 +71,78 @@ CPU_LIMIT = 15.0
 """Limits of time and processor time [s] of a file, and of every further 100 MB (chosen: 20 MB take
 less than 1 s).
 """
-MEMORY_LIMIT = 6e9
-MEMORY_FACTOR = 20.0
-"""Limit of the memory [bytes], with this multiple of the size of the file (chosen)."""
+MEMORY_SETTING = "AIRMUSCLE_READER_MEMORY"
+"""Environment variable with the limit of the memory of a reader, such as `8 GB`."""
+MEMORY_LIMIT = 2e9
+MEMORY_FACTOR = 10.0
+"""Limit of the memory [bytes] that a reader takes beside its packages, or this multiple of the size
+of the file if that is more (chosen: twice what a column takes in text, numbers and the answer).
+"""
+_SIZE = re.compile(r"\s*(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>[MG])B\s*")
+_BYTES = {"M": 1e6, "G": 1e9}
 _worker = Worker(quiet=True)
 stop = _worker.stop
 """Ends the present process; the next request starts another one."""
 _lock = threading.Lock()
 
 
-def in_separate_process(
-    package: str,
-) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
-    """A decorator of a reader in native code, which the separate process evaluates, from a regular
-    file. It raises FileError if the package that the reader needs is not installed, or if the file
-    is not regular.
+def memory_limit(size: int) -> float:
+    """The limit of the memory [bytes] of the reader of a file of this size [bytes]. Raises
+    ParameterError for a setting that states none.
     """
+    text = os.environ.get(MEMORY_SETTING, "")
+    match = _SIZE.fullmatch(text)
+    if text and not match:
+        raise ParameterError(
+            f"the environment variable {MEMORY_SETTING} is {abridged(text)}; it must be a size in"
+            " MB or GB, such as '4 GB'."
+        )
+    limit = float(match["number"]) * _BYTES[match["unit"]] if match else MEMORY_LIMIT
+    return max(limit, MEMORY_FACTOR * size)
 
-    def decorated(read: Callable[Given, Result]) -> Callable[Given, Result]:
-        @functools.wraps(read)
-        def call(*arguments: Given.args, **named: Given.kwargs) -> Result:
-            given = inspect.signature(read).bind(*arguments, **named)
-            given.apply_defaults()
-            path, *others = given.args
-            if not is_installed(package):
-                raise _missing_package(package, path)
-            check_regular_file(path)
-            found: Result = call_in_separate_process(read.__module__, read.__name__, path, *others)
-            return found
 
-        return call
+def too_large(path: Path, limit: float) -> FileError:
+    """The error of a file whose reader needs more memory than the limit [bytes]."""
+    return FileError(
+        f"{path.name}: its reader needs more than {limit / 1e9:.3g} GB of memory, so the file is"
+        " damaged or unusually large. If you trust it, state a higher limit in the environment"
+        f" variable {MEMORY_SETTING}, such as '{math.ceil(2.0 * limit / 1e9)} GB', or export fewer"
+        " rows."
+    )
 
-    return decorated
+
+def check_installed(package: str, path: Path) -> None:
+    """Raise FileError with the install command if a package is not installed."""
+    if not is_installed(package):
+        raise _missing_package(package, path)
 
 
 def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:
     """Return `function(path, *arguments)` of a module, evaluated in the separate process. An
-    exception of the function is raised here. Raises FileError if the process ends or exceeds the
-    time limit."""
+    exception of the function is raised here. Raises FileError if the process ends or exceeds its
+    limits of time and memory.
+    """
     path = Path(path).absolute()
-    limit, seconds = (each * (1.0 + path.stat().st_size / 1e8) for each in (TIME_LIMIT, CPU_LIMIT))
+    size = path.stat().st_size
+    longer = 1.0 + size / 1e8
+    memory = memory_limit(size)
+    limits = Limits(CPU_LIMIT * longer, memory)
     try:
         with _lock:
-            return _worker.call(call_function, (seconds, module, function, path, *arguments), limit)
+            return _worker.call(
+                call_function, (limits, module, function, path, *arguments), TIME_LIMIT * longer
+            )
     except WorkerError as error:
         cause = (
-            f"its reading takes more than {limit:.0f} s"
+            f"its reading takes more than {TIME_LIMIT * longer:.0f} s"
             if error.late
-            else "its reader ended without a result"
+            else "its reader ended without a result, because the data are damaged, or need more"
+            f" than {limits.seconds:.0f} s of a processor or {memory / 1e9:.3g} GB of memory"
         )
     except AirmuscleError:
         raise
+    except MemoryError:
+        raise too_large(path, memory) from None
     except Exception as error:  # in what a package returned of a damaged file
         cause = " ".join(f"{type(error).__name__}: {error}".split())[:120]
     raise FileError(
@@ -129,15 +151,33 @@ def call_in_separate_process(module: str, function: str, path: Path, *arguments:
     )
 
 
-def call_function(seconds: float, module: str, function: str, path: Path, *arguments: Any) -> Any:
+class Limits(NamedTuple):
+    """Processor time [s] and memory [bytes] that the reader of a file may take."""
+
+    seconds: float
+    memory: float
+
+
+def call_function(limits: Limits, module: str, function: str, path: Path, *arguments: Any) -> Any:
     """The result of a function of a module, which is imported only in the separate process, within
-    its limits. `seconds` of the processor limit the time."""
+    its limits.
+    """
+    # the pool of memory that Arrow has by default reserves a gigabyte that it does not use
+    os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
+    reader = getattr(importlib.import_module(module), function)
     if resource is not None:
-        size = path.stat().st_size
-        _limit(resource.RLIMIT_CPU, time.process_time() + seconds)
-        _limit(resource.RLIMIT_AS, MEMORY_LIMIT + MEMORY_FACTOR * size)
-    reader = inspect.unwrap(getattr(importlib.import_module(module), function))
+        _limit(resource.RLIMIT_CPU, time.process_time() + limits.seconds)
+        _limit(resource.RLIMIT_AS, _address_space() + limits.memory)
     return reader(path, *arguments)
+
+
+def _address_space() -> int:
+    """The address space [bytes] of this process, which its packages reserve before they read."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except (OSError, ValueError):  # another system than Linux
+        return 0
+    return pages * resource.getpagesize()
 
 
 def _limit(kind: int, value: float) -> None:

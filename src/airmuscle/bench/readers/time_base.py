@@ -152,6 +152,10 @@ TIME_BASES: dict[str, TimeBase] = {
 """Time bases by their names in mapping files and on the command line."""
 
 
+ALL_ROWS = 2**62
+"""Number of rows of a reduction that keeps all: no file has as many."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Downsampling(abc.ABC):
     """Reduction of a longer file to at most `max_rows` rows."""

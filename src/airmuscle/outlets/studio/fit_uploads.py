@@ -18,7 +18,7 @@ import unicodedata
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
-from ...bench.readers.reader import EXTENSIONS
+from ...bench.readers.formats import EPISODE_EXTENSIONS
 from ...core import is_running
 from .security import BadRequest
 
@@ -34,7 +34,7 @@ one without files may be removed at once."""
 MAX_NAME = 120
 """Maximum length of the name of a file (chosen)."""
 FILES = "files"
-ACCEPTED = (*EXTENSIONS, ".npz", ".json", ".jsonl", ".zip")
+ACCEPTED = (*EPISODE_EXTENSIONS, ".zip")
 """Extensions of measurement files and of episodes."""
 IsNeeded = Callable[[str], bool]
 _PREFIX = "airmuscle-studio-"

@@ -1,7 +1,5 @@
-"""Readers of Parquet and HDF5 files: columns with their names and units."""
+"""Reader of HDF5 files: columns with their names and units, and arrays of episodes."""
 
-import contextlib
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -9,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...core import FileError, check_known
+from ...core import FileError
+from .arrays import Arrays, episodes_of, flat
 from .channels import Channel, RawTable, merge_channels
-from .separate_process import import_lab_package, in_separate_process, reading
-from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths
+from .selection import Selection
+from .separate_process import import_lab_package, reading
+from .time_base import Downsampling, Reduction, check_reduced_lengths
 
 StoredTable = tuple[str, list[Channel], dict[str, float | str], Reduction]
 """Name, channels and constants of a group or a dataset of an HDF5 file, and the reduction of its
@@ -20,40 +20,9 @@ rows.
 """
 
 
-@in_separate_process("pyarrow")
-def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of
-    the file constants. A Parquet file has no groups; `group` is not used. Raises FileError or
-    ColumnError."""
-    parquet = import_lab_package("pyarrow.parquet", path)
-    with reading(path, "Parquet"):
-        table = parquet.read_table(str(path))
-        channels = [
-            Channel(
-                field.name,
-                table.column(i).to_numpy(),
-                unit=_text((field.metadata or {}).get(b"unit", b"")),
-            )
-            for i, field in enumerate(table.schema)
-            if not field.name.startswith("__index_level_")
-        ]
-        metadata = {
-            _text(name): _text(value) for name, value in (table.schema.metadata or {}).items()
-        }
-        constants = {
-            name: _number(text)
-            for name, text in metadata.items()
-            if name not in ("pandas", "ARROW:schema")
-        }
-        return (merge_channels(path.name, channels, constants),)
-
-
-@in_separate_process("h5py")
-def read_hdf5_tables(
-    path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
-) -> tuple[RawTable, ...]:
-    """Read one table from each group with vectors, or from the named group; the attribute `unit`
-    states a unit.
+def read_hdf5_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
+    """Read one table from each group with vectors, or from the selected groups; the attribute
+    `unit` states a unit.
 
     A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute
     `columns`. A table of more than `downsampling.max_rows` rows is read by pieces and reduced.
@@ -62,7 +31,7 @@ def read_hdf5_tables(
     h5py = import_lab_package("h5py", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
         check_own_values(h5py, file, path)
-        tables = _groups(h5py, file, path.name, downsampling)
+        tables = _groups(h5py, file, path.name, selection.downsampling)
         contents = {
             name: (channels, constants, kept)
             for name, channels, constants, kept in tables
@@ -73,13 +42,7 @@ def read_hdf5_tables(
             f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of"
             " records."
         )
-    check_known(
-        f"{path.name}: no group",
-        [] if group is None else group,
-        contents,
-        "the groups are",
-        FileError,
-    )
+    selected = selection.groups(path.name, "group", contents)
     origins = {
         name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name
         for name in contents
@@ -87,8 +50,38 @@ def read_hdf5_tables(
     return tuple(
         reduction.noted(merge_channels(origins[name], channels, constants))
         for name, (channels, constants, reduction) in contents.items()
-        if group in (None, name)
+        if name in selected
     )
+
+
+def read_hdf5_arrays(path: Path) -> list[Arrays]:
+    """The arrays of numbers of every episode: those of a group each, or of the file without groups.
+    Raises FileError.
+    """
+    h5py = import_lab_package("h5py", path)
+    with reading(path, "HDF5"), h5py.File(path, "r") as file:
+        check_own_values(h5py, file, path)
+        check_no_external_links(h5py, file, path)
+        return [
+            {name: np.asarray(dataset, dtype=float) for name, dataset in flat(episode)}
+            for episode in episodes_of(_datasets(h5py, file))
+        ]
+
+
+def _datasets(h5py: Any, group: Any) -> dict[str, Any]:
+    """The datasets of numbers in a group, and those of the groups inside it; no links are
+    followed.
+    """
+    found: dict[str, Any] = {}
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            found[name] = _datasets(h5py, item)
+        elif isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf":
+            found[name] = item
+    return found
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:
@@ -225,15 +218,3 @@ def _text(value: Any) -> str:
 
 def _texts(values: Any) -> list[str]:
     return [_text(value) for value in np.atleast_1d(np.asarray(values, dtype=object))]
-
-
-def _number(text: str) -> float | str:
-    """A constant in the metadata: a number, or a text, which `write` puts in quotation marks if it
-    looks like one.
-    """
-    with contextlib.suppress(ValueError):
-        return float(text)
-    with contextlib.suppress(json.JSONDecodeError):
-        if isinstance(value := json.loads(text), str):
-            return value
-    return text

@@ -1,0 +1,138 @@
+"""Reader of bags of ROS 1 and ROS 2: the numbers of all topics with the times of their messages."""
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core import FileError
+from .channels import Channel, RawTable, merge_channels
+from .selection import Selection
+from .separate_process import import_lab_package, reading
+
+STANDARD = ("geometry_msgs/", "sensor_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
+"""Packages whose fields are no quantities of a muscle by their names, except those in
+QUANTITY_FIELDS.
+"""
+FIELD_UNITS = {
+    "geometry_msgs/msg/Wrench": {"force": "N", "torque": "N m"},
+    "geometry_msgs/msg/Twist": {"linear": "m/s", "angular": "rad/s"},
+    "geometry_msgs/msg/Accel": {"linear": "m/s^2", "angular": "rad/s^2"},
+    "geometry_msgs/msg/Pose": {"position": "m"},
+    "geometry_msgs/msg/Transform": {"translation": "m"},
+    "geometry_msgs/msg/PointStamped": {"point": "m"},
+    "sensor_msgs/msg/Imu": {"angular_velocity": "rad/s", "linear_acceleration": "m/s^2"},
+    "sensor_msgs/msg/JointState": {"position": "rad", "velocity": "rad/s", "effort": "N m"},
+    "sensor_msgs/msg/Range": {"range": "m"},
+    "sensor_msgs/msg/FluidPressure": {"fluid_pressure": "Pa(a)"},
+    "sensor_msgs/msg/Temperature": {"temperature": "°C"},
+}
+"""The unit of a field and of the numbers inside it, by type and name; those of JointState are of
+revolute joints.
+"""
+QUANTITY_FIELDS = {"fluid_pressure": "pressure", "temperature": "temperature"}
+"""Fields of standard messages that are quantities, with the names of these."""
+
+MAX_ELEMENTS = 64
+"""Elements of a list of numbers that become columns at most (chosen): joints, not pictures."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Field:
+    """A number of a message: its path, its unit, and whether its name may state a quantity."""
+
+    name: str
+    unit: str
+    is_quantity: bool
+
+
+def read_rosbag_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
+    """One table from a bag of ROS 1 (.bag) or ROS 2 (.db3 or .mcap, in a folder with
+    metadata.yaml).
+
+    Columns are named `topic.field`: `joint_states.position.elbow`, with the name of the joint where
+    a message has some. The field `data` alone is named by its topic. Fields of standard messages
+    have the units of their type, and are no quantities by their names, except those of
+    FluidPressure (absolute) and Temperature. The time is that at which a message was recorded, from
+    the first one on. `selection.group` names
+    topics. Files of one ROS 2 bag are read together. Raises
+    FileError or ColumnError.
+    """
+    highlevel = import_lab_package("rosbags.highlevel", path)
+    folder = path if path.suffix == ".bag" else path.parent
+    if path.suffix != ".bag" and not (folder / "metadata.yaml").exists():
+        raise FileError(
+            f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag."
+        )
+    if path.suffix != ".bag" and path != min(
+        p for p in folder.iterdir() if p.suffix == path.suffix
+    ):
+        return ()
+    topics: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
+    with reading(path, "ROS bag"):
+        typestore = import_lab_package("rosbags.typesys", path)
+        default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
+        with highlevel.AnyReader([folder], default_typestore=default) as bag:
+            names = dict.fromkeys(connection.topic for connection in bag.connections)
+            selected = selection.groups(folder.name, "topic", names)
+            chosen = [each for each in bag.connections if each.topic in selected]
+            for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
+                numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
+                topic = connection.topic.strip("/").replace("/", ".")
+                if numbers:
+                    topics.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
+    channels = [
+        channel
+        for topic, messages in topics.items()
+        for channel in _topic_channels(topic, messages)
+    ]
+    if not channels:
+        raise FileError(f"{path}: no topic contains numbers.")
+    return (merge_channels(folder.name, channels, {}, "message"),)
+
+
+def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, float]]:
+    """The numbers of a message by their fields; headers are left out."""
+    names = getattr(value, "name", None)
+    kind = str(getattr(value, "__msgtype__", ""))
+    labels = [str(n) for n in names] if isinstance(names, list | tuple) else []
+    for field in getattr(value, "__dataclass_fields__", {}):
+        item = getattr(value, field)
+        within = FIELD_UNITS.get(kind, {}).get(field, unit)
+        stated = bool(within) and field in QUANTITY_FIELDS
+        inner = ".".join([*([path] if path else []), QUANTITY_FIELDS[field] if stated else field])
+        if field in ("header", "layout", "__msgtype__") or field.endswith("covariance"):
+            continue
+        if isinstance(item, bool | int | float | np.number):
+            number = item.item() if isinstance(item, np.number) else item
+            own = len(field) > 1 and not kind.startswith(
+                STANDARD
+            )  # x, y and z are parts of a vector in every message
+            yield _Field(inner, within, stated or own), number
+        elif (
+            isinstance(item, np.ndarray)
+            and item.dtype.kind in "biuf"
+            and 0 < item.size <= MAX_ELEMENTS
+        ):
+            words = labels if len(labels) == item.size else [str(i) for i in range(item.size)]
+            fields = (_Field(f"{inner}.{word}", within, False) for word in words)
+            yield from zip(fields, item.ravel().tolist(), strict=True)
+        elif hasattr(item, "__dataclass_fields__"):
+            yield from _numbers(item, inner, within)
+
+
+def _topic_channels(topic: str, messages: list[tuple[float, dict[_Field, float]]]) -> list[Channel]:
+    """One channel for each number of a topic; where a message lacks it, there is no row."""
+    fields = dict.fromkeys(field for _, numbers in messages for field in numbers)
+    channels = []
+    for field in fields:
+        rows = [(time, numbers[field]) for time, numbers in messages if field in numbers]
+        time, values = map(
+            np.array, zip(*rows, strict=True)
+        )  # integers remain integers: held between messages
+        first = np.concatenate([[True], np.diff(time) > 0])
+        name = topic if field.name == "data" else f"{topic}.{field.name}"
+        channels.append(Channel(name, values[first], time[first], field.unit, field.is_quantity))
+    return channels
