@@ -27,6 +27,7 @@ from airmuscle.engine.compile.cache import kernel as kernels
 from airmuscle.engine.compile.cache import store as kept
 from airmuscle.engine.compile.cache.kernel import BoundKernel, Kernel
 from airmuscle.engine.compile.llvm.jit import build, object_code, shallow_scope_copies
+from airmuscle.engine.compile.llvm.processor import TargetProcessor
 from airmuscle.errors import AirmuscleWarning
 
 CASE = lifting_run(1)
@@ -223,7 +224,7 @@ def test_other_sources_and_versions_have_another_origin(monkeypatch, tmp_path):
 def test_each_processor_and_each_kind_has_its_own_file(monkeypatch):
     mine = kept._file_name("evaluate", ("q", "d1"))
     assert kept._file_name("evaluate", ("q", "d2")) != mine
-    monkeypatch.setattr(kept, "_processor", lambda: "another")
+    monkeypatch.setattr(kept, "processor", lambda: TargetProcessor("another", "", 16))
     assert kept._file_name("evaluate", ("q", "d1")) != mine
 
 

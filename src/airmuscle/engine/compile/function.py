@@ -18,7 +18,9 @@ from .ir.instructions import ZERO, Code, Instruction, Operand, Operation, finish
 from .ir.interpreter import InterpretedBody
 from .ir.jacobian import Tape
 from .llvm import vector_math
-from .llvm.emit import LlvmLanguage, LlvmType
+from .llvm.emit import LlvmType
+from .llvm.groups import LaneGroups
+from .llvm.processor import processor
 from .program import CompiledSystem, Module, Program
 
 LANES = 8
@@ -37,18 +39,19 @@ class Function:
     def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any], lanes: int = 1) -> None:
         import casadi
 
-        number = LlvmType(lanes=lanes)
         rows = {
             name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()
         }
-        printer = Printer(LlvmLanguage(number))
-        printer.add("function", inputs, rows)
-        parts = [
-            vector_math.definition(name, count, number) for name, count in printer.needed.items()
-        ]
-        if lanes > 1:
-            parts.insert(0, vector_math.declarations({number}))
-        self._module = Module("\n".join([*parts, printer.module()]))
+        if lanes == 1:
+            printer = Printer()
+            printer.add("function", inputs, rows)
+            text = printer.module()
+        else:
+            groups = LaneGroups(LlvmType(lanes=lanes), processor().register)
+            printer = Printer(groups)
+            printer.add("function", inputs, rows)
+            text = vector_math.definitions(printer.needed, groups.number) + printer.module()
+        self._module = Module(text)
         self.address = self._module.address("function")
 
 

@@ -2,18 +2,15 @@
 plant.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 from .functions import POINT, Extension, Printer, TracedSystem
 from .ir import emission
 from .ir.instructions import Code, Operand, instructions
 from .llvm import emit, vector_math
-from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage, LlvmType
-
-AT_ONCE = 64
-"""Bytes of one value in the step: the widest register (measured; values of two do not fit the
-registers).
-"""
+from .llvm.emit import FLAGS, FunctionBody, LlvmType
+from .llvm.groups import LaneGroups
 
 ROWS = LlvmType(lanes=4)
 """A value of several rows of one plant. Vectors of eight slow down what the processor does next
@@ -106,7 +103,7 @@ class _RowsBody(FunctionBody):
 
 
 def lanes_module(
-    t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float], number: LlvmType
+    t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float], groups: LaneGroups
 ) -> tuple[str, int]:
     """One whole step of an explicit Runge-Kutta method, and the outputs, for one plant a lane; how
     long `c` must be.
@@ -115,95 +112,114 @@ def lanes_module(
     outputs(x, u, c, o)      what a row of each plant shows
     prepare(p, c)            what both need of the parameters
     """
-    printer = Printer(LlvmLanguage(number))
+    printer = Printer(groups)
     point = t.point
     code, held = printer.set_apart(instructions(list(point.values()), [t.f]), POINT)
-    step = _Step(t, code, held, number)
+    step = _Step(t, code, held, groups)
     text = step.printed(a, b)
     printer.add("outputs", point, {"o": t.o})
-    needed = {(name, number): count for name, count in printer.needed.items()}
-    needed |= {(name, step.number): count for name, count in step.block.needed.items()}
-    parts = [vector_math.definition(name, count, kind) for (name, kind), count in needed.items()]
-    module = [vector_math.declarations({number, step.number}), *parts, text, printer.module()]
-    return "\n".join(module), printer.held
+    parts = vector_math.definitions({**printer.needed, **step.needed}, groups.number)
+    return "\n".join([parts, text, printer.module()]), printer.held
+
+
+CACHE = 32_768
+"""Bytes of the smallest first-level data cache of processors with such registers."""
+SLOPES = "k"
+"""The array of the slopes of all stages, of the length stages x states."""
+OF_STAGE = (*"xucwh", SLOPES)
+OF_END = ("x", "h", SLOPES, "y")
 
 
 class _Step:
-    """The step of as many lanes as a register holds, called for one group of lanes after the other.
+    """The step of all lanes: one stage for one group of lanes after the other, then the next
+    stage.
 
-    All groups run the same code, so that a plant's result does not depend on its lane; while one
-    waits for a root or a quotient, the processor is at the next. Every stage reads `c` through an
-    argument of its own: LLVM, which cannot know that they are equal, reads what it needs where it
-    needs it, instead of keeping all of `c` from the first stage on, for which there are no
-    registers.
+    All stages of one group depend on each other, and have more operations than the processor looks
+    ahead; the next group in the same stage is near enough to be computed at the same time. That is
+    worth less than data that stay in the cache from stage to stage (both measured, with registers
+    of 32 and 64 bytes).
     """
 
     def __init__(
-        self, t: TracedSystem, code: Code, held: dict[Operand, int], number: LlvmType
+        self, t: TracedSystem, code: Code, held: dict[Operand, int], groups: LaneGroups
     ) -> None:
-        self.number = LlvmType(number.bits, min(number.lanes, AT_ONCE * 8 // number.bits))
-        self.groups = number.lanes // self.number.lanes
+        self.groups = groups
         self.states = t.x.shape[0]
         self.inputs = t.u.shape[0]
         self.items = emission.with_gates(code, POINT, held)
         self.outputs = code.outputs
         self.held = held
-        self.block = FunctionBody((), self.number)
+        self.needed: dict[str, int] = {}
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
-        """The text of the step, and of its stages for one group."""
-        slopes: list[list[str]] = []
-        for stage, row in enumerate([(), *a]):
-            slopes.append(self._rates(stage, row, slopes))
-        for i in range(self.states):
-            self.block.store("y", i * self.groups, self._moved(i, b, slopes))
-        copies = [f"c{stage}" for stage in range(len(slopes))]
-        names = ["x", "u", *copies, "w", "h", "y"]
-        stages = emit.function("stages", names, self.block, f"{emit.ALIGNED} noinline")
-        outer = FunctionBody((), self.number)
-        for group in range(self.groups):
-            arrays = {
-                n: outer.put(f"getelementptr inbounds i8, ptr %{n}, i64 {group * AT_ONCE}")
-                for n in "xucwhy"
-            }
-            given = ", ".join(f"ptr {arrays['c' if name in copies else name]}" for name in names)
-            outer.lines.append(f"  call void @stages({given})")
-        return stages.replace("define", "define internal", 1) + emit.function(
-            "step", list("xucwhy"), outer
-        )
+        """The text of the step and of its stages."""
+        rows = [(), *a]
+        stages = [self._stage(f"stage{number}", row) for number, row in enumerate(rows)]
+        parts = {f"stage{number}": OF_STAGE for number in range(len(rows))} | {"finish": OF_END}
+        room = {SLOPES: len(rows) * self.states}
+        by_group = self._cached_by_group(room[SLOPES])
+        whole = self.groups.sequence("step", list("xucwhy"), parts, room, by_group=by_group)
+        return "".join([*stages, self._finish("finish", b), whole])
 
-    def _rates(
-        self, stage: int, row: Sequence[float], slopes: Sequence[Sequence[str]]
-    ) -> list[str]:
-        """The rates of one stage."""
-        given: dict[Operand, str] = {
-            ("in", 0, i): self._moved(i, row, slopes) for i in range(self.states)
-        }
-        node = sum(row)
-        combined = self.block.arithmetic
-        for i in range(self.inputs):
-            u = self._load("u", i)
-            if node:  # u + node h w
-                way = combined("*", self.block.constant(node), self._load("h", 0))
-                u = combined("+", u, combined("*", way, self._load("w", i)))
-            given["in", 1, i] = u
-        for operand, place in self.held.items():
-            given[operand] = self._load(f"c{stage}", place)
-        at = emission.Emission(self.block, (), {}, given)
+    def _cached_by_group(self, slopes: int) -> bool:
+        """Whether the first-level cache holds what the step reads and writes for one group, but not
+        for all.
+        """
+        read: int = len(set(self.held.values())) + self.states + self.inputs + slopes
+        of_group = read * self.groups.width
+        return of_group <= CACHE < of_group * self.groups.groups
+
+    def _stage(self, name: str, row: Sequence[float]) -> str:
+        """The function of one stage, which computes its slopes."""
+        block = self.groups.body()
+        values = _Moved(block, row, self.states)
+        given: dict[Operand, str] = {("in", 0, i): values.state(i) for i in range(self.states)}
+        given |= {("in", 1, i): values.input(i) for i in range(self.inputs)}
+        at = emission.Emission(block, POINT, self.held, given)
         at.run(self.items)
-        by_index = {i: at.value_of(operand) for _, i, operand in self.outputs}
-        return [by_index[i] for i in range(self.states)]
+        for _, i, operand in self.outputs:
+            block.store(SLOPES, len(row) * self.states + i, at.value_of(operand))
+        self.needed |= block.needed
+        return self.groups.part(name, OF_STAGE, block)
 
-    def _load(self, array: str, index: int) -> str:
-        return self.block.load(array, index * self.groups)
+    def _finish(self, name: str, weights: Sequence[float]) -> str:
+        """The function that computes the states at the end of the step."""
+        block = self.groups.body()
+        values = _Moved(block, weights, self.states)
+        for i in range(self.states):
+            block.store("y", i, values.state(i))
+        return self.groups.part(name, OF_END, block)
 
-    def _moved(self, i: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> str:
+
+@dataclasses.dataclass(frozen=True)
+class _Moved:
+    """States and inputs at a stage, with the weights of the slopes of the stages before it."""
+
+    block: FunctionBody
+    weights: Sequence[float]
+    states: int
+
+    def state(self, i: int) -> str:
         """x + h (a1 k1 + a2 k2 + ...)."""
-        x = self._load("x", i)
+        x = self.block.load("x", i)
         total = ""
-        combined = self.block.arithmetic
-        for weight, k in zip(row, slopes, strict=True):
+        for stage, weight in enumerate(self.weights):
             if weight:
-                term = combined("*", self.block.constant(weight), k[i])
-                total = combined("+", total, term) if total else term
-        return combined("+", x, combined("*", self._load("h", 0), total)) if total else x
+                slope = self.block.load(SLOPES, stage * self.states + i)
+                total = self._added(total, self._product(self.block.constant(weight), slope))
+        return self._added(x, self._product(self.block.load("h", 0), total)) if total else x
+
+    def input(self, i: int) -> str:
+        """u + (a1 + a2 + ...) h w."""
+        u = self.block.load("u", i)
+        node = sum(self.weights)
+        if not node:
+            return u
+        way = self._product(self.block.constant(node), self.block.load("h", 0))
+        return self._added(u, self._product(way, self.block.load("w", i)))
+
+    def _added(self, a: str, b: str) -> str:
+        return self.block.arithmetic("+", a, b) if a else b
+
+    def _product(self, a: str, b: str) -> str:
+        return self.block.arithmetic("*", a, b)

@@ -20,6 +20,8 @@ from .cache.store import load_module
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module, row_outputs, rows_at_once
 from .llvm.emit import LlvmType
+from .llvm.groups import LaneGroups
+from .llvm.processor import processor
 
 
 class Pool:
@@ -173,8 +175,9 @@ class Program:
         """
         with self._compiling:
             if (tableau, number) not in self._lane_modules:
+                groups = LaneGroups(number, processor().register)
                 self._lane_modules[tableau, number] = Module(
-                    *lanes_module(self.traced, *tableau, number)
+                    *lanes_module(self.traced, *tableau, groups)
                 )
         module = self._lane_modules[tableau, number]
         return (

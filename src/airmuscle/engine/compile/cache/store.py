@@ -19,6 +19,7 @@ from typing import Any
 
 from ....core import AirmuscleWarning, atomic_file, user_folder
 from ..llvm.jit import engine_of, object_code
+from ..llvm.processor import processor
 
 _POSIX = hasattr(os, "getuid")
 _PACKAGE = pathlib.Path(__file__).parents[1]
@@ -132,18 +133,12 @@ def _remove_oldest(folder: pathlib.Path) -> None:
             path.unlink()
 
 
-@functools.cache
-def _processor() -> str:
-    import llvmlite.binding as llvm
-
-    return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-
-
 def _file_name(name: str, kinds: Sequence[str]) -> str:
     """A name for each processor, kind of arguments and version of the program, so that none
     replaces the other.
     """
-    key = f"{','.join(kinds)} {_processor()} {_origin().hex()}"
+    made_for = processor()
+    key = f"{','.join(kinds)} {made_for.name} {made_for.features} {_origin().hex()}"
     return f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:16]}.code"
 
 

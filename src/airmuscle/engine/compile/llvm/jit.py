@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from .emit import DECLARED
+from .processor import processor
 
 LEVEL = 2
 """Optimisation level of printed modules."""
@@ -20,13 +21,18 @@ those of the standard pipeline that change it, in half the time of the pipeline 
 
 def object_code(text: str) -> bytes:
     """An object file with the machine code of LLVM text for this processor."""
+    code: bytes = native(LEVEL).emit_object(optimised(text))
+    return code
+
+
+def optimised(text: str) -> Any:
+    """The module of LLVM text, optimised for this processor."""
     import llvmlite.binding as llvm
 
-    machine = native(LEVEL)
     module = llvm.parse_assembly(DECLARED + text)
+    machine = native(LEVEL)
     _optimise(module, machine)
-    code: bytes = machine.emit_object(module)
-    return code
+    return module
 
 
 def _optimise(module: Any, machine: Any) -> None:
@@ -71,15 +77,11 @@ def _target() -> Any:
 
 
 def native(level: int) -> Any:
-    """A code generator for this very processor, with so much optimisation (0 to 3); each engine
-    owns its own.
+    """A code generator for this processor, with so much optimisation (0 to 3); each engine owns
+    its own.
     """
-    import llvmlite.binding as llvm
-
-    features = llvm.get_host_cpu_features().flatten()
-    return _target().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=level
-    )
+    made_for = processor()
+    return _target().create_target_machine(cpu=made_for.name, features=made_for.features, opt=level)
 
 
 _C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
@@ -88,6 +90,15 @@ _STANDALONE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": Tr
 
 def build(kernel: Any, kinds: Sequence[str]) -> bytes:
     """Machine code of a numba kernel for arguments of these kinds; empty where the kernel cannot do
+    without numba.
+    """
+    module = standalone(kernel, kinds)
+    code: bytes = b"" if module is None else native(3).emit_object(module)
+    return code
+
+
+def standalone(kernel: Any, kinds: Sequence[str]) -> Any:
+    """The module of a numba kernel for arguments of these kinds; None where the kernel cannot do
     without numba.
 
     That is where it allocates or raises, returns something else than a status, or calls what
@@ -99,15 +110,15 @@ def build(kernel: Any, kinds: Sequence[str]) -> bytes:
     from numba.core.errors import NumbaError
 
     options = {name: value for name, value in kernel.targetoptions.items() if name != "nopython"}
-    standalone = numba.njit(**options, **_STANDALONE)(kernel.py_func)
+    compiled = numba.njit(**options, **_STANDALONE)(kernel.py_func)
     signature = tuple(_numba_type(kind) for kind in kinds)
     try:
         with shallow_scope_copies():
-            standalone.compile(signature)
+            compiled.compile(signature)
     except NumbaError:
-        return b""
-    text = standalone.inspect_llvm(signature)
-    returned = {s.return_type for s in standalone.nopython_signatures}
+        return None
+    text = compiled.inspect_llvm(signature)
+    returned = {s.return_type for s in compiled.nopython_signatures}
     functions = [f for f in llvm.parse_assembly(text).functions if not f.is_declaration]
     expected = [
         "retptr",
@@ -117,20 +128,19 @@ def build(kernel: Any, kinds: Sequence[str]) -> bytes:
     if [[a.name for a in f.arguments] for f in functions] != [expected] or text.count(
         "%excinfo"
     ) > 1:
-        return b""  # arrays are passed in another way, or it raises
+        return None  # arrays are passed in another way, or it raises
     if not returned <= {numba.int64, numba.none}:
-        return b""
+        return None
     module = llvm.parse_assembly(f"{text}\n{entry_point(functions[0].name, kinds)}")
-    machine = native(3)
     module.get_function(functions[0].name).linkage = "internal"
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
+    machine = native(3)
     passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
     declared = [v.name for v in (*module.functions, *module.global_variables) if v.is_declaration]
     if any(not name.startswith("llvm.") and name not in _C_LIBRARY for name in declared):
-        return b""
-    code: bytes = machine.emit_object(module)
-    return code
+        return None
+    return module
 
 
 def _numba_type(kind: str) -> Any:

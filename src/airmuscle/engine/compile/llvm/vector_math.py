@@ -14,7 +14,7 @@ Mathematik 18, 1971.
 """
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from .emit import STEADY_POWER, FunctionBody, LlvmType, function_of_values
 from .exact import ExactBody, steady_power
@@ -229,6 +229,14 @@ def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: Llv
         value = block.put(f"call double @{name}({', '.join(f'double {a}' for a in given)})")
         vector = block.put(f"insertelement {number.text} {vector}, double {value}, i32 {i}")
     return function_of_values(as_name, arguments, block, number, vector)
+
+
+def definitions(needed: Mapping[str, int], number: LlvmType) -> str:
+    """Definitions of the functions that printed code needs, by name with the number of their
+    arguments, and of what they call.
+    """
+    parts = [definition(name, count, number) for name, count in needed.items()]
+    return "\n".join([declarations({number}), *parts])
 
 
 def declarations(numbers: Collection[LlvmType]) -> str:
