@@ -3,16 +3,13 @@ the library.
 
 With the steps of `simulate(..., RungeKutta4(step))` they agree to 1e-12 of the tension in double
 and to 1e-5 in single precision. Derivatives of PyTorch are those of the printed expressions. The
-adapters run in the released package of Newton; those of mjlab and Isaac Lab, which need another
-MuJoCo or Isaac Sim, against their interfaces as recorded here.
+adapters of robot learning frameworks run in test_frameworks.py.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
 import sys
-import types
 from dataclasses import replace
 
 import numpy as np
@@ -368,161 +365,116 @@ def test_a_parameter_of_each_muscle_is_set_by_its_path(torch, tmp_path):
         actuator.set_parameters({"mass": 1.0})
 
 
-# Adapters
+DAMPING = "muscle.damper.damping"
 
 
-GEARS = ((0.03,), (-0.03,))
-OFFSETS = (0.97 * LIFT.resting_lengths[0],) * 2
-"""Gears [m/rad] and offsets [m] of two muscles on a joint."""
+@pytest.fixture(scope="module")
+def modules(torch, warp, tmp_path_factory):
+    """Written modules of PyTorch and Warp with an uncertainty, and those without."""
+    folder = tmp_path_factory.mktemp("modules")
+    written = []
+    for name, uncertainty in (("muscle", UNCERTAINTY), ("plain", None)):
+        for stack, end in ((TorchStack(), ""), (WarpStack(Double()), "_warp")):
+            write_actuator(LIFT, folder, stack, name=name, uncertainty=uncertainty)
+            written.append(module_of(folder / f"{name}{end}.py"))
+    return written
 
 
-def joint_torques(torch, folder, angles, speed, commands, dt):
-    """Torques of two muscles of the library's actuator on a joint, computed muscle by muscle."""
-    module = module_of(folder / "muscle.py")
-    torques = np.zeros(len(angles))
-    for (gear,), offset, command in zip(GEARS, OFFSETS, commands, strict=True):
-        actuator = module.Muscle((1,))
-        state = actuator.start(1e5, offset + gear * angles[0])
-        for k, angle in enumerate(angles):
-            output = actuator.compute(state, command, offset + gear * angle, gear * speed, dt)
-            state = output.state
-            torques[k] = torques[k] - gear * float(output.tension)
-    return torques
+def actuators(torch, modules):
+    """Four muscles of PyTorch and of Warp."""
+    in_torch, in_warp = modules
+    return [
+        getattr(in_torch, class_of(in_torch))((4,), dtype=torch.float64),
+        getattr(in_warp, class_of(in_warp))(4, device="cpu"),
+    ]
 
 
-ANGLES = np.linspace(0.0, 0.1, 21)
-COMMANDS = (0.6, -0.2)
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (-5.0, "-5"),
+        (float("nan"), "nan"),
+        (float("inf"), "inf"),
+        ([100.0, 200.0, -1.0, 300.0], "-1"),
+    ],
+)
+def test_a_parameter_beyond_its_bounds_is_refused_and_changes_nothing(value, shown, torch, modules):
+    for actuator, prepared in zip(
+        actuators(torch, modules[:2]), ("prepared", "prepared"), strict=True
+    ):
+        before = np.array(getattr(actuator, prepared).numpy())
+        with pytest.raises(ValueError, match=rf"{DAMPING} is {shown}; allowed are 0 to "):
+            actuator.set_parameters({DAMPING: value})
+        np.testing.assert_array_equal(getattr(actuator, prepared).numpy(), before)
+        with pytest.raises(KeyError, match="there is no parameter 'mass'"):
+            actuator.set_parameters({"mass": 1.0})
 
 
-def test_the_drive_of_newton_gives_the_efforts_of_the_muscles(warp, torch, tmp_path, monkeypatch):
-    newton = pytest.importorskip("newton.actuators", reason="needs the package newton")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    write_actuator(LIFT, tmp_path, WarpStack(), name="muscle")
-    write_actuator(LIFT, tmp_path, name="muscle")
-    adapter = module_of(tmp_path / "muscle_newton.py")
-    drive = adapter.MuscleDrive([g for (g,) in GEARS], OFFSETS, initial_pressure=1e5)
-    actuator = newton.Actuator(warp.array([0, 0], dtype=warp.uint32, device="cpu"), drive)
-    states, controls, efforts = [actuator.state(), actuator.state()], actuator.sim_control(), []
-    for angle in ANGLES:
-        points = actuator.sim_state()
-        points.joint_q, points.joint_qd = (
-            warp.array([v], dtype=float, device="cpu") for v in (angle, 1.0)
-        )
-        for name in ("joint_target_q", "joint_target_qd", "joint_f"):
-            setattr(controls, name, warp.zeros(1, dtype=float, device="cpu"))
-        controls.muscle_command = warp.array(COMMANDS, dtype=float, device="cpu")
-        actuator.step(points, controls, *states, dt=1e-3)
-        states.reverse()
-        efforts.append(controls.joint_f.numpy()[0])
-    np.testing.assert_allclose(
-        efforts, joint_torques(torch, tmp_path, ANGLES, 1.0, COMMANDS, 1e-3), rtol=1e-4, atol=1e-3
+def test_parameters_of_each_muscle_are_set_in_warp_as_in_torch(torch, warp, modules):
+    dampings = [0.0, 100.0, 200.0, 400.0]
+    in_torch, in_warp = actuators(torch, modules[:2])
+    for actuator in (in_torch, in_warp):
+        actuator.set_parameters({DAMPING: dampings})
+    output = in_torch.compute(in_torch.start(3e5, 0.28), 0.0, 0.28, -0.1, 1e-3)
+    in_warp.start(3e5, 0.28)
+    in_warp.compute(
+        *(warp.full(4, v, dtype=modules[1].real, device="cpu") for v in (0.0, 0.28, -0.1)), 1e-3
     )
-    before = states[0].drive_state.values.numpy()
-    states[0].reset(warp.array([True, False], dtype=warp.bool, device="cpu"))
-    assert states[0].drive_state.fresh.numpy().tolist() == [1, 0]
-    assert (states[0].drive_state.values.numpy() == before).all(), (
-        "a muscle starts at its length in the next step"
-    )
+    np.testing.assert_allclose(in_warp.tension.numpy(), output.tension.numpy(), rtol=1e-12)
+    assert np.ptp(output.tension.numpy()) == pytest.approx(40.0)
 
 
-class RecordedActuator:
-    """Interface of `mjlab.actuator.Actuator` 1.6 and of `isaaclab.actuators.ActuatorBase` 2.3, as
-    far as it is used.
-    """
+@pytest.mark.parametrize("change", ["tensor", "number", "randomise", "none"])
+@pytest.mark.parametrize("before", ["randomise", "none"])
+def test_a_stored_actuator_is_restored_whatever_its_parameters_are(change, before, torch, modules):
+    """Into a new module, and into one with drawn parameters; alone and within a policy."""
 
-    def __init__(self, cfg, *arguments, **_):
-        self.cfg, self._mjs_actuators, self.effort_limit = cfg, [], float("inf")
-        self.target_names = arguments[-1] if isinstance(arguments[-1], list) else arguments[0]
+    def changed(actuator, change, seed):
+        if change == "randomise":
+            actuator.randomise(generator=torch.Generator().manual_seed(seed))
+        elif change != "none":
+            value = 150.0 if change == "number" else torch.tensor([10.0, 20.0, 30.0, 40.0])
+            actuator.set_parameters({DAMPING: value})
+        return torch.nn.Sequential(actuator)
 
-    def initialize(self, mj_model, model, data, device):
-        pass
-
-    def reset(self, env_ids=None):
-        pass
-
-
-def record(monkeypatch, names):
-    """Modules of an interface in place of a package that is not there."""
-    for name, content in names.items():
-        module = types.ModuleType(name)
-        vars(module).update(content)
-        monkeypatch.setitem(sys.modules, name, module)
-
-
-@dataclasses.dataclass(kw_only=True)
-class RecordedCfg:
-    """Fields that all configurations have."""
-
-    target_names_expr: tuple = ()
-    joint_names_expr: tuple = ()
-    armature: float | None = None
-    frictionloss: float | None = None
-    viscous_damping: float | None = None
-    transmission_type: str = "joint"
-    delay_max_lag: int = 0
+    first = changed(actuators(torch, modules[:2])[0], change, 1)
+    second = changed(actuators(torch, modules[:2])[0], before, 2)
+    second.load_state_dict(first.state_dict())
+    tensions = []
+    for policy in (first, second):
+        actuator = policy[0]
+        state = actuator.start(3e5, 0.28)
+        tensions.append(actuator.compute(state, 0.0, 0.28, -0.1, 1e-3).tension.numpy())
+        np.testing.assert_array_equal(actuator.values.numpy(), first[0].values.numpy())
+    np.testing.assert_array_equal(*tensions)
 
 
-def test_the_actuator_of_mjlab_gives_the_efforts_of_the_muscles(torch, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(tmp_path))
-    motors = []
-    base = {"Actuator": RecordedActuator, "ActuatorCfg": RecordedCfg}
-    spec = {
-        "create_motor_actuator": (
-            lambda spec, name, **options: motors.append((name, options)) or name
-        )
-    }
-    record(
-        monkeypatch,
-        {"mjlab": {}, "mjlab.actuator": base, "mjlab.utils": {}, "mjlab.utils.spec": spec},
-    )
-    write_actuator(LIFT, tmp_path, name="muscle")
-    adapter = module_of(tmp_path / "muscle_mjlab.py")
-    cfg = adapter.MuscleCfg(
-        target_names_expr=("elbow",), gears=GEARS, offsets=OFFSETS, initial_pressure=1e5
-    )
-    actuator = cfg.build(None, [0], ["elbow"])
-    actuator.edit_spec(None, ["elbow"])
-    assert motors[0][0] == "elbow"
-    timed = types.SimpleNamespace(opt=types.SimpleNamespace(timestep=1e-3))
-    actuator.initialize(timed, None, types.SimpleNamespace(nworld=3), "cpu")
-    actuator.command[:] = torch.tensor(COMMANDS)
-    efforts = []
-    for angle in ANGLES:
-        pos = torch.full((3, 1), angle)
-        vel = torch.ones((3, 1))
-        command = types.SimpleNamespace(pos=pos.float(), vel=vel, effort_target=torch.zeros((3, 1)))
-        efforts.append(actuator.compute(command)[2, 0].item())
-    np.testing.assert_allclose(
-        efforts, joint_torques(torch, tmp_path, ANGLES, 1.0, COMMANDS, 1e-3), rtol=1e-5, atol=1e-4
-    )
-    actuator.reset(torch.tensor([1]))
-    actuator.compute(command)
-    assert actuator.output.pressure[1] == pytest.approx(torch.tensor([1e5, 1e5]), rel=1e-6)
-    assert actuator.output.pressure[2, 0] > 1.1e5
+def test_an_actuator_of_another_shape_or_kind_is_not_restored(torch, modules):
+    muscle = modules[0].Muscle
+    stored = muscle((4,))
+    stored.set_parameters({DAMPING: torch.full((4,), 10.0)})
+    with pytest.raises(RuntimeError, match="size mismatch for values"):
+        muscle((3,)).load_state_dict(stored.state_dict())
 
 
-def test_the_actuator_of_isaac_lab_gives_the_efforts_of_the_muscles(torch, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(tmp_path))
-    base = {"ActuatorBase": RecordedActuator, "ActuatorBaseCfg": RecordedCfg}
-    utils = {"configclass": dataclasses.dataclass}
-    record(monkeypatch, {"isaaclab": {}, "isaaclab.actuators": base, "isaaclab.utils": utils})
-    write_actuator(LIFT, tmp_path, name="muscle")
-    adapter = module_of(tmp_path / "muscle_isaaclab.py")
-    cfg = adapter.MuscleCfg(dt=1e-3, gears=GEARS, offsets=OFFSETS, initial_pressure=1e5)
-    actuator = cfg.class_type(cfg, ["elbow"], slice(None), 3, "cpu")
-    actuator.command[:] = torch.tensor(COMMANDS)
-    efforts = []
-    for angle in ANGLES:
-        action = types.SimpleNamespace(joint_efforts=None, joint_positions=1, joint_velocities=1)
-        action = actuator.compute(action, torch.full((3, 1), angle).float(), torch.ones((3, 1)))
-        efforts.append(action.joint_efforts[2, 0].item())
-    assert action.joint_positions is None
-    np.testing.assert_allclose(
-        efforts, joint_torques(torch, tmp_path, ANGLES, 1.0, COMMANDS, 1e-3), rtol=1e-5, atol=1e-4
-    )
-    actuator.reset([1])
-    actuator.compute(action, torch.zeros((3, 1)), torch.zeros((3, 1)))
-    assert actuator.output.pressure[1] == pytest.approx(torch.tensor([1e5, 1e5]), rel=1e-6)
+def test_without_a_covariance_nothing_can_be_drawn(torch, modules):
+    """The remedy works: values that were drawn elsewhere are given to set_parameters."""
+    remedy = r"have no covariance .* table \[uncertainty\].* drawn values to set_parameters"
+    drawn = np.random.default_rng(1).uniform(50.0, 100.0, 4)
+    for actuator in actuators(torch, modules[2:]):
+        with pytest.raises(ValueError, match=remedy):
+            actuator.randomise()
+        actuator.set_parameters({DAMPING: drawn})
+
+
+@pytest.mark.parametrize("dt", [0.0, -1e-3, float("nan"), float("inf")])
+def test_a_step_that_is_not_positive_is_refused(dt, torch, warp, modules):
+    in_torch, in_warp = actuators(torch, modules[:2])
+    with pytest.raises(ValueError, match=r"dt is .* s; it must be positive and finite"):
+        in_torch.compute(in_torch.start(), 0.0, 0.28, 0.0, dt)
+    rows = [warp.zeros(4, dtype=modules[1].real, device="cpu") for _ in range(3)]
+    with pytest.raises(ValueError, match=r"dt is .* s; it must be positive and finite"):
+        in_warp.compute(*rows, dt)
 
 
 # What cannot be exported, and the command

@@ -8,12 +8,15 @@ step(x, z, c, h, y)  states y after a time h [s] under z = (command, length [m],
 observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validity range of the
                      muscle, else 0)
 prepare(p, c)        c, what these need of the parameters
+
+A command beyond its range is limited. With a number in z or a step h that is not finite, `step`
+returns the states as they are, and `observe` gives NaN, NaN and 0.
 """
 
 import dataclasses
 import functools
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,6 +34,9 @@ SAFETY = 1.0
 MAX_STEP = 1e-3
 """Largest product of the default step and the fastest rate of the plant, of which 2.8 is the limit
 of the method, and longest default step [s] (chosen)."""
+LARGEST = float(np.finfo(np.float32).max)
+"""Largest magnitude of an input that counts as finite: that of single precision, in which an
+actuator may compute."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -63,8 +69,14 @@ class ActuatorModel:
         model, vector = autodiff.symbolic(self.part)
         rest = casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
         low, high = control_range(self.controls)
-        command = casadi.fmin(casadi.fmax(z[0], low), high)
-        values = {SHORTENING: rest - z[1], SHORTENING_SPEED: -z[2]}
+        # What is not finite is replaced, so that no derivative of the choice in `step` and
+        # `observe` is NaN.
+        length, speed = (
+            casadi.if_else(_is_finite(z[i]), z[i], usual) for i, usual in ((1, rest), (2, 0.0))
+        )
+        command = casadi.if_else(_is_finite(z[0]), z[0], low)
+        command = casadi.fmin(casadi.fmax(command, low), high)
+        values = {SHORTENING: rest - length, SHORTENING_SPEED: -speed}
         pair = [casadi.fmax(command, 0.0), casadi.fmax(-command, 0.0)]
         openings = pair if len(self.controls) == 2 else [command]
         values |= {
@@ -90,7 +102,12 @@ class ActuatorModel:
         later = t.x + h * sum(
             (b * k for b, k in zip(weights, slopes, strict=True) if b), casadi.SX(0)
         )
-        return {"x": t.x, "z": z, "p": t.p, "h": h}, later
+        usable = _all_finite([z[0], z[1] + h * z[2], z[2]])
+        states = [
+            casadi.if_else(usable, after, before)
+            for after, before in zip(casadi.vertsplit(later), casadi.vertsplit(t.x), strict=True)
+        ]
+        return {"x": t.x, "z": z, "p": t.p, "h": h}, casadi.vertcat(*states)
 
     @functools.cached_property
     def observe(self) -> tuple[dict[str, Any], Any]:
@@ -102,15 +119,16 @@ class ActuatorModel:
         o = casadi.substitute(t.o, t.u, self._inputs(z, t.p))
         names = (*(s.name for s in self.part.states), *t.output_names)
         known = dict(zip(names, casadi.vertsplit(casadi.vertcat(t.x, o)), strict=True))
-        valid = casadi.SX(1.0)
+        usable = _all_finite(casadi.vertsplit(z))
+        results = [known["force"], known["pressure"]]
+        valid = casadi.logic_and(usable, _all_finite(results))
         for limit in (each for each in self.part.column_limits if each.column in known):
             value = known[limit.column]
             low, high = limit.bounds
             valid = casadi.logic_and(valid, value >= low) if np.isfinite(low) else valid
             valid = casadi.logic_and(valid, value <= high) if np.isfinite(high) else valid
-        return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(
-            known["force"], known["pressure"], valid
-        )
+        shown = (casadi.if_else(usable, result, np.nan) for result in results)
+        return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(*shown, valid)
 
     @functools.cached_property
     def start(self) -> tuple[dict[str, Any], Any]:
@@ -229,6 +247,20 @@ def control_range(controls: Sequence[Input]) -> tuple[float, float]:
     if len(controls) == 2:
         return -controls[1].maximum, controls[0].maximum
     return (controls[0].minimum, controls[0].maximum) if controls else (0.0, 0.0)
+
+
+def _is_finite(value: Any) -> Any:
+    """Whether a symbol is a finite number, as a condition that is false for NaN."""
+    import casadi
+
+    return casadi.fabs(value) <= LARGEST
+
+
+def _all_finite(values: Iterable[Any]) -> Any:
+    """Whether all symbols are finite numbers."""
+    import casadi
+
+    return functools.reduce(casadi.logic_and, map(_is_finite, values))
 
 
 def _stable_step(part: Plant) -> float:

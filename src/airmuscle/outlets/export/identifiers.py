@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ParameterError, abridged, cite, leaves, printable
+from ...core import Leaf, ParameterError, abridged, cite, leaves, printable
 from ...core.tree import fingerprint
 from ...engine.compile.text.languages import CLanguage
 
@@ -199,6 +199,7 @@ def provenance(
     units = (
         (leaf, "" if leaf.declared.unit == "1" else f" {leaf.declared.unit}")
         for leaf in leaves(model)
+        if not is_unstated_rating(leaf)
     )
     rows = [
         f"  {leaf.path} = {float(leaf.value)!r}{unit}  ({leaf.declared.meaning})"
@@ -219,6 +220,13 @@ def provenance(
     ):  # no line ends its comment
         lines = [line.replace(ending, harmless) for line in lines]
     return [line.rstrip("\\ \t") for line in lines]  # nor continues into the next one
+
+
+def is_unstated_rating(leaf: Leaf) -> bool:
+    """Whether a number stands for a rating that the maker does not state, which is no fact to
+    print.
+    """
+    return ".ratings." in f".{leaf.path}" and leaf.value == leaf.declared.default
 
 
 def block_comment(lines: Iterable[str]) -> str:

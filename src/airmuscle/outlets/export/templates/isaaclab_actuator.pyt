@@ -3,7 +3,8 @@
 Muscle m has the length offsets[m] + sum over the joints j of gears[m][j] times their position; its tension T acts on
 joint j with the effort -gears[m][j] T. By default each joint has one muscle, whose length is its position. The command
 of the muscles is `command` (environments, muscles), to be written by an action term; with one muscle per joint the
-effort of the action is added to it. `dt` is the time between two calls, that of a physics step.
+effort of the action is added to it. `dt` is the time between two calls, that of a physics step. `max_delay` delays the
+commands by so many calls, or by those of `muscles.delay`.
 """
 
 import torch
@@ -43,7 +44,7 @@ class @class@Actuator(ActuatorBase):
         self.output = self.muscles.compute(state, command, length, speed, self.cfg.dt)
         self.state = self.output.state
         self.computed_effort = -self.output.tension @ self.gears
-        self.applied_effort = torch.clamp(self.computed_effort, -self.effort_limit, self.effort_limit)
+        self.applied_effort = self._clip_effort(self.computed_effort)
         control_action.joint_efforts = self.applied_effort
         control_action.joint_positions = control_action.joint_velocities = None
         return control_action

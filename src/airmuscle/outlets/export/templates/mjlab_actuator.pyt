@@ -3,10 +3,10 @@
 Muscle m has the length offsets[m] + sum over the targets j of gears[m][j] times their position; its tension T acts on
 target j with the force -gears[m][j] T. By default each target has one muscle, whose length is its position. The command
 of the muscles is `command` (environments, muscles), to be written by an action term; with one muscle per target the
-effort target is added to it. A delay of the command is that of mjlab (`delay_min_lag`, `delay_max_lag`).
+effort target is added to it. The sum is delayed by mjlab (`delay_min_lag`, `delay_max_lag` and the further fields).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from mjlab.actuator import Actuator, ActuatorCfg
@@ -55,12 +55,21 @@ class @class@Actuator(Actuator):
         super().reset(env_ids)
         self.fresh[slice(None) if env_ids is None else env_ids] = True
 
+    def get_command(self, data):
+        """The commands of the muscles in place of the targets, so that mjlab delays them."""
+        cmd = super().get_command(data)
+        command = self.command.clone()
+        if cmd.effort_target.shape == command.shape:
+            command = command + cmd.effort_target
+        unused = torch.zeros_like(command)
+        return replace(cmd, position_target=unused, velocity_target=unused, effort_target=command)
+
     def compute(self, cmd):
         length, speed = self.offsets + cmd.pos @ self.gears.T, cmd.vel @ self.gears.T
         begun = self.muscles.start(self.cfg.initial_pressure, length).values
         values = torch.where(self.fresh[:, None], begun, self.state.values)
         self.fresh[:] = False
-        command = self.command + cmd.effort_target if cmd.effort_target.shape == self.command.shape else self.command
-        self.output = self.muscles.compute(self.state._replace(values=values), command, length, speed, self.dt)
+        state = self.state._replace(values=values)
+        self.output = self.muscles.compute(state, cmd.effort_target, length, speed, self.dt)
         self.state = self.output.state
         return -self.output.tension @ self.gears

@@ -2,7 +2,9 @@
 
 Actuator i has one muscle of the length offset[i] + gear[i] q, with the position q of its degree of freedom; its tension
 T gives the effort -gear[i] T. Its command is `muscle_command[i]` of the controls, or the feed-forward of its degree of
-freedom where that array is missing. A muscle starts at rest at `initial_pressure` [Pa] with its length at that instant.
+freedom where `muscle_command` is None. A muscle starts at rest at `initial_pressure` [Pa] with its length at that
+instant. `max_delay` delays commands by so many steps, or by those of `muscles.delay`; `delay_steps` of Newton delays the
+feed-forward alone, and is refused with `muscle_command`.
 """
 
 from dataclasses import dataclass
@@ -62,6 +64,7 @@ class @class@Drive(DriveBase):
     """
 
     custom_inputs = ("muscle_command",)
+    SHARED_PARAMS = frozenset({"initial_pressure", "max_delay"})
 
     @dataclass
     class State(DriveBase.State):
@@ -79,7 +82,8 @@ class @class@Drive(DriveBase):
 
     @classmethod
     def resolve_arguments(cls, args):
-        return {"gear": args.get("gear", 1.0), "offset": args.get("offset", 0.0)}
+        usual = {"gear": 1.0, "offset": 0.0, "initial_pressure": 0.0, "max_delay": 0}
+        return {name: args.get(name, value) for name, value in usual.items()}
 
     def __init__(self, gear, offset, initial_pressure=0.0, max_delay=0):
         self.gear, self.offset = gear, offset
@@ -110,6 +114,8 @@ class @class@Drive(DriveBase):
         target_vel_indices, forces, state, dt, device=None, *, custom_inputs=None,
     ):
         muscles, own = self.muscles, (custom_inputs or {}).get("muscle_command")
+        if own is not None:
+            self._check_command(own, is_delayed=target_vel_indices is not vel_indices)
         launch = {"dim": muscles.count, "device": muscles.device}
         pressure = real(self.initial_pressure)
         points = [positions, velocities, pos_indices, vel_indices, self.gear, self.offset, pressure]
@@ -122,6 +128,18 @@ class @class@Drive(DriveBase):
         wp.launch(begin, inputs=[state.fresh, self._begun, muscles.states], **launch)
         muscles.compute(self._command, self._length, self._speed, dt)
         wp.launch(put_effort, inputs=[muscles.tension, self.gear, forces], **launch)
+
+    def _check_command(self, own, is_delayed):
+        if len(own) != self.muscles.count:
+            raise ValueError(
+                f"muscle_command has {len(own)} elements; assign an array of {self.muscles.count}, one for each actuator of"
+                " this group, or None for the feed-forward of the degrees of freedom"
+            )
+        if is_delayed:
+            raise ValueError(
+                "delay_steps does not delay muscle_command; give the drive max_delay in its place, or set muscle_command to"
+                " None for the feed-forward of the degrees of freedom"
+            )
 
     def update_state(self, current_state, next_state):
         wp.copy(next_state.values, self.muscles.states)

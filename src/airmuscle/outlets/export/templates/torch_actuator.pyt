@@ -10,6 +10,9 @@ COMMAND_RANGE; length [m] and speed [m/s] are those of the muscle. The tension [
 the point is within the validity range of the muscle belong to the beginning of the step, the state to its end: apply
 the tension for the step. The command is held over the step, the length moves at its speed; the method is the classical
 one of Runge and Kutta with steps of at most STEP. `torch.compile(actuator.compute)` makes one kernel of it.
+
+Where a command, length or speed is not finite, `valid` is False, tension and pressure are NaN, and the state remains
+as it is.
 """
 
 import math
@@ -27,6 +30,10 @@ STEP = @step@
 # Identified parameters, and the root of their covariance: deviations are SPREAD times independent normal deviates.
 IDENTIFIED = @identified@
 SPREAD = @spread@
+NO_COVARIANCE = (
+    "the parameters of this actuator have no covariance from which to draw; export a muscle file with a table"
+    " [uncertainty], as `airmuscle campaign` writes it, or give drawn values to set_parameters"
+)
 
 
 def stacked(values, like):
@@ -76,12 +83,39 @@ class @class@(torch.nn.Module):
             raise KeyError(f"there is no parameter {unknown[0]!r}; there are {', '.join(PARAMETERS)}")
         rows = [self.values[i] for i in range(len(PARAMETERS))]
         for path, value in values.items():
-            rows[PARAMETERS.index(path)] = value
+            rows[PARAMETERS.index(path)] = self._within_bounds(path, value)
         self.values = stacked(rows, self.defaults)
         self.prepared = prepare(self.values)
 
+    def _within_bounds(self, path, value):
+        """A parameter as a tensor; raises ValueError beyond its bounds, and for NaN."""
+        value = torch.as_tensor(value, dtype=self.defaults.dtype, device=self.defaults.device)
+        i = PARAMETERS.index(path)
+        refused = ~((value >= self.lower[i]) & (value <= self.upper[i]))
+        if refused.any():
+            raise ValueError(f"{path} is {value[refused][0].item():.6g}; allowed are {LOWER[i]:.6g} to {UPPER[i]:.6g}")
+        return value
+
+    def _load_from_state_dict(self, state_dict, prefix, *arguments):
+        """Parameters of a stored actuator are common to all muscles, or of each: take over their shape."""
+        for name in ("values", "prepared"):
+            stored, present = state_dict.get(prefix + name), getattr(self, name)
+            if stored is not None and self._fits(stored):
+                setattr(self, name, present.new_empty(stored.shape))
+        super()._load_from_state_dict(state_dict, prefix, *arguments)
+
+    def _fits(self, rows):
+        """Whether each of these rows belongs to all muscles or to a batch of this shape."""
+        shape = rows.shape[1:]
+        return len(shape) <= len(self.shape) and all(n in (1, m) for n, m in zip(shape[::-1], self.shape[::-1]))
+
     def randomise(self, scale=1.0, generator=None):
-        """Draw the identified parameters of every muscle from their covariance, within their bounds."""
+        """Draw the identified parameters of every muscle from their covariance, within their bounds.
+
+        Raises ValueError without a covariance.
+        """
+        if not IDENTIFIED:
+            raise ValueError(NO_COVARIANCE)
         kind = {"dtype": self.defaults.dtype, "device": self.defaults.device}
         normal = torch.randn((self.spread.shape[1], *self.shape), generator=generator, **kind)
         deviations = scale * torch.tensordot(self.spread, normal, dims=1)
@@ -102,7 +136,9 @@ class @class@(torch.nn.Module):
         return State(values, self._tensor(command).expand(self.max_delay, *self.shape).clone())
 
     def compute(self, state, command, length, speed, dt):
-        """The output of a step of `dt` [s], and the state after it."""
+        """The output of a step of `dt` [s], and the state after it. Raises ValueError for a `dt` that is not positive."""
+        if not 0.0 < dt < math.inf:
+            raise ValueError(f"dt is {dt} s; it must be positive and finite")
         command, commands = self._tensor(command), state.commands
         if self.max_delay:
             known = torch.cat([command[None], commands])

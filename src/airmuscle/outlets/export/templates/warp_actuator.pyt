@@ -9,6 +9,9 @@ The command [@unit@] is @command@, limited to COMMAND_RANGE; length [m] and spee
 tension [N], the gauge pressure [Pa] and whether the point is within the validity range of the muscle belong to the
 beginning of the step, the states to its end. The command is held over the step, the length moves at its speed; the
 method is the classical one of Runge and Kutta with steps of at most STEP. The launches can be captured in a CUDA graph.
+
+Where a command, length or speed is not finite, `valid` is 0, tension and pressure are NaN, and the states remain as they
+are.
 """
 
 import math
@@ -28,6 +31,10 @@ STEP = @step@
 # Identified parameters, and the root of their covariance: deviations are SPREAD times independent normal deviates.
 IDENTIFIED = @identified@
 SPREAD = @spread@
+NO_COVARIANCE = (
+    "the parameters of this actuator have no covariance from which to draw; export a muscle file with a table"
+    " [uncertainty], as `airmuscle campaign` writes it, or give drawn values to set_parameters"
+)
 HELD = @held@
 
 
@@ -66,7 +73,7 @@ def gather(
             if past == real(0.0):
                 commands[k, i] = commands[k - 1, i]
         commands[0, i] = command[i]
-        z[0, i] = commands[delay[i], i]
+        z[0, i] = commands[wp.clamp(delay[i], 0, commands.shape[0] - 1), i]
     z[1, i] = length[i] + past * speed[i]
     z[2, i] = speed[i]
 
@@ -98,8 +105,28 @@ class @class@:
         """Take over the parameters after they were changed."""
         self._launch(prepare, self.parameters, self.prepared)
 
+    def set_parameters(self, values):
+        """Set parameters by path: numbers, or arrays (count,). Raises ValueError beyond their bounds, and for NaN."""
+        unknown = [path for path in values if path not in PARAMETERS]
+        if unknown:
+            raise KeyError(f"there is no parameter {unknown[0]!r}; there are {', '.join(PARAMETERS)}")
+        rows = self.parameters.numpy()
+        for path, value in values.items():
+            i, value = PARAMETERS.index(path), np.asarray(value, dtype=float)
+            refused = ~((value >= LOWER[i]) & (value <= UPPER[i]))
+            if refused.any():
+                raise ValueError(f"{path} is {value[refused][0]:.6g}; allowed are {LOWER[i]:.6g} to {UPPER[i]:.6g}")
+            rows[i] = value
+        self.parameters.assign(rows)
+        self.prepare()
+
     def randomise(self, scale=1.0, seed=None):
-        """Draw the identified parameters of every muscle from their covariance, within their bounds."""
+        """Draw the identified parameters of every muscle from their covariance, within their bounds.
+
+        Raises ValueError without a covariance.
+        """
+        if not IDENTIFIED:
+            raise ValueError(NO_COVARIANCE)
         root = np.array(SPREAD, dtype=float).reshape(len(IDENTIFIED), len(IDENTIFIED))
         deviations = scale * root @ np.random.default_rng(seed).standard_normal((root.shape[1], self.count))
         values = self.parameters.numpy()
@@ -116,7 +143,12 @@ class @class@:
         self._launch(start, self._q, self.prepared, self.states)
 
     def compute(self, command, length, speed, dt):
-        """Write the outputs at the beginning of a step of `dt` [s], and advance the states."""
+        """Write the outputs at the beginning of a step of `dt` [s], and advance the states.
+
+        Raises ValueError for a `dt` that is not positive.
+        """
+        if not 0.0 < dt < math.inf:
+            raise ValueError(f"dt is {dt} s; it must be positive and finite")
         steps = max(1, math.ceil(dt / STEP - 1e-9))
         for k in range(steps):
             self._launch(gather, command, length, speed, self.commands, self.delay, real(k * dt / steps), self._z)
