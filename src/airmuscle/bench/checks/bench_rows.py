@@ -108,7 +108,7 @@ def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
         sensor = estimate_sensors(
             [Recording({"force": each["force"]}, each.origin) for each in given]
         )["force"]
-        complete &= columns[2] < sensor.upper_limit - 0.25 * sensor.resolution
+        complete &= columns[2] < sensor.upper_limit - sensor.tolerance
     return BenchRows(*(column[complete] for column in columns))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...core import AMBIENT_PRESSURE, Hint, HintedText, listed
 from ...recording import Recording
 from ..checks.bench_rows import file_list
+from ..segment import distinct_readings, magnitude, rounding
 from ..segment.interval import true_intervals
 from .matched_rows import Block, MatchedRuns, Matches
 
@@ -22,6 +23,10 @@ MIN_LEVELS = 3
 """Minimum number of different values of the force in these rows (chosen)."""
 _FACTORS = (1.0, 1.2345678912345e6, 1.3247179572447e3)
 """Factors of the columns in the sum by which equal rows are searched; without a common divisor."""
+_CELL = 1e-8
+_CELL_OFFSET = 0.381966
+"""Width of the cells whose numbers are summed, as a fraction of the maximum, and the place of their
+edges, which is no round number (chosen): equal rows but for rounding have equal numbers."""
 
 
 class RepeatedRows(NamedTuple):
@@ -40,11 +45,14 @@ class RepeatedRows(NamedTuple):
 def find_repeated_rows(
     recordings: Sequence[Recording], columns: Sequence[str]
 ) -> tuple[RepeatedRows, ...]:
-    """The stretches of rows whose columns are equal, digit by digit, to those of successive rows of
-    another recording. Those of the later recording are given. Equal rows within one recording are
-    not searched."""
+    """The stretches of rows whose columns are equal, but for rounding, to those of successive rows
+    of another recording. Those of the later recording are given. Equal rows within one recording
+    are not searched."""
     if len(recordings) < 2:
         return ()
+    least = [
+        max((rounding(name, run[name]) for run in recordings), default=0.0) for name in columns
+    ]
     found = []
     for here, there, offset in _candidates(recordings, columns):
         one = recordings[here]
@@ -53,11 +61,16 @@ def find_repeated_rows(
         last = min(len(one), len(other) + offset)
         rows = slice(first, last)
         earlier = slice(first - offset, last - offset)
-        same = np.logical_and.reduce([one[name][rows] == other[name][earlier] for name in columns])
+        same = np.logical_and.reduce(
+            [
+                np.abs(one[name][rows] - other[name][earlier]) <= tolerance
+                for name, tolerance in zip(columns, least, strict=True)
+            ]
+        )
         for stretch in true_intervals(same):
             rows = slice(first + stretch.start, first + stretch.stop)
             is_long = len(stretch) >= min(MIN_ROWS, len(one), len(other))
-            if is_long and np.unique(one["force"][rows]).size >= MIN_LEVELS:
+            if is_long and distinct_readings(one["force"][rows]).size >= MIN_LEVELS:
                 found.append(RepeatedRows(here, rows, (one.origin, other.origin)))
     return tuple(found)
 
@@ -68,10 +81,19 @@ def _candidates(
     """Pairs of recordings (later, earlier) and the offset of their rows at which several rows have
     one weighted sum.
     """
-    weighted = [
-        [factor * run[n] for factor, n in zip(_FACTORS, columns, strict=True)] for run in recordings
+    cells = {
+        name: _CELL * max((magnitude(name, run[name]) for run in recordings), default=0.0) or 1.0
+        for name in columns
+    }
+    keys = [
+        np.add.reduce(
+            [
+                factor * np.floor(run[name] / cells[name] + _CELL_OFFSET)
+                for factor, name in zip(_FACTORS, columns, strict=True)
+            ]
+        )
+        for run in recordings
     ]
-    keys = [np.add.reduce(terms) for terms in weighted]
     row = np.concatenate([np.arange(key.size) for key in keys])
     run = np.repeat(np.arange(len(keys)), [key.size for key in keys])
     joined = np.concatenate(keys)

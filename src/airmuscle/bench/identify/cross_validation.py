@@ -23,6 +23,7 @@ from ...core import (
     level_text,
 )
 from ...recording import Recording
+from ..segment import EDGE, SAME_READING, constant_band, estimate_resolution, rounding
 
 LEVEL_TOLERANCE = 0.005
 """Maximum difference between neighbouring values of a level, as a fraction of the maximum
@@ -42,7 +43,7 @@ def held_levels(values: Array) -> tuple[Array, float]:
     """The levels of a measured quantity in increasing order, and the fraction of the rows at them:
     medians of groups of values, without groups that a ramp fills."""
     ordered = np.sort(values)
-    tolerance = LEVEL_TOLERANCE * float(np.abs(ordered).max())
+    tolerance = LEVEL_TOLERANCE * (1 + EDGE) * float(np.abs(ordered).max())
     ends = np.flatnonzero(np.diff(ordered) > tolerance) + 1
     groups = [
         group for group in np.split(ordered, ends) if np.ptp(group) <= MAX_LEVEL_WIDTH * tolerance
@@ -57,7 +58,9 @@ def levels_of(values: Array, max_count: int) -> Array:
     levels, fraction = held_levels(values)
     if fraction < 0.5:
         quantiles = np.quantile(values, np.linspace(0.1, 0.9, max_count))
-        return np.unique([float(f"{value:.{ROUND_DIGITS - 1}e}") for value in quantiles])
+        return np.unique(
+            [float(f"{value * (1 + EDGE):.{ROUND_DIGITS - 1}e}") for value in quantiles]
+        )
     if levels.size <= max_count:
         return levels
     return np.asarray(levels[np.unique(np.linspace(0, levels.size - 1, max_count).astype(int))])
@@ -148,17 +151,29 @@ class LevelSplit(GroupSplit):
         values = np.concatenate([run[self.quantity] for run in recordings])
         ordered = np.sort(values[np.isfinite(values)])
         span = float(np.ptp(ordered)) if ordered.size else 0.0
-        ends = np.flatnonzero(np.diff(ordered) > self.min_gap * span) + 1
+        same = self._difference_of_readings(ordered)
+        span = span if span > same else 0.0
+        ends = np.flatnonzero(np.diff(ordered) > max(self.min_gap * span * (1 + EDGE), same)) + 1
         groups = np.split(ordered, ends if span > 0 else [])
         centres = np.array([float(np.median(group)) for group in groups])
         while centres.size > MAX_LEVELS:
-            nearest = int(np.argmin(np.diff(centres)))
+            gaps = np.diff(centres)
+            nearest = int(np.argmax(gaps <= gaps.min() * (1 + EDGE)))  # the first of equal gaps
             centres = np.delete(centres, nearest)
         edges = (centres[1:] + centres[:-1]) / 2
         names = np.array(
             [f"{self.quantity} {level_text(self.quantity, float(each), span)}" for each in centres]
         )
         return [names[np.searchsorted(edges, run[self.quantity])] for run in recordings]
+
+    def _difference_of_readings(self, values: Array) -> float:
+        """The difference up to which values (N,) are readings of one level: rounding, or one count
+        of a quantity that is constant in all of them.
+        """
+        band = constant_band(self.quantity, values)
+        is_constant = values.size > 0 and float(np.ptp(values)) <= band
+        count = estimate_resolution(values, band) if is_constant else 0.0
+        return max((1.0 + SAME_READING) * count, rounding(self.quantity, values))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -190,7 +205,8 @@ class BlockSplit(GroupSplit):
             known = values[~np.isnan(values)]
             low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
             fractions = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
-            interval = np.minimum((2 * self.folds * fractions).astype(np.intp), 2 * self.folds - 1)
+            cells = 2 * self.folds * fractions + EDGE  # a row on an edge is above it
+            interval = np.minimum(cells.astype(np.intp), 2 * self.folds - 1)
             inside = (interval > 0) & (interval < 2 * self.folds - 1)
             labels.append(np.where(inside, names[(i + interval) % self.folds], ALWAYS_FITTED))
         return labels

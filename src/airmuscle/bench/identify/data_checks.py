@@ -153,8 +153,7 @@ def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
     )["pressure"]
     least = MIN_DISTANCE * _greatest_force(runs)
     at_limit = {
-        run.origin: run.rows(run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution)
-        for run in runs
+        run.origin: run.rows(run["pressure"] >= limit.upper_limit - limit.tolerance) for run in runs
     }
     held = {
         name: run

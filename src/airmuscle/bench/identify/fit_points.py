@@ -11,7 +11,14 @@ import numpy.typing as npt
 from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
-from ..segment import ISOBARIC, ISOMETRIC, RELATIVE_BAND, find_runs, level_intervals
+from ..segment import (
+    ISOBARIC,
+    ISOMETRIC,
+    RELATIVE_BAND,
+    find_runs,
+    level_intervals,
+    rounding,
+)
 from ..segment.interval import spread
 from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
@@ -145,7 +152,7 @@ class FitPoints:
     def _range_of(self, name: str) -> tuple[float, float]:
         values = self.data[name]
         unit = " Pa" if name == "pressure" else ""
-        if np.ptp(values) == 0:
+        if float(np.ptp(values)) <= rounding(name, values):
             raise IdentificationError(
                 f"{self.data.origin}: {name} is {values[0]:g}{unit} in every row, so a surface"
                 f" cannot be fitted. Measure at several levels of {name}.",

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ...core import Array
 from ...recording import Recording
 from ...recording.columns import quantity_of
-from ..segment import branch_directions, find_branches, find_runs
+from ..segment import branch_directions, find_branches, find_runs, merged_readings
 from .cross_validation import specimen_name
 from .problem import POINT_COLUMNS
 
@@ -165,9 +165,9 @@ def _blocks_of(recording: Recording, least: float, step: int, by_branch: bool) -
         name: values for name, values in recording.columns.items() if quantity_of(name) is None
     }
     labelling = {
-        name: values
+        name: merged_readings(values)
         for name, values in unknown.items()
-        if 2 <= np.unique(values).size <= MAX_VALUES
+        if 2 <= np.unique(merged_readings(values)).size <= MAX_VALUES
     }
     keys += labelling.values()
     values, member = np.unique(np.stack(keys), axis=1, return_inverse=True)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ...core import Array, Hint, IdentificationError
 from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
-from ..segment import RELATIVE_BAND, level_intervals
+from ..segment import RELATIVE_BAND, level_intervals, rounding
 from .identifiability import singular_vectors
 from .parameter_covariance import Runs, estimate_covariance
 from .problem import POINT_COLUMNS, FitProblem, LeastSquaresSolution
@@ -90,7 +90,7 @@ def goodness_of_fit(problem: FitProblem, modelled: Array, data: Recording) -> di
     target = data[problem.fitted_quantity.name]
     errors = problem.residuals(modelled) / problem.weights
     worst = int(np.argmax(np.abs(errors)))
-    varies = np.ptp(target[measured]) > 0
+    varies = float(np.ptp(target[measured])) > rounding("", target[measured])
     return {
         "rmse": float(np.sqrt(errors @ errors / max(int(np.count_nonzero(measured)), 1))),
         "max_error": WorstPoint(

@@ -23,10 +23,13 @@ from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.shown import parameter_table
 from ..reported import Reported
+from ..segment import level_intervals
 from .model_evidence import EQUIVALENT, aicc
 
 HELD = 0.005
 """Range of the contraction within which it is held during a fill (chosen)."""
+LEVEL_BAND = 1e-4
+"""Range of the contractions that count as one (chosen)."""
 MIN_RISE = 2e4
 """Minimum pressure rise of a fill [Pa] (chosen)."""
 SETTLED = 0.05
@@ -209,7 +212,7 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
             f"fit_volume: {missing} of {points.volume.size} points have no finite contraction and"
             " volume. Remove them."
         )
-    levels = np.unique(np.round(points.contraction, 4)).size
+    levels = sum(1 for _ in level_intervals(np.sort(points.contraction), LEVEL_BAND))
     if points.volume.size < 4 or levels < 3:
         raise IdentificationError(
             "a volume law needs four points at three contractions or more; there are"

@@ -132,8 +132,7 @@ def force_limits(runs: Sequence[Recording]) -> Censoring:
     sensor = estimate_sensors(
         [Recording({"force": run.columns["force"]}, run.origin) for run in runs]
     )["force"]
-    margin = 0.25 * sensor.resolution
-    return Censoring(sensor.lower_limit + margin, sensor.upper_limit - margin)
+    return Censoring(sensor.lower_limit + sensor.tolerance, sensor.upper_limit - sensor.tolerance)
 
 
 MIN_SENSOR_RATIO = 2.0

@@ -3,6 +3,7 @@ identification.
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...core import Array, IdentificationError, counted
 from ...report.chapter import BY_ROW, Chapter, Table, TableColumn
 from ..reported import Reported
+from ..segment import Sensor, estimate_resolution, rounding
 from .episodes import HISTORY, ROWS, Episodes, Windows, long_enough, speed_of
 
 MAX_DELAY = 8
@@ -37,7 +39,7 @@ TRAVEL = 5
 rows of it (chosen).
 """
 SATURATED = 0.02
-"""Share of rows exactly at an end of the range of a reading that counts as saturation (chosen)."""
+"""Share of rows at an end of the range of a reading that counts as saturation (chosen)."""
 SETTLED = 3
 LEAST = 0.2
 """Rows after which a wrong reading is forgotten before the start of a window; least share of rows
@@ -370,19 +372,36 @@ def saturated(episodes: Episodes) -> tuple[Array, list[str]]:
     top = np.full(episodes.muscles, np.inf)
     remarks = []
     for i, values in enumerate(episodes.rows("pressure").T):
-        ends = (
-            (values.min(), "the muscle is empty"),
-            (values.max(), "it has the pressure of its supply"),
-        )
-        for edge, cause in ends if np.ptp(values) > 0.0 else ():
-            count = int(np.sum(values == edge))
-            if count > SATURATED * len(values):
+        least = rounding("pressure", values)
+        sensor = Sensor("pressure", estimate_resolution(values), 0.0, rounding=least)
+        if not np.ptp(values) > sensor.jitter:
+            continue
+        low = -_end_of_readings(-values, sensor)
+        high = _end_of_readings(values, sensor)
+        top[i] = high - sensor.tolerance
+        for edge, cause in (
+            (low, "the muscle is empty"),
+            (high, "it has the pressure of its supply"),
+        ):
+            if np.isfinite(edge):
+                beyond = values <= edge if cause == "the muscle is empty" else values >= edge
+                count = int(np.count_nonzero(beyond | (np.abs(values - edge) <= sensor.tolerance)))
                 remarks.append(
                     f"pressure {i + 1} is {edge:.4g} Pa in {count} of {len(values)} rows "
                     f"({100 * count / len(values):.0f} %): its reading saturates there, or {cause}"
                 )
-                top[i] = edge if edge == values.max() else np.inf
     return top, remarks
+
+
+def _end_of_readings(values: Array, sensor: Sensor) -> float:
+    """The greatest reading, if more than `SATURATED` of the rows are there; the count below it, if
+    they are only with those that jitter by one count; else infinite."""
+    top = float(values.max())
+    at_top = float(np.mean(values >= top - sensor.tolerance))
+    near = float(np.mean(values >= top - sensor.jitter))
+    if at_top > SATURATED:
+        return top
+    return top - sensor.resolution if near > SATURATED and 4.0 * at_top > near else math.inf
 
 
 def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, list[str]]:

@@ -20,6 +20,7 @@ from .plateaus import maximum_rate as maximum_rate
 from .plateaus import plateau_points as plateau_points
 from .plateaus import quasi_static_rows as quasi_static_rows
 from .plateaus import rate_of_change as rate_of_change
+from .resolution import estimate_resolution as estimate_resolution
 from .runs import AT_REST as AT_REST
 from .runs import FREE as FREE
 from .runs import ISOBARIC as ISOBARIC
@@ -31,18 +32,24 @@ from .sensor import Sampling as Sampling
 from .sensor import Sensor as Sensor
 from .sensor import analyse_sampling as analyse_sampling
 from .sensor import estimate_noise as estimate_noise
-from .sensor import estimate_resolution as estimate_resolution
 from .sensor import estimate_sensors as estimate_sensors
 
 # isort: split
 # For the other rooms, not in __all__
 from .branches import branch_name as branch_name
 from .inspection_result import inspection_chapters as inspection_chapters
+from .interval import EDGE as EDGE
 from .interval import Mask as Mask
 from .interval import level_intervals as level_intervals
 from .interval import remembered as remembered
 from .interval import running_median as running_median
 from .outliers import find_bench_outliers as find_bench_outliers
 from .outliers import kept_rows as kept_rows
-from .runs import CONTRACTION_BAND as CONTRACTION_BAND
-from .runs import RELATIVE_BAND as RELATIVE_BAND
+from .resolution import CONTRACTION_BAND as CONTRACTION_BAND
+from .resolution import RELATIVE_BAND as RELATIVE_BAND
+from .resolution import SAME_READING as SAME_READING
+from .resolution import constant_band as constant_band
+from .resolution import distinct_readings as distinct_readings
+from .resolution import magnitude as magnitude
+from .resolution import merged_readings as merged_readings
+from .resolution import rounding as rounding

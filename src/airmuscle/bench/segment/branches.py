@@ -18,6 +18,7 @@ import numpy as np
 from ...core import Array
 from ...recording.recording import Recording
 from .interval import Interval, remembered, running_median
+from .resolution import rounding
 from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
 from .sensor import Sensor, count_rows, estimate_noise
 
@@ -90,12 +91,13 @@ def find_branches(
     if column == "pressure":
         if sensor is None and any(run.kind == AT_REST for run in runs):
             sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
-        deviation = 10.0 * (sensor.std if sensor else 0.0)
-        thresholds = [max(reversal * float(np.ptp(np.concatenate(smooth))), deviation)] * len(parts)
+        combined = np.concatenate(smooth)
+        least = max(10.0 * (sensor.std if sensor else 0.0), rounding(column, combined))
+        thresholds = [max(reversal * float(np.ptp(combined)), least)] * len(parts)
     else:
         noise = [0.0 if time is None else estimate_noise(values) for values in smooth]
         thresholds = [
-            max(reversal * float(np.ptp(v)), 10.0 * std)
+            max(reversal * float(np.ptp(v)), 10.0 * std, rounding(column, v))
             for v, std in zip(smooth, noise, strict=True)
         ]
     branches = []
@@ -128,7 +130,7 @@ def motion_direction(
     signal is constant. Reversals are detected as for the branches of the pressure."""
     smooth = _remove_spikes(values, time)
     signs = np.zeros(len(values))
-    threshold = reversal * float(np.ptp(smooth)) if len(smooth) else 0.0
+    threshold = max(reversal * float(np.ptp(smooth)), rounding("", smooth)) if len(smooth) else 0.0
     for interval, direction in _monotonic_intervals(smooth, threshold):
         signs[interval.rows] = direction
     return signs

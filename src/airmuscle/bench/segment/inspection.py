@@ -16,6 +16,7 @@ from .inspection_result import Finding, Inspection
 from .interval import find_static_points
 from .outliers import find_outliers
 from .plateaus import find_plateaus, quasi_static_rows
+from .resolution import rounding
 from .runs import AT_REST, FREE, KINDS, Run, find_runs, moved_column
 from .sensor import Sampling, Sensor, analyse_sampling, estimate_sensors
 
@@ -141,9 +142,8 @@ def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Ite
         for limit, adjective in ((sensor.lower_limit, "lower"), (sensor.upper_limit, "upper")):
             if name not in recording.columns or not len(recording) or not np.isfinite(limit):
                 continue
-            count = int(
-                np.count_nonzero(np.abs(recording[name] - limit) <= 0.25 * sensor.resolution)
-            )
+            side = 1.0 if adjective == "lower" else -1.0
+            count = int(np.count_nonzero(sensor.censoring(recording[name]) == side))
             fraction = count / len(recording)
             quantity = quantity_of(name)
             unit = f" {quantity.unit}" if quantity and quantity.unit != "1" else ""
@@ -234,7 +234,8 @@ def _duration_findings(
         return
     pressure = recording["pressure"]
     span = float(np.ptp(pressure))
-    if span <= NOISE_FACTOR * (sensors["pressure"].std if "pressure" in sensors else 0.0):
+    noise = NOISE_FACTOR * (sensors["pressure"].std if "pressure" in sensors else 0.0)
+    if span <= max(noise, rounding("pressure", pressure)):
         return
     last = pressure[-max(len(pressure) // 10, 3) :]
     quasi_static = quasi_static_rows(recording, sensors)

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
+from .resolution import rounding
 
 Analysis = TypeVar("Analysis", bound=Callable[..., Any])
 _Known = dict[tuple[int | str, ...], tuple[tuple[weakref.ref[Recording], ...], Any]]
@@ -84,6 +85,11 @@ def true_intervals(mask: Mask) -> list[Interval]:
     return [Interval(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
+EDGE = 1e-6
+"""Relative excess at which a level is still within its band (chosen): the steps of a test rig are
+often exact fractions of its range, and must not be decided by rounding."""
+
+
 def level_intervals(
     values: Array, band: float, *, within: Interval | None = None
 ) -> Iterator[Interval]:
@@ -96,7 +102,8 @@ def level_intervals(
         is_outside = np.zeros(0, dtype=bool)
         while not is_outside.any() and is_outside.size < end - start:  # in windows of doubling size
             window = values[start : min(start + size, end)]
-            is_outside = np.maximum.accumulate(window) - np.minimum.accumulate(window) > band
+            width = np.maximum.accumulate(window) - np.minimum.accumulate(window)
+            is_outside = width > band * (1.0 + EDGE)
             size *= 2
         stop = start + int(np.argmax(is_outside)) if is_outside.any() else end
         yield Interval(start, stop)
@@ -189,17 +196,18 @@ def _levels(values: Array) -> npt.NDArray[np.int64] | None:
     levels.
     """
     span = float(np.ptp(values)) if np.isfinite(values).all() else 0.0
-    if not span > 0:
+    if not span > rounding("", values):
         return None
     order = np.argsort(values, kind="stable")
     ordered = values[order]
     steps = np.diff(ordered)
     for width in LEVEL_WIDTHS:
-        starts = np.concatenate([[0], np.flatnonzero(steps > width * span) + 1])
+        gap = width * span * (1.0 + EDGE)
+        starts = np.concatenate([[0], np.flatnonzero(steps > gap) + 1])
         if starts.size < MIN_LEVELS or values.size < MIN_ROWS * starts.size:
             continue
         ends = np.append(starts[1:], values.size)
-        if (ordered[ends - 1] - ordered[starts] <= width * span).all():
+        if (ordered[ends - 1] - ordered[starts] <= gap).all():
             numbers = np.empty(values.size, dtype=np.int64)
             numbers[order] = np.repeat(np.arange(starts.size), ends - starts)
             return numbers

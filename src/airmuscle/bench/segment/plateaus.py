@@ -16,6 +16,7 @@ from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import Interval, Mask, level_intervals, running_median, true_intervals
+from .resolution import rounding
 from .sensor import Sensor, count_rows, estimate_sensors
 
 SETTLING_TIME = 0.1
@@ -42,7 +43,8 @@ def quasi_static_rows(
     for name in recording:
         if name.rpartition(".")[2] in _MONITORED and name in sensors and width < len(recording):
             values = recording[name]
-            allowed = max(max_change * float(np.ptp(values)), NOISE_FACTOR * sensors[name].std)
+            change = max_change * float(np.ptp(values))
+            allowed = max(change, NOISE_FACTOR * sensors[name].std, rounding(name, values))
             changes = np.abs(values[width:] - values[:-width]) > allowed
             quasi_static[:-width] &= ~changes
             quasi_static[width:] &= ~changes
@@ -66,7 +68,7 @@ def rate_of_change(recording: Recording, name: str) -> float:
     time = recording["time"]
     values = recording[name]
     sensor = estimate_sensors(recording).get(name)
-    least = MIN_CHANGE * (sensor.std if sensor else 0.0)
+    least = max(MIN_CHANGE * (sensor.std if sensor else 0.0), rounding(name, values))
     width = 1
     while width < len(recording):
         change = np.abs(values[width:] - values[:-width])
@@ -130,9 +132,9 @@ def find_plateaus(
         if (
             name in recording and name in sensors
         ):  # of its quasi-static change, its noise, or rounding
-            rounding = 1e-9 * float(np.max(np.abs(recording[name])))
             change = 2.0 * MAX_CHANGE * float(np.ptp(recording[name]))
-            bands[name] = max(change, 8.0 * sensors[name].std, rounding)
+            least = rounding(name, recording[name])
+            bands[name] = max(change, 8.0 * sensors[name].std, least)
     min_rows = max(MIN_ROWS, count_rows(MIN_DURATION, recording["time"], MIN_ROWS))
     intervals = true_intervals(quasi_static_rows(recording, sensors))
     for name, band in bands.items():
@@ -140,7 +142,9 @@ def find_plateaus(
             recording[name], MEDIAN_ROWS
         )  # so that an outlier does not end a plateau
         intervals = [
-            part for each in intervals for part in _steady_parts(values, band, each, min_rows)
+            part
+            for each in intervals
+            for part in _steady_parts(values, band, sensors[name].jitter, each, min_rows)
         ]
     plateaus = []
     for interval in intervals:
@@ -155,9 +159,11 @@ def find_plateaus(
 
 
 def _steady_parts(
-    values: Array, band: float, within: Interval, min_rows: int
+    values: Array, band: float, jitter: float, within: Interval, min_rows: int
 ) -> Iterator[Interval]:
-    """The parts of an interval in which a quantity stays within its band without drift."""
+    """The parts of an interval in which a quantity stays within its band without drift; a change by
+    the jitter of a reading is none.
+    """
     for level in level_intervals(values, band, within=within):
         inside = values[level.rows]  # without the start and the end of a ramp from or to the level
         near = np.flatnonzero(np.abs(inside - np.median(inside)) <= 0.25 * band)
@@ -171,7 +177,7 @@ def _steady_parts(
             float(np.median(each)) for each in np.array_split(values[part.rows], count) if each.size
         ]
         drift = max(medians, default=0.0) - min(medians, default=0.0)
-        if len(part) >= min_rows and not drift > MAX_DRIFT * band:
+        if len(part) >= min_rows and not drift > max(MAX_DRIFT * band, jitter):
             yield part
 
 

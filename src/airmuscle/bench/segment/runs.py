@@ -26,10 +26,9 @@ from .interval import (
     remembered,
     spread,
 )
+from .resolution import constant_band
 from .sensor import Sensor, estimate_sensors
 
-RELATIVE_BAND = 0.02
-"""Band of a constant quantity, as a fraction of its maximum (chosen)."""
 RIPPLE_BAND = 0.06
 MIN_RIPPLE_REVERSALS = 3
 """Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum, and
@@ -37,10 +36,6 @@ number of crossings of the mean that makes a fluctuation a ripple, not a step be
 (chosen)."""
 MOVED_BANDS = 4.0
 """A muscle is moved if its length changes by more than this number of constant bands (chosen)."""
-CONTRACTION_BAND = 0.005
-"""Band of a constant contraction, and of a constant length as a fraction of its maximum
-(chosen).
-"""
 SWEEP_FRACTION = 0.1
 MIN_ROWS = 3
 """Minimum change of a swept quantity, as a fraction of its range in the recording; minimum rows of
@@ -99,8 +94,7 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     bands = dict[str, float]()
     sensors = sensors or estimate_sensors(recording)
     for name in columns.values():
-        maximum = 1.0 if name == "contraction" else float(np.max(np.abs(recording[name])))
-        least = maximum * (CONTRACTION_BAND if name in ("contraction", "length") else RELATIVE_BAND)
+        least = constant_band(name, recording[name])
         bands[name] = max(least, 8.0 * sensors[name].std if name in sensors else 0.0)
     whole = _classify(recording, Interval(0, len(recording)), columns, bands)
     if whole.kind != FREE:

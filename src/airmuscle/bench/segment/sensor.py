@@ -11,7 +11,15 @@ import numpy as np
 from ...core import Array
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
-from .interval import Mask, find_static_points, remembered, true_intervals
+from .interval import Mask, find_static_points, level_intervals, remembered, true_intervals
+from .resolution import (
+    ROUNDING,
+    SAME_READING,
+    constant_band,
+    estimate_resolution,
+    rounding,
+    time_rounding,
+)
 
 GAP_FACTOR = 5.0
 """A time step longer than this multiple of the sample time is a gap (chosen)."""
@@ -59,7 +67,7 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
     if "time" not in recording or len(recording) < 2:
         return None
     time = recording["time"]
-    steps = np.diff(time)
+    steps = _time_steps(time)
     forward = steps[steps > 0]
     step = float(np.median(forward)) if forward.size else 0.0
     jitter = 1.4826 * float(np.median(np.abs(forward - step))) / step if step else 0.0
@@ -72,6 +80,12 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
     return Sampling(
         len(recording), duration, sample_time, jitter, gaps if step else (), repeated, backward
     )
+
+
+def _time_steps(time: Array) -> Array:
+    """The steps of time stamps, 0 between equal ones."""
+    steps = np.diff(time)
+    return np.where(np.abs(steps) <= time_rounding(time), 0.0, steps)
 
 
 def _sample_time(steps: Array) -> float:
@@ -91,26 +105,18 @@ def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
     """
     if time is None or len(time) < 2:
         return min_rows
-    sample_time = _sample_time(np.diff(time))
+    sample_time = _sample_time(_time_steps(time))
     return max(min_rows, round(min(seconds / sample_time, len(time)))) if sample_time else min_rows
 
 
-MIN_DISTINCT_VALUES = 15
-"""Minimum number of distinct readings for a resolution; fewer may be the set points of the test
-(chosen).
-"""
-MAX_RMS_OFFSET = 0.12
-"""Maximum RMS distance of the differences from multiples of the step, in steps (chosen; random
-differences: 0.29).
-"""
-SAME_READING = 0.05
-"""Readings closer than this fraction of a step are the same reading (chosen)."""
 MIN_NOISE = 0.2
 """Minimum noise, in units of the resolution, at which readings vary (chosen)."""
-ROUNDING_ERROR = 1e-9
-"""Noise below this fraction of the readings is rounding error (chosen)."""
 MIN_SATURATED_ROWS = 5
 """Minimum number of consecutive rows that show saturation (chosen)."""
+MIN_SHARE_AT_TOP = 0.25
+"""Minimum share of the readings of a saturated interval at their maximum, where they jitter by one
+count (chosen): of a held value with noise, few are.
+"""
 _IGNORED = ("time", "branch", "fill", "discharge", "latched")
 
 
@@ -128,6 +134,20 @@ class Sensor:
     noise: float
     lower_limit: float = -math.inf
     upper_limit: float = math.inf
+    rounding: float = 0.0
+    """Difference of two readings that rounding explains."""
+
+    @property
+    def tolerance(self) -> float:
+        """The difference up to which two readings are of the same count."""
+        return max(SAME_READING * self.resolution, self.rounding)
+
+    @property
+    def jitter(self) -> float:
+        """The difference up to which two readings may be of the same value: one count, with the
+        tolerance of a reading.
+        """
+        return self.resolution + self.tolerance
 
     @property
     def std(self) -> float:
@@ -140,9 +160,8 @@ class Sensor:
         """The censoring (N,) of readings (N,): 0 measured, 1 at the lower limit (true value below),
         -1 at the upper.
         """
-        tolerance = 0.25 * self.resolution
-        at_lower = values <= self.lower_limit + tolerance
-        at_upper = values >= self.upper_limit - tolerance
+        at_lower = values <= self.lower_limit + self.tolerance
+        at_upper = values >= self.upper_limit - self.tolerance
         return at_lower * 1.0 - at_upper * 1.0
 
 
@@ -173,18 +192,24 @@ def _estimate_sensor(name: str, all_runs: list[Array], runs: list[Array]) -> Sen
     """The sensor of a column: its resolution from all runs, the rest from those whose order has a
     meaning.
     """
-    steps = [step for values in all_runs if (step := estimate_resolution(values))]
+    steps = [
+        step
+        for values in all_runs
+        if (step := estimate_resolution(values, constant_band(name, values)))
+    ]
     together = steps or len(all_runs) == 1
     resolution = (
         float(np.median(steps or 0.0))
         if together
         else estimate_resolution(np.concatenate(all_runs))
     )
+    least = max((rounding(name, values) for values in all_runs), default=0.0)
+    sensor = Sensor(name, resolution, 0.0, rounding=least)
     if not runs:
-        return Sensor(name, resolution, 0.0)
-    low = -_upper_limit([-values for values in runs], resolution)
-    high = _upper_limit(runs, resolution)
-    sensor = Sensor(name, resolution, 0.0, low, high)
+        return sensor
+    low = -_upper_limit([-values for values in runs], sensor)
+    high = _upper_limit(runs, sensor)
+    sensor = dataclasses.replace(sensor, lower_limit=low, upper_limit=high)
     noise = float(
         np.median([estimate_noise(values[sensor.censoring(values) == 0.0]) for values in runs])
     )
@@ -199,72 +224,52 @@ def estimate_noise(values: Array) -> float:
         return 0.0
     second = values[:-2] - 2.0 * values[1:-1] + values[2:]
     noise = float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0))
-    return noise if noise > ROUNDING_ERROR * float(np.max(np.abs(values))) else 0.0
+    return noise if noise > ROUNDING * float(np.max(np.abs(values))) else 0.0
 
 
-def estimate_resolution(values: Array) -> float:
-    """The largest step of which the differences of adjacent readings are multiples; 0 if there is
-    none.
-    """
-    distinct = np.unique(values)
-    if len(distinct) < MIN_DISTINCT_VALUES:
-        return 0.0
-    gaps = np.diff(distinct)
-    for candidate in sorted(
-        {float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True
-    ):
-        # One reading may be written in two ways, 71.70 and 71.71; both count as one.
-        steps = np.diff(distinct[np.concatenate(([True], gaps > SAME_READING * candidate))])
-        step = candidate
-        differences = steps[steps < 8.5 * candidate]
-        for _ in range(3):  # the least-squares step of differences of a few steps
-            counts = np.round(differences / step)
-            total = float(counts @ counts)
-            step = float(counts @ differences) / total if total else 0.0
-            if not total:
-                break
-        if step > 0.0 and _are_multiples(steps, step):
-            return step
-    return 0.0
-
-
-def _are_multiples(steps: Array, step: float) -> bool:
-    """Whether nearly all small differences are integer multiples of a step, and enough of them are
-    single steps.
-    """
-    small = steps[steps < 8.5 * step] / step
-    count = len(small)
-    multiples = np.round(small)
-    offset = small - multiples
-    if count < 10 or math.sqrt(float(offset @ offset) / count) >= MAX_RMS_OFFSET:
-        return False
-    return bool(
-        np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count
-    )
-
-
-def _upper_limit(runs: list[Array], resolution: float) -> float:
+def _upper_limit(runs: list[Array], sensor: Sensor) -> float:
     """The upper limit at which readings stay for many more rows than elsewhere; infinite without
-    saturation.
+    saturation. Readings at the limit may jitter by one count: the limit is then the lower one of
+    the two.
+    """
+    limits = [0.0, sensor.resolution] if sensor.resolution > 0.0 else [0.0]
+    top = max(float(values.max()) for values in runs)
+    for below in limits:
+        if _stays_at_top(runs, sensor, below):
+            return top - below
+    return math.inf
+
+
+def _stays_at_top(runs: list[Array], sensor: Sensor, below: float) -> bool:
+    """Whether the readings stay within `below` of their maximum for many more rows than in a band
+    of this width elsewhere, and are not just without noise.
     """
     combined = np.concatenate(runs)
     top = float(combined.max())
-    tolerance = 0.25 * resolution
-    at_top = [values >= top - tolerance for values in runs]
-    below = combined[combined < top - tolerance]
-    rows_at_top = max(_longest_interval(mask) for mask in at_top)
-    if not len(below) or rows_at_top < MIN_SATURATED_ROWS:
-        return math.inf
-    between = [
-        values[(values < top - tolerance) & (values > combined.min() + tolerance)]
-        for values in runs
+    tolerance = sensor.tolerance
+    edge = top - below - tolerance
+    stays = [
+        (values, max(true_intervals(values >= edge), key=len, default=None)) for values in runs
     ]
+    values, longest = max(stays, key=lambda stay: len(stay[1] or ()))
+    if longest is None or len(longest) < MIN_SATURATED_ROWS or not (combined < edge).any():
+        return False
+    at_limit = values[longest.rows]
+    if float(np.mean(at_limit >= top - tolerance)) < MIN_SHARE_AT_TOP:
+        return False
+    between = [
+        values[(values < edge) & (values > combined.min() + below + tolerance)] for values in runs
+    ]
+    band = below + tolerance
     rows_elsewhere = 1 + max(
-        _longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between
+        _longest_interval(np.abs(np.diff(values)) <= tolerance)
+        if not below
+        else max((len(level) for level in level_intervals(values, band)), default=0)
+        for values in between
     )
     noise = max(estimate_noise(values) for values in between)
-    is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
-    return top if is_noisy and rows_at_top > 2 * rows_elsewhere else math.inf
+    is_noisy = noise > max(MIN_NOISE * sensor.resolution, 1e-6 * float(np.ptp(combined)))
+    return is_noisy and len(longest) > 2 * rows_elsewhere
 
 
 def _longest_interval(mask: Mask) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ....physics import CreepElements, ForceLaw
 from ....recording import Recording
-from ...segment.runs import CONTRACTION_BAND
+from ...segment.resolution import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep
 from ..hysteresis.creep import MIN_RATIO, CreepFit
 from .friction_and_release import creep_stretches, has_path

@@ -20,15 +20,8 @@ from ...segment import (
     quasi_static_rows,
 )
 from ...segment.interval import Interval, true_intervals
-from ...segment.runs import (
-    AT_REST,
-    CONTRACTION_BAND,
-    ISOBARIC,
-    ISOMETRIC,
-    ISOTONIC,
-    RELATIVE_BAND,
-    Run,
-)
+from ...segment.resolution import CONTRACTION_BAND, RELATIVE_BAND
+from ...segment.runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run
 from ..hysteresis.loop_result import describe_run
 from ..hysteresis.loops import rows_of
 from ..matched_rows import match_rows

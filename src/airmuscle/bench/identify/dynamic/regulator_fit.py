@@ -25,6 +25,7 @@ from ....physics import (
 from ....recording import Recording
 from ....report import Chapter, Table, TableColumn
 from ...reported import Reported
+from ...segment import SAME_READING, distinct_readings, rounding
 from ..identifiability import MAX_RELATIVE_ERROR
 from .experiment import Experiment, PriorValue
 from .fit import fit_dynamic
@@ -51,6 +52,10 @@ MIN_RANGE = 5.0
 """Minimum range of command and pressure in standard deviations of the noise (chosen)."""
 GAIN = 10.0
 """Rate of the outlet pressure by the control error from which a search starts [1/s] (chosen)."""
+OFTEN = 0.2
+"""Share of the rows in which a command changes that is a recorded voltage, and greatest share of
+different readings (chosen).
+"""
 COMMANDS = {
     "fill.conductance": "a step up of at least half the supply pressure",
     "discharge.conductance": "a step down from near the supply pressure to zero",
@@ -274,8 +279,24 @@ def _changes(recording: Recording) -> tuple[Array, Array]:
     """
     time = recording["time"] - recording["time"][0]
     setpoint = recording["setpoint"]
-    rows = np.flatnonzero(np.concatenate([[True], np.diff(setpoint) != 0.0]))
+    same = _difference_of_commands(setpoint)
+    rows = [0]
+    for row, value in enumerate(setpoint.tolist()):
+        if abs(value - setpoint[rows[-1]]) > same:
+            rows.append(row)
     return time[rows], setpoint[rows]
+
+
+def _difference_of_commands(setpoint: Array) -> float:
+    """The difference [Pa] up to which a command is the same: rounding, and one count of a recorded
+    voltage, which changes in many rows between few readings.
+    """
+    least = rounding("pressure", setpoint)
+    readings = distinct_readings(setpoint)
+    changes = float(np.mean(np.abs(np.diff(setpoint)) > least)) if setpoint.size > 1 else 0.0
+    if changes < OFTEN or not 1 < readings.size <= OFTEN * setpoint.size:
+        return least
+    return (1.0 + SAME_READING) * float(np.diff(readings).min())
 
 
 def _settled_difference(recording: Recording) -> float:

@@ -18,7 +18,17 @@ import numpy as np
 from ....core import Array, IdentificationError, ParameterError, model, one_line, parameter
 from ....physics.muscle import CreepElements
 from ....recording import Recording
-from ...segment import RELATIVE_BAND, Interval, estimate_noise, find_plateaus, level_intervals
+from ...segment import (
+    RELATIVE_BAND,
+    SAME_READING,
+    Interval,
+    constant_band,
+    estimate_noise,
+    estimate_resolution,
+    find_plateaus,
+    level_intervals,
+    rounding,
+)
 from ..model_evidence import effective_sample_size, f_test_p_value
 from .result import SIGNIFICANCE_LEVEL
 
@@ -72,14 +82,22 @@ def _drifts(values: Array) -> bool:
     quarter = max(values.size // 4, 1)
     return bool(
         abs(np.median(values[-quarter:]) - np.median(values[:quarter]))
-        > DRIFT * estimate_noise(values)
+        > max(DRIFT * estimate_noise(values), _jitter(values))
     )
+
+
+def _jitter(values: Array) -> float:
+    """The difference up to which readings of a held quantity (N,) may be of one value: one count,
+    or rounding.
+    """
+    count = estimate_resolution(values, constant_band("", values))
+    return max((1.0 + SAME_READING) * count, rounding("", values))
 
 
 def _trim_to_level(values: Array, level: Interval) -> Interval:
     """The interval without the transitions to and from its level."""
     inside = values[level.rows]
-    band = max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside))
+    band = max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside), _jitter(inside))
     near = np.flatnonzero(np.abs(inside - np.median(inside)) <= band)
     return (
         Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1)

@@ -13,7 +13,7 @@ from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ....report.chapter import Chapter, Plot
 from ....report.shown import parameter_table
-from ...segment.runs import RELATIVE_BAND
+from ...segment.resolution import RELATIVE_BAND
 from ..model_evidence import effective_sample_size, format_p_value
 from .loop_data import MILLIMETRES, DataLimits, combine_limits, limit_reservations
 from .loop_result import LoopFit

@@ -12,7 +12,7 @@ from ....core import Array, Hint, IdentificationError, Leaf, leaves, model, para
 from ....physics import Characteristic
 from ....physics.muscle.friction import Friction
 from ....recording import Recording
-from ...segment import Mask, estimate_noise
+from ...segment import EDGE, Mask, estimate_noise, rounding
 from ..identifiability import UndeterminedCombination
 
 
@@ -210,7 +210,7 @@ def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> Da
     high = math.nan
     width = float(np.ptp(path)) / SPEED_INTERVALS if len(path) else 0.0
     if time is not None and width > 0:
-        steps = np.sign(np.diff(np.floor((path - path.min()) / width)))
+        steps = np.sign(np.diff(np.floor((path - path.min()) / width + EDGE)))
         crossings = np.flatnonzero(steps) + 1
         one_way = np.flatnonzero(steps[crossings[1:] - 1] == steps[crossings[:-1] - 1])
         first = crossings[one_way]
@@ -231,7 +231,7 @@ def resolved_stiffness(path: Array, hysteresis: Array) -> float:
     The resolution is the noise, a tenth of the median step, or the step of a reading that is
     repeated in motion."""
     steps = np.abs(np.diff(path))
-    moving = steps > 0
+    moving = steps > rounding("", path)
     if not moving.any():
         return math.inf
     repeated = np.count_nonzero(~moving[1:-1] & (moving[:-2] | moving[2:]))

@@ -13,7 +13,7 @@ from ....physics import Characteristic, Friction, LoopScales
 from ....physics.muscle import friction as laws
 from ....recording import Recording
 from ... import segment
-from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
+from ...segment.resolution import CONTRACTION_BAND, RELATIVE_BAND
 from . import loop_data as data
 from .loop_result import HysteresisLoop, LoopFit
 from .result import HysteresisFit, assess_fit

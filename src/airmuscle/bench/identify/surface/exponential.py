@@ -17,6 +17,7 @@ from ....core import Array, IdentificationError, bar
 from ....physics.muscle.characteristic.base import Characteristic
 from ....physics.muscle.characteristic.borzikova import BorzikovaExponential
 from ....recording import Recording
+from ...segment import distinct_readings, rounding
 from ..statistics import CorrelationIndex, correlation_index
 
 
@@ -223,7 +224,7 @@ class SurfaceProblem:
             )
         for name, unit in (("pressure", "Pa"), ("force", "N")):
             values = recording[name]
-            if values.min() == values.max():
+            if float(np.ptp(values)) <= rounding(name, values):
                 raise IdentificationError(
                     f"{recording.origin}: {name} is {values[0]:g} {unit} in every row, so a surface"
                     f" cannot be fitted. Measure at {force_degree + 1} or more loads and"
@@ -251,7 +252,7 @@ class SurfaceProblem:
         """
         conditioning = Conditioning.from_design_matrix(rows)
         if conditioning.rank < conditioning.coefficients:
-            levels = np.unique(self.recording["force"])
+            levels = distinct_readings(self.recording["force"])
             loads = f"{', '.join(f'{load:g}' for load in levels)} N"
             loads = (
                 loads
