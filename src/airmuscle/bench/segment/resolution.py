@@ -31,6 +31,8 @@ MAX_RMS_OFFSET = 0.12
 """Maximum RMS distance of the differences from multiples of the step, in steps (chosen; random
 differences: 0.29).
 """
+MIN_SHARE = 0.05
+"""Minimum share of the rows with a reading that recurs (chosen)."""
 SAME_CELL = 0.05
 """Readings closer than this fraction of a step are the same reading, written in two ways
 (chosen).
@@ -105,13 +107,14 @@ def estimate_resolution(values: Array, held_band: float = 0.0) -> float:
     The few readings of a quantity that stays within `held_band` are counts; elsewhere they may be
     set points.
     """
-    distinct = distinct_readings(values[np.isfinite(values)])
+    known = values[np.isfinite(values)]
+    distinct = distinct_readings(known)
     if len(distinct) < 2:
         return 0.0
-    gaps = np.diff(distinct)
     if len(distinct) < MIN_DISTINCT_VALUES:
         is_held = float(distinct[-1] - distinct[0]) <= held_band
-        return float(gaps.min()) if is_held and len(distinct) <= len(values) / 2 else 0.0
+        return _count_of_held(known, distinct) if is_held else 0.0
+    gaps = np.diff(distinct)
     for candidate in sorted(
         {float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True
     ):
@@ -128,6 +131,15 @@ def estimate_resolution(values: Array, held_band: float = 0.0) -> float:
         if step > 0.0 and _are_multiples(steps, step):
             return step
     return 0.0
+
+
+def _count_of_held(values: Array, distinct: Array) -> float:
+    """The least difference of the readings that recur in a held quantity (N,); 0 for a single one.
+    Those of the way to its level do not recur.
+    """
+    shares = np.bincount(reading_numbers(values)) / len(values)
+    recurring = distinct[shares >= MIN_SHARE]
+    return float(np.diff(recurring).min()) if len(recurring) > 1 else 0.0
 
 
 def _are_multiples(steps: Array, step: float) -> bool:
