@@ -10,17 +10,19 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import segment
-from airmuscle.bench.identify import LevelSplit
-from airmuscle.bench.identify.contradictions import find_repeated_rows
-from airmuscle.bench.identify.cross_validation import held_levels, levels_of
-from airmuscle.bench.identify.data_checks import saturation_notes
-from airmuscle.bench.identify.dynamic.regulator_fit import _changes
-from airmuscle.bench.identify.hysteresis import find_holds, find_loops
-from airmuscle.bench.identify.hysteresis.loop_data import resolved_stiffness
-from airmuscle.bench.identify.matched_rows import match_rows
-from airmuscle.bench.identify.problem import POINT_COLUMNS
-from airmuscle.bench.identify.weighting import force_limits
-from airmuscle.bench.joint.episode_inspection import _end_of_readings
+from airmuscle.bench.identify import (
+    LevelSplit,
+    contradictions,
+    cross_validation,
+    data_checks,
+    levels_of,
+    matched_rows,
+    problem,
+    weighting,
+)
+from airmuscle.bench.identify.dynamic import regulator_fit
+from airmuscle.bench.identify.hysteresis import find_holds, find_loops, loop_data
+from airmuscle.bench.joint import episode_inspection
 from airmuscle.recording import Recording
 
 COUNTS = {"pressure": 200.0, "length": 1e-4, "force": 0.5, "setpoint": 500.0}
@@ -114,7 +116,7 @@ def resolutions(jitter):
 def saturated_rows(jitter):
     recording = isometric(jitter)
     signs = segment.estimate_sensors(recording)["force"].censoring(recording["force"])
-    limits = force_limits([recording])
+    limits = weighting.force_limits([recording])
     assert np.array_equal(limits.signs(recording["force"]), signs)
     return rows_near(np.count_nonzero(signs == -1.0), 20), np.count_nonzero(signs == 1.0)
 
@@ -177,7 +179,7 @@ def loop(jitter):
 
 
 def levels(jitter):
-    held, share = held_levels(isometric(jitter)["contraction"])
+    held, share = cross_validation.held_levels(isometric(jitter)["contraction"])
     return len(held), round(share, 3), len(levels_of(isometric(jitter)["contraction"], 5))
 
 
@@ -188,7 +190,7 @@ def groups(jitter):
 
 
 def labels_of_rows(jitter):
-    matches = match_rows([isometric(jitter), isometric(jitter, seed=5)])
+    matches = matched_rows.match_rows([isometric(jitter), isometric(jitter, seed=5)])
     return [
         {name: round(value, 6) for name, value in run.first.labels.items()} for run in matches.runs
     ]
@@ -198,16 +200,19 @@ def repeated_rows(jitter):
     if jitter == "count":  # a copy has no other counts
         jitter = "none"
     recordings = [isometric("none"), isometric(jitter)]
-    return [(r.recording, r.rows) for r in find_repeated_rows(recordings, POINT_COLUMNS)]
+    return [
+        (r.recording, r.rows)
+        for r in contradictions.find_repeated_rows(recordings, problem.POINT_COLUMNS)
+    ]
 
 
 def command_changes(jitter):
-    instants, values = _changes(isometric(jitter))
+    instants, values = regulator_fit._changes(isometric(jitter))
     return [(round(t, 6), round(v / 1e4)) for t, v in zip(instants, values, strict=True)]
 
 
 def pressure_saturation(jitter):
-    notes = saturation_notes([clipped_pressure(jitter)])
+    notes = data_checks.saturation_notes([clipped_pressure(jitter)])
     return [note.partition(" at ")[0] for note in notes]
 
 
@@ -228,13 +233,13 @@ def clipped_pressure(jitter: str) -> Recording:
 def end_of_an_episode(jitter):
     values = clipped_pressure(jitter)["pressure"]
     sensor = segment.estimate_sensors(clipped_pressure(jitter))["pressure"]
-    return round(_end_of_readings(values, sensor) / 1e3)
+    return round(episode_inspection._end_of_readings(values, sensor) / 1e3)
 
 
 def stiffness(jitter):
     recording = hold("rounding" if jitter == "rounding" else "none")
     path = RESTING_LENGTH * recording["contraction"]
-    return float(f"{resolved_stiffness(path, recording['force']):.3g}")
+    return float(f"{loop_data.resolved_stiffness(path, recording['force']):.3g}")
 
 
 def sampling(jitter):
