@@ -3,41 +3,27 @@ dataclass and a call.
 """
 
 import dataclasses
-import functools
 import inspect
 import numbers
 import types
-import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from .annotation_parts import AnyArray, alternatives, arguments_of, origin, type_hints
 from .errors import AirmuscleError, FileError, ParameterError
 
-_NAMES = {float: "a number", int: "an integer", str: "a text", types.NoneType: "None"}
+_NAMES = {
+    AnyArray: "an array of numbers",
+    float: "a number",
+    int: "an integer",
+    str: "a text",
+    types.NoneType: "None",
+}
 _MAX_INTEGER = 2**63
 """Magnitude below which an integer must be: integers of 64 bits."""
-
-
-_ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))
-
-
-def type_hints(cls: Any) -> dict[str, Any]:
-    """The annotations of a class or function as types; empty if they contain names imported for
-    type checking only.
-    """
-    try:
-        return _resolved(cls)
-    except NameError:
-        return {}
-
-
-@functools.cache
-def _resolved(cls: Any) -> dict[str, Any]:
-    return typing.get_type_hints(cls)
 
 
 def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
@@ -48,15 +34,14 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
     annotation of a tuple. The contents of an array are seen where the annotation is `ArrayLike`
     only.
     """
-    origin = typing.get_origin(hint)
-    arguments = typing.get_args(hint)
-    if origin in (typing.Union, types.UnionType):
-        if set(arguments) >= _ARRAY_LIKE:
-            arguments = tuple(each for each in arguments if each not in _ARRAY_LIKE)
-            return is_numeric(value) or any(
-                conforms(value, each, lists=lists) for each in arguments
-            )
-        return any(conforms(value, each, lists=lists) for each in arguments)
+    options = alternatives(hint)
+    return any(_conforms(value, option, lists=lists) for option in options)
+
+
+def _conforms(value: Any, hint: Any, *, lists: bool) -> bool:
+    """Whether a value conforms to an annotation that is no union."""
+    if hint is AnyArray:
+        return is_numeric(value)
     if hint is float:
         return _is_number(value)
     if hint is int:
@@ -65,37 +50,45 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
             and not isinstance(value, bool)
             and abs(int(value)) < _MAX_INTEGER
         )
-    if origin is np.ndarray:
-        return hasattr(value, "__array__") or isinstance(value, tuple | list)
-    if origin is Mapping:
-        return isinstance(value, Mapping) and all(
-            conforms(part, of_part, lists=lists)
-            for item in value.items()
-            for part, of_part in zip(item, arguments, strict=True)
-        )
-    if origin in (tuple, Sequence):
-        kinds = (Sequence,) if origin is Sequence else (tuple, list) if lists else (tuple,)
-        if not isinstance(value, kinds) or isinstance(value, str | bytes):
-            return False
-        of_items = (
-            arguments if origin is tuple and arguments[1:] != (...,) else arguments[:1] * len(value)
-        )
-        return len(value) == len(of_items) and all(
-            conforms(item, of_item, lists=lists)
-            for item, of_item in zip(value, of_items, strict=True)
-        )
-    if origin in (Collection, Iterable) and isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
-        return all(conforms(item, arguments[0], lists=lists) for item in value)
-    if origin is Callable:
-        return callable(value) and _takes(value, arguments[0])
-    if origin in (Collection, Iterable):
-        return isinstance(value, origin) and not isinstance(value, np.ndarray)
+    arguments = arguments_of(hint)
+    if arguments:
+        return _conforms_to_parts(value, origin(hint), arguments, lists=lists)
     return (
         hint is Any
         or not isinstance(hint, type)
         or getattr(hint, "_is_protocol", False)
         or isinstance(value, hint)
     )
+
+
+def _conforms_to_parts(value: Any, kind: Any, arguments: tuple[Any, ...], *, lists: bool) -> bool:
+    """Whether a value conforms to a class with arguments, such as a tuple of numbers."""
+    if kind is np.ndarray:
+        return hasattr(value, "__array__") or isinstance(value, tuple | list)
+    if kind is Mapping:
+        return isinstance(value, Mapping) and all(
+            conforms(part, of_part, lists=lists)
+            for item in value.items()
+            for part, of_part in zip(item, arguments, strict=True)
+        )
+    if kind in (tuple, Sequence):
+        kinds = (Sequence,) if kind is Sequence else (tuple, list) if lists else (tuple,)
+        if not isinstance(value, kinds) or isinstance(value, str | bytes):
+            return False
+        of_items = (
+            arguments if kind is tuple and arguments[1:] != (...,) else arguments[:1] * len(value)
+        )
+        return len(value) == len(of_items) and all(
+            conforms(item, of_item, lists=lists)
+            for item, of_item in zip(value, of_items, strict=True)
+        )
+    if kind in (Collection, Iterable) and isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
+        return all(conforms(item, arguments[0], lists=lists) for item in value)
+    if kind is Callable:
+        return callable(value) and _takes(value, arguments[0])
+    if kind in (Collection, Iterable):
+        return isinstance(value, kind) and not isinstance(value, np.ndarray)
+    return True
 
 
 def is_model(obj: Any) -> bool:
@@ -139,34 +132,35 @@ def _is_number(value: Any) -> bool:
 
 def describe(hint: Any) -> str:
     """An annotation in words: `a number`, `a text or an instance of SplitRange`."""
-    origin = typing.get_origin(hint)
-    arguments = typing.get_args(hint)
-    if origin in (typing.Union, types.UnionType):
-        is_array = set(arguments) >= _ARRAY_LIKE
-        others = [describe(each) for each in arguments if not (is_array and each in _ARRAY_LIKE)]
-        return " or ".join(["an array of numbers"] * is_array + others)
-    if origin is Callable:
-        given = [describe(each) for each in arguments[0]] if isinstance(arguments[0], list) else []
-        return f"a function of {' and '.join(given)}" if given else "a function"
-    if origin in (Collection, Iterable):
+    return " or ".join(_described(option) for option in alternatives(hint))
+
+
+def _described(hint: Any) -> str:
+    kind = origin(hint)
+    arguments = arguments_of(hint)
+    if not arguments:
+        return _NAMES.get(hint) or f"an instance of {getattr(hint, '__name__', hint)}"
+    if kind is Callable:
+        taken = arguments[0] if isinstance(arguments[0], list) else []
+        words = " and ".join(map(describe, taken))
+        return f"a function of {words}" if words else "a function"
+    if kind in (Collection, Iterable):
         return f"several values, each of which is {describe(arguments[0])}"
-    if origin is np.ndarray:
+    if kind is np.ndarray:
         return "an array of numbers"
-    if origin is Mapping:
+    if kind is Mapping:
         return f"a mapping, from {describe(arguments[0])} to {describe(arguments[1])}"
-    if origin is Sequence or (origin is tuple and arguments[1:] == (...,)):
+    if kind is Sequence or (kind is tuple and arguments[1:] == (...,)):
         return (
-            f"a {'tuple' if origin is tuple else 'sequence'}, each element of which is"
+            f"a {'tuple' if kind is tuple else 'sequence'}, each element of which is"
             f" {describe(arguments[0])}"
         )
-    if origin is tuple:
+    if kind is tuple:
         return (
             f"a tuple of {len(arguments)} values"
             f" ({', '.join(describe(each) for each in arguments)})"
         )
-    if origin is not None:
-        return "anything"
-    return _NAMES.get(hint) or f"an instance of {getattr(hint, '__name__', hint)}"
+    return "anything"
 
 
 def abridged(value: Any) -> str:
@@ -276,7 +270,7 @@ def check_arguments(
         is_several = isinstance(value, Sequence | Mapping) and not isinstance(value, str)
         if is_several and not value and value is not declared.default:
             raise ParameterError(f"{owner}: {name} is empty; give at least one.") from failure
-        is_path = Path in typing.get_args(hint) and isinstance(value, str | Path)
+        is_path = Path in alternatives(hint) and isinstance(value, str | Path)
         if is_path and (isinstance(failure, OSError) or not Path(value).name or "\0" in str(value)):
             reason = failure.strerror if isinstance(failure, OSError) else failure
             raise FileError(
@@ -288,10 +282,11 @@ def _suits(value: Any, hint: Any) -> bool:
     """Whether a value conforms to the annotation of an argument, as which an array serves for a
     sequence.
     """
-    if typing.get_origin(hint) is np.ndarray:
+    options = alternatives(hint)
+    if len(options) > 1 and AnyArray not in options:
+        return any(_suits(value, option) for option in options)
+    if origin(hint) is np.ndarray:
         return is_numeric(value) and np.ndim(value) > 0
-    if typing.get_origin(hint) is types.UnionType and not set(typing.get_args(hint)) >= _ARRAY_LIKE:
-        return any(_suits(value, each) for each in typing.get_args(hint))
     return conforms(value, hint, lists=True) or (
         isinstance(value, np.ndarray)
         and value.ndim > 0

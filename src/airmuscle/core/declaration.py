@@ -22,9 +22,9 @@ from .annotation import (
     describe,
     is_model,
     one_line,
-    type_hints,
     within,
 )
+from .annotation_parts import depth, type_hints
 from .errors import AirmuscleWarning, ParameterError, check_known
 from .short_repr import ShortRepr
 from .units import is_known_unit, quantity, usual_unit
@@ -131,7 +131,10 @@ def _depths_of(cls: type[Any]) -> dict[str, int]:
     """The depth of the annotation of each field: 0 for one number, 1 for a list of numbers, 2 for a
     list of lists.
     """
-    return {f.name: str(f.type).count("tuple[") for f in dataclasses.fields(cls)}
+    hints = type_hints(cls)
+    if not hints:  # a name is imported for the type checker alone
+        return {f.name: str(f.type).count("tuple[") for f in dataclasses.fields(cls)}
+    return {name: depth(hint) for name, hint in hints.items()}
 
 
 @functools.cache

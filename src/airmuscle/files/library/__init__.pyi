@@ -49,7 +49,6 @@ from .entry_display import PARTS as PARTS
 from .evaluation import UNITS as UNITS
 from .evaluation import evaluate as evaluate
 from .fields import custom_field as custom_field
-from .fields import origin as origin
 from .fields import read_parameter as read_parameter
 from .files import check_keys as check_keys
 from .files import is_path as is_path

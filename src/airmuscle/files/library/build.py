@@ -15,7 +15,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...core import ParameterError, abridged, check_field, parameters
-from ...core.annotation import conforms, type_hints
+from ...core.annotation import conforms
+from ...core.annotation_parts import alternatives, item_type, type_hints
 from . import fields
 from .fields import allows, has_variants, model_class, model_names
 from .files import Location, check_keys, located_errors
@@ -53,7 +54,7 @@ class TableReader:
         kind  annotation of the place of the object, by which other classes are refused
         """
         for cls, read in self.named.items():
-            if cls in fields.options(kind) and (part := read(table, location, self)) is not None:
+            if cls in alternatives(kind) and (part := read(table, location, self)) is not None:
                 return part
         if isinstance(table, str) and fields.is_table(kind):
             table = {"model": table}
@@ -65,7 +66,7 @@ class TableReader:
         for key in values if is_named else ():
             with located_errors(location):
                 check_field(cls, key)
-        library = ["library"] if any(each in self.named for each in fields.options(kind)) else []
+        library = ["library"] if any(each in self.named for each in alternatives(kind)) else []
         check_keys(values, [*(key for key in names if key), *library], location)
         values = {names[key]: value for key, value in values.items() if names[key] not in given}
         hints = type_hints(cls)
@@ -137,7 +138,7 @@ class TableReader:
         """The value of a key by an annotation; `first` is the number of the first table of an array
         in messages.
         """
-        item = fields.item_type(hint)
+        item = item_type(hint)
         if isinstance(value, list) and item is not None:
             places = [
                 f"{key}[{i}]" if first is None else f"{key} {i + first}" for i in range(len(value))
@@ -174,7 +175,7 @@ def only_class(kind: Any) -> type[Any] | None:
     """The class of a place where only one is possible."""
     classes = [
         each
-        for each in fields.options(kind)
+        for each in alternatives(kind)
         if dataclasses.is_dataclass(each) and inspect.isclass(each)
     ]
     if len(classes) != 1 or inspect.isabstract(classes[0]) or has_variants(classes[0]):

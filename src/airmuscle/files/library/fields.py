@@ -13,7 +13,6 @@ import importlib
 import inspect
 import sys
 import types
-import typing
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
@@ -31,7 +30,7 @@ from ...core import (
     one_line,
     suggestion,
 )
-from ...core.annotation import type_hints
+from ...core.annotation_parts import alternatives, item_type, origin, type_hints
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
 from ...physics.muscle import characteristic, friction, geometry
@@ -80,7 +79,7 @@ def has_variants(cls: type[Any]) -> bool:
 
 def allows(kind: Any, cls: type[Any]) -> bool:
     """Whether the outermost type of an annotation allows the instances of a class."""
-    bases = map(origin, options(kind))
+    bases = map(origin, alternatives(kind))
     return kind is Any or any(inspect.isclass(base) and issubclass(cls, base) for base in bases)
 
 
@@ -273,39 +272,17 @@ def read_parameter(value: Any, declared: Parameter, hint: Any, location: Locatio
     return read_number(value, unit, where, about)
 
 
-def options(hint: Any) -> tuple[Any, ...]:
-    """Options of a union annotation; the annotation alone if it is no union."""
-    return (
-        typing.get_args(hint)
-        if typing.get_origin(hint) in (typing.Union, types.UnionType)
-        else (hint,)
-    )
-
-
-def origin(hint: Any) -> Any:
-    """The class of an annotation without its arguments: `tuple` of `tuple[float, ...]`."""
-    return typing.get_origin(hint) or hint
-
-
 def is_table(hint: Any) -> bool:
     """Whether an annotation allows an object that a table describes."""
-    return hint is not None and any(origin(option) not in _PLAIN for option in options(hint))
+    return hint is not None and any(origin(option) not in _PLAIN for option in alternatives(hint))
 
 
 def describes_tables(hint: Any) -> bool:
     """Whether an annotation allows only objects that tables describe, one or a list."""
     return is_table(hint) and all(
         origin(o) not in _PLAIN or o in (tuple, types.NoneType) or origin(o) is tuple
-        for o in options(hint)
+        for o in alternatives(hint)
     )
-
-
-def item_type(hint: Any) -> Any:
-    """Type of the items of a tuple annotation, which may be an option of a union; None if there is
-    no tuple.
-    """
-    tuples = (option for option in options(hint) if origin(option) is tuple)
-    return next((typing.get_args(option)[0] for option in tuples), None)
 
 
 def describe_type(hint: Any) -> str:
@@ -313,7 +290,7 @@ def describe_type(hint: Any) -> str:
     texts'.
     """
     words = []
-    for option in options(hint):
+    for option in alternatives(hint):
         if origin(option) is tuple:
             words.append(f"a list{_ITEMS.get(item_type(option), '')}")
         elif option is not types.NoneType:

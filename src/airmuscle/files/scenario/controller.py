@@ -10,11 +10,11 @@ import dataclasses
 import functools
 import math
 import re
-import typing
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core import Input, Parameter, ParameterError, abridged, is_known_unit, parameters
+from ...core.annotation_parts import alternatives, arguments_of, origin, type_hints
 from ...engine.loop import ControlLoop, check_input_names, check_present
 from ...engine.loop.controller import (
     RELATIVE,
@@ -31,7 +31,6 @@ from ..library import (
     Location,
     custom_field,
     located_errors,
-    origin,
     read_parameter,
     read_table,
 )
@@ -73,7 +72,7 @@ class PlantSignals:
         """Whether a class has numbers in units of signals, or muscles or a mechanism, which are
         those of the plant.
         """
-        hints = typing.get_type_hints(cls).values()
+        hints = type_hints(cls).values()
         return issubclass(cls, SignalRelated) or any(
             _has(h, kind) for h in hints for kind in (Muscle, Mechanism)
         )
@@ -105,7 +104,7 @@ class PlantSignals:
             object.__setattr__(outline, field.name, parts.get(field.name, default))
         if self.units is None:
             return outline
-        hints = typing.get_type_hints(cls)
+        hints = type_hints(cls)
         declared = {p.name: p for p in parameters(cls)}
         read = {
             n: self._number(v, declared[n], hints[n], outline, location) for n, v in numbers.items()
@@ -171,7 +170,7 @@ def _read(value: Any, declared: Parameter, unit: str, hint: Any, location: Locat
 
 def plant_fields(cls: type[Any]) -> tuple[str, ...]:
     """The fields of a model that are those of the plant where a table does not give them."""
-    hints = typing.get_type_hints(cls)
+    hints = type_hints(cls)
     known = (tuple[Muscle, ...], Mechanism, Plant)
     if not {tuple[Muscle, ...], Plant} & set(hints.values()):
         return ()
@@ -181,7 +180,10 @@ def plant_fields(cls: type[Any]) -> tuple[str, ...]:
 
 
 def _has(hint: Any, kind: type[Any]) -> bool:
-    return hint is kind or any(_has(option, kind) for option in typing.get_args(hint))
+    for option in alternatives(hint):
+        if option is kind or any(_has(part, kind) for part in arguments_of(option)):
+            return True
+    return False
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,11 +11,11 @@ import dataclasses
 import inspect
 import math
 import types
-import typing
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...core import Parameter, parameters
+from ...core.annotation_parts import alternatives, item_type, origin, type_hints
 from ...engine.loop import RELATIVE, Controller, Driver
 from ...physics import Muscle, Orifice, Plant
 from ..library import (
@@ -28,7 +28,7 @@ from ..library import (
     only_class,
 )
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
-from ..library.fields import is_required, options, origin
+from ..library.fields import is_required
 from . import controller, initial_state, plant_uncertainty, scenario, values
 from .controller import plant_fields
 
@@ -157,7 +157,7 @@ class _ModelSchemas:
         is_model = hasattr(cls, "from_file") and model_needed is not None
         properties: Schema = {"model": {"const": cls.__name__}} if is_model else {}
         declared = {p.name: p for p in parameters(cls)}
-        hints = typing.get_type_hints(cls)
+        hints = type_hints(cls)
         for field in dataclasses.fields(cls):
             if field.init and (key := field.metadata.get("key", field.name)):
                 if field.name in declared:
@@ -180,7 +180,7 @@ class _ModelSchemas:
     def number(self, declared: Parameter, hint: Any) -> Schema:
         """A declared parameter."""
         number = _quantity("" if declared.unit in RELATIVE else declared.unit, *declared.bounds)
-        if any(origin(option) is tuple for option in options(hint)):
+        if any(origin(option) is tuple for option in alternatives(hint)):
             column = _table({"file": _TEXT, "column": _TEXT}, ("file", "column"))
             number = {"anyOf": [_list_of(number), column]}
         unit = "" if declared.unit == "1" else f" [{declared.unit}]"
@@ -232,11 +232,13 @@ class _ModelSchemas:
         """A structural field, by its annotation."""
         if hint is Muscle:
             return self.muscle()
-        if len(options(hint)) > 1:
-            parts = [self.part(option) for option in options(hint) if option is not types.NoneType]
+        if len(alternatives(hint)) > 1:
+            parts = [
+                self.part(option) for option in alternatives(hint) if option is not types.NoneType
+            ]
             return parts[0] if len(parts) == 1 else {"anyOf": parts}
         if origin(hint) is tuple:
-            return _list_of(self.part(typing.get_args(hint)[0]))
+            return _list_of(self.part(item_type(hint)))
         return {"type": _PLAIN[hint]} if hint in _PLAIN else self.kind(hint)
 
 

@@ -9,13 +9,12 @@ for conditions on several fields.
 import dataclasses
 import math
 import re
-import types
-import typing
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
 
 from ...core import Hint, HintedText, InputError, quantity, suggestion
+from ...core.annotation_parts import alternatives, item_type, type_hints
 
 T = TypeVar("T")
 Where = Callable[[str], str]
@@ -171,22 +170,21 @@ def request(cls: type[T]) -> type[T]:
 
 def options_of(cls: Any) -> tuple[Option, ...]:
     """The declared fields of a request, in order."""
-    hints = typing.get_type_hints(cls)
+    hints = type_hints(cls)
     found = []
     for field in (each for each in dataclasses.fields(cls) if _KEY in each.metadata):
         declared = dict(field.metadata[_KEY])
         hint = hints[field.name]
         default = declared.pop("default")
-        parts = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-        kind = next(each for each in parts if each is not type(None))
-        repeated = typing.get_origin(kind) is tuple
         needed = default is dataclasses.MISSING
-        kind = typing.get_args(kind)[0] if repeated else kind
+        repeated = item_type(hint)
+        kinds = alternatives(hint) if repeated is None else (repeated,)
+        kind = next(kind for kind in kinds if kind is not type(None))
         found.append(
             Option(
                 field.name,
                 kind if kind in (bool, int, float, str, Path) else str,
-                repeated,
+                repeated is not None,
                 needed=needed,
                 default=None if needed or default in ((), None) else default,
                 **declared,
