@@ -3,6 +3,7 @@ dataclass and a call.
 """
 
 import dataclasses
+import functools
 import inspect
 import numbers
 import types
@@ -130,35 +131,40 @@ def _is_number(value: Any) -> bool:
     return True
 
 
-def describe(hint: Any) -> str:
-    """An annotation in words: `a number`, `a text or an instance of SplitRange`."""
-    return " or ".join(_described(option) for option in alternatives(hint))
+def describe(hint: Any, levels: int = 4) -> str:
+    """An annotation in words: `a number`, `a text or an instance of SplitRange`; parts inside parts
+    down to this level, because an alias may contain itself.
+    """
+    return " or ".join(_described(option, levels) for option in alternatives(hint))
 
 
-def _described(hint: Any) -> str:
+def _described(hint: Any, levels: int) -> str:
+    if levels == 0:
+        return "anything"
     kind = origin(hint)
     arguments = arguments_of(hint)
     if not arguments:
         return _NAMES.get(hint) or f"an instance of {getattr(hint, '__name__', hint)}"
+    described = functools.partial(describe, levels=levels - 1)
     if kind is Callable:
         taken = arguments[0] if isinstance(arguments[0], list) else []
-        words = " and ".join(map(describe, taken))
+        words = " and ".join(map(described, taken))
         return f"a function of {words}" if words else "a function"
     if kind in (Collection, Iterable):
-        return f"several values, each of which is {describe(arguments[0])}"
+        return f"several values, each of which is {described(arguments[0])}"
     if kind is np.ndarray:
         return "an array of numbers"
     if kind is Mapping:
-        return f"a mapping, from {describe(arguments[0])} to {describe(arguments[1])}"
+        return f"a mapping, from {described(arguments[0])} to {described(arguments[1])}"
     if kind is Sequence or (kind is tuple and arguments[1:] == (...,)):
         return (
             f"a {'tuple' if kind is tuple else 'sequence'}, each element of which is"
-            f" {describe(arguments[0])}"
+            f" {described(arguments[0])}"
         )
     if kind is tuple:
         return (
             f"a tuple of {len(arguments)} values"
-            f" ({', '.join(describe(each) for each in arguments)})"
+            f" ({', '.join(described(each) for each in arguments)})"
         )
     return "anything"
 

@@ -192,20 +192,27 @@ def terminal_width() -> int:
     )
 
 
+def is_watched() -> bool:
+    """Whether someone sees the progress of a command: whether stderr is a terminal."""
+    return sys.stderr.isatty()
+
+
 def _display(*columns: Any) -> Any:
     """The bars of a terminal with these columns, which disappear at the end."""
     from rich.console import Console
     from rich.progress import Progress
 
-    console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    return Progress(*columns, console=Console(stderr=True), transient=True)
 
 
 @contextlib.contextmanager
 def progress_bars(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
     """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one
-    bar per name.
+    bar per name on a terminal.
     """
+    if not is_watched():
+        yield lambda name, fraction: None
+        return
     from rich.markup import escape
     from rich.progress import TaskID
 
@@ -225,8 +232,12 @@ def progress_bars(label: str = "reading") -> Iterator[Callable[[str, float], Non
 
 @contextlib.contextmanager
 def counted_progress(label: str) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a callback (step, done, in total) that draws one bar with the number of its runs and
-    the time left; it raises KeyboardInterrupt after Ctrl-C."""
+    """Yield a callback (step, done, in total) that draws one bar on a terminal, with the number of
+    its runs and the time left; it raises KeyboardInterrupt after Ctrl-C.
+    """
+    if not is_watched():
+        yield lambda step, done, total: check_interrupted()
+        return
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
     description = TextColumn("{task.description}", markup=False)
