@@ -14,15 +14,18 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, Status, tree
-from ...compile.cache.kernel import aligned_array, lanes, loop_lanes
+from ...compile.cache.kernel import BoundKernel, aligned_array, lanes, loop_lanes
 from ...compile.llvm.emit import LlvmType
 from ...loop import MEASURED, SETPOINT, ControlLaw
 from ..compiled_law import compiled_sample
+from ..compiled_loop import CompiledLoop
 from ..integrators import ExplicitRungeKutta
 from ..sampled_loop import intervals_of
 from .job import BatchJob, Queue
 
 Plants = npt.NDArray[np.intp]
+Flag = npt.NDArray[np.int64]
+"""A flag (1,) that ends a kernel early."""
 BITS = 1024
 """Size of a vector of lanes: two of the widest registers, which alternate."""
 MAX_SAMPLES = 200_000
@@ -89,18 +92,28 @@ class LaneArrays(abc.ABC):
         m = sizes.inputs
         lengths = (sizes.parameters, held, n, n, m, m, m, 1, sizes.outputs, *more)
         self.arrays = [aligned_array((length, self.width), precision.dtype) for length in lengths]
+        self.arrays[0][:] = job.compiled.parameters[:, None]
         self.status = np.empty(self.width, dtype=np.int64)
 
+    @property
     @abc.abstractmethod
-    def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
+    def kernel(self) -> BoundKernel:
+        """The kernel with the arrays of this block."""
+
+    @abc.abstractmethod
+    def write(self, plants: Plants) -> None:
+        """Write the results of one block of plants."""
+
+    def run(self, plants: Plants, lane: Plants) -> None:
         """Simulate one block of plants, of which `lane` names one for each lane."""
+        self.load(lane)
+        if self.kernel() != Status.INTERRUPTED:
+            self.write(plants)
 
     def load(self, lane: Plants) -> None:
-        """Take over parameters and initial states of one plant a lane."""
+        """Take over the parameters that differ, and the initial states, of one plant a lane."""
         job = self.job
-        parameters = self.arrays[0]
-        parameters[:] = job.compiled.parameters[:, None]
-        parameters[job.variations.places] = job.variations.values[lane].T
+        self.arrays[0][job.variations.places] = job.variations.values[lane].T
         self.arrays[2][:] = job.initial_states[lane].T
 
     def finish(self, plants: Plants, final: npt.NDArray[Any]) -> None:
@@ -132,9 +145,12 @@ class LaneArrays(abc.ABC):
 class LaneBlock(LaneArrays):
     """A block of plants, each with its own segments and steps."""
 
-    def __init__(self, job: BatchJob, precision: Precision, table: "SegmentTable") -> None:
+    def __init__(
+        self, job: BatchJob, precision: Precision, table: "SegmentTable", stop: Flag
+    ) -> None:
         super().__init__(job, precision)
         self.table = table
+        self.stop = stop
         width = self.width
         dtype = precision.dtype
         self.bounded = np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
@@ -148,30 +164,36 @@ class LaneBlock(LaneArrays):
             *(np.empty(width) for _ in range(3)),
         )
 
-    def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
-        job = self.job
-        table = self.table
-        self.load(lane)
-        ended = lanes(
+        self.first, self.last = np.empty(width, np.int64), np.empty(width, np.int64)
+
+    @functools.cached_property
+    def kernel(self) -> BoundKernel:
+        return lanes.bind(
             *self.addresses,
             *self.arrays,
-            table.ends,
-            table.values,
-            table.slopes,
-            table.first[lane],
-            table.last[lane],
-            job.start_time,
+            self.table.ends,
+            self.table.values,
+            self.table.slopes,
+            self.first,
+            self.last,
+            self.job.start_time,
             self.step,
-            job.times,
+            self.job.times,
             self.kept,
             self.rows,
             self.final,
             self.status,
-            stop,
+            self.stop,
             *self.counters,
         )
-        if ended == Status.INTERRUPTED:
-            return
+
+    def load(self, lane: Plants) -> None:
+        super().load(lane)
+        self.first[:] = self.table.first[lane]
+        self.last[:] = self.table.last[lane]
+
+    def write(self, plants: Plants) -> None:
+        job = self.job
         for j, column in enumerate(job.columns.values()):
             column[plants] = self.rows[j, : plants.size]
         below = (self.final < job.lower_bounds).any(axis=1)
@@ -184,7 +206,7 @@ class LaneBlock(LaneArrays):
 class LoopLaneBlock(LaneArrays):
     """A block of control loops, whose sampling instants and segments are the same."""
 
-    def __init__(self, job: BatchJob) -> None:
+    def __init__(self, job: BatchJob, stop: Flag) -> None:
         first = job.loop_of(0)
         assert first.law is not None
         law = first.law
@@ -194,6 +216,7 @@ class LoopLaneBlock(LaneArrays):
         c = len(law.inputs)
         super().__init__(job, Double(), (first.parameters.size, memory, memory, k, s, c, c, c, 1))
         self.first = first
+        self.stop = stop
         self.prepared = first.prepared
         width = self.width
         m = job.compiled.sizes.inputs
@@ -214,26 +237,34 @@ class LoopLaneBlock(LaneArrays):
     def load(self, lane: Plants) -> None:
         super().load(lane)
         job = self.job
-        u = self.arrays[4]
-        parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
-        for i, plant in enumerate(lane.tolist()):
-            loop = job.loop_of(plant)
-            prepared = loop.prepared
-            law = loop.law
-            assert law is not None
-            parameters[:, i] = loop.parameters if job.laws is None else job.laws.parameters(plant)
-            memory[:, i] = list(law.initial_memory.values())
-            self.setpoints[:, :, i] = prepared.setpoint_values
-            self.values[:, :, i] = prepared.inputs.values
-            self.slopes[:, :, i] = prepared.inputs.slopes
-            period[:, i], low[:, i], high[:, i], _ = loop.commanding
-        u[:] = self.values[0]
+        if len(job.loops) == 1:
+            self._load_loop(self.first, slice(None))
+        else:
+            for i, plant in enumerate(lane.tolist()):
+                self._load_loop(job.loop_of(plant), slice(i, i + 1))
+        if job.laws is not None:
+            self.arrays[9][job.laws.places] = job.laws.values[lane].T
+        self.arrays[4][:] = self.values[0]
 
-    def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
-        job = self.job
+    def _load_loop(self, loop: CompiledLoop, places: slice) -> None:
+        """Take over one loop into these lanes."""
+        law = loop.law
+        assert law is not None
+        prepared = loop.prepared
+        parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
+        parameters[:, places] = loop.parameters[:, None]
+        memory[:, places] = np.array(list(law.initial_memory.values()))[:, None]
+        self.setpoints[:, :, places] = prepared.setpoint_values[..., None]
+        self.values[:, :, places] = prepared.inputs.values[..., None]
+        self.slopes[:, :, places] = prepared.inputs.slopes[..., None]
+        period[:, places] = loop.commanding[0]
+        low[:, places] = loop.commanding[1][:, None]
+        high[:, places] = loop.commanding[2][:, None]
+
+    @functools.cached_property
+    def kernel(self) -> BoundKernel:
         prepared = self.prepared
-        self.load(lane)
-        ended = loop_lanes(
+        return loop_lanes.bind(
             *self.addresses,
             self.sample.address,
             *self.arrays,
@@ -247,18 +278,19 @@ class LoopLaneBlock(LaneArrays):
             self.step,
             self.first.measuring[1],
             self.first.commanding[3],
-            job.lower_bounds,
-            job.times,
+            self.job.lower_bounds,
+            self.job.times,
             self.row_segment,
             self.kept,
             self.rows,
             self.samples,
             self.commands,
             self.status,
-            stop,
+            self.stop,
         )
-        if ended == Status.INTERRUPTED:
-            return
+
+    def write(self, plants: Plants) -> None:
+        job = self.job
         kept = iter(self.rows)
         for place, (name, column) in zip(job.kept.tolist(), job.columns.items(), strict=True):
             column[plants] = (
@@ -311,25 +343,23 @@ def lane_workers(
         job.loops and not run_in_lanes(job, active)
     ):
         return None
-    make: Callable[[], LaneArrays] = functools.partial(LoopLaneBlock, job)
-    if not job.loops:
-        make = functools.partial(LaneBlock, job, precision, SegmentTable(job))
-    first = make()
-    count = -(-active.size // first.width)
+    width = precision.number.lanes
+    count = -(-active.size // width)
     queue = Queue(count)
+    make: Callable[[], LaneArrays] = functools.partial(LoopLaneBlock, job, queue.stop)
+    if not job.loops:
+        table = SegmentTable(job)
+        make = functools.partial(LaneBlock, job, precision, table, queue.stop)
 
     def worker(block: LaneArrays) -> Callable[[int], Any]:
         def run(i: int) -> None:
-            plants = active[i * block.width : (i + 1) * block.width]
-            block.run(plants, np.pad(plants, (0, block.width - plants.size), "edge"), queue.stop)
+            places = np.arange(i * width, (i + 1) * width)
+            lane = active[np.minimum(places, active.size - 1)]
+            block.run(lane[: active.size - i * width], lane)
 
         return run
 
-    return (
-        queue,
-        [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))],
-        first.width,
-    )
+    return queue, [worker(make()) for _ in range(min(cores, count))], width
 
 
 def run_in_lanes(job: BatchJob, plants: Plants) -> bool:
