@@ -21,7 +21,9 @@ def main() -> None:
     """
     for name in _BLAS_THREADS:
         os.environ.setdefault(name, "1")
+    os.environ["MPLBACKEND"] = "Agg"  # figures are files; another name may be unknown here
     try:
+        importlib.import_module("airmuscle.outlets.cli.streams").prepare_streams()
         interruption = importlib.import_module("airmuscle.outlets.cli.interruption")
         with interruption.deferred_sigint():
             app = importlib.import_module("airmuscle.outlets.cli.commands").app

@@ -6,6 +6,7 @@ Exit code 0: success. 1: failure, with one line on stderr that gives the reason.
 
 import contextlib
 import importlib
+import sys
 import warnings
 from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
@@ -16,6 +17,7 @@ from typer.core import TyperGroup
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .options import install_completion_classes, print_completion_script
+from .streams import encodable
 from .terminal import RUN_CODE, echo, in_options, warned
 
 SETTINGS: dict[str, Any] = {
@@ -240,13 +242,13 @@ def _exit_codes(ctx: Any) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _printable_usage_errors() -> Iterator[None]:
-    """Escape control characters of arguments that a usage error quotes; typer prints the error
-    itself.
+    """Escape control characters of arguments that a usage error quotes, and replace those that
+    stderr lacks; typer prints the error itself, in UTF-8 where ASCII is asked for.
     """
     try:
         yield
     except _UsageError as error:
-        error.message = quotable(error.message)
+        error.message = encodable(quotable(error.message), sys.stderr)
         raise
 
 

@@ -8,9 +8,7 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
-
-import typer
+from typing import Any, TextIO
 
 from ...bench.readers.missing_values import MISSING_VALUES
 from ...bench.readers.time_base import TIME_BASES
@@ -20,6 +18,7 @@ from ...report.data import as_json
 from ...report.text import table_lines
 from ..requests.declaration import Instruction, reworded
 from .interruption import check_interrupted
+from .streams import encodable
 
 TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
 """Names of the time bases of the option --time."""
@@ -153,7 +152,13 @@ WIDE = 160
 
 def echo(text: str = "", *, err: bool = False) -> None:
     """Print a message; every message of the command line passes through this function."""
-    typer.echo("\n".join(map(printable, text.split("\n"))), err=err)
+    _print("\n".join(map(printable, text.split("\n"))), sys.stderr if err else sys.stdout)
+
+
+def _print(text: str, stream: TextIO) -> None:
+    """Write lines as they are; `typer.echo` would write UTF-8 where ASCII is asked for."""
+    stream.write(text + "\n")
+    stream.flush()
 
 
 warned: set[str] = set()
@@ -170,11 +175,19 @@ def on_one_screen() -> bool:
 def print_json(content: Any) -> None:
     """Print standard JSON; numbers that are not finite are null."""
     lines = as_json(content).splitlines()
-    typer.echo(
-        "\n".join(
-            "".join(c if printable(c) == c else json.dumps(c)[1:-1] for c in line) for line in lines
-        )
-    )
+    _print("\n".join(map(_json_line, lines)), sys.stdout)
+
+
+def _json_line(line: str) -> str:
+    if line.isascii() and line.isprintable():
+        return line
+    return "".join(map(_json_character, line))
+
+
+def _json_character(character: str) -> str:
+    """A character of JSON, escaped where it is a control character or cannot be encoded."""
+    shown = encodable(printable(character), sys.stdout)
+    return character if shown == character else json.dumps(character)[1:-1]
 
 
 def print_table(columns: Mapping[str, Sequence[Any]]) -> None:
