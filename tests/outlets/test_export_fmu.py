@@ -399,10 +399,19 @@ def test_the_log_states_once_what_left_its_validity_range(tmp_path):
     assert re.search(r"extrapolated \(1[5-9]\d{4}(\.\d+)? at 0\.\d+ s\)$", warning)
 
 
-def test_an_input_outside_its_range_is_reported(instance):
-    instance.set(fill=1.5)
-    instance.step(0.0, 0.001)
-    assert any("the input fill is outside its range, 0 to 1 (" in text for _, text in instance.log)
+def test_an_input_outside_its_range_is_limited_and_reported_once(instance):
+    """The input keeps the number that was set; the plant has that of the limit."""
+    before = instance.fmu.getFMUState()
+    pressures = {}
+    for opening in (1.0, 1.5):
+        instance.fmu.setFMUState(before)
+        instance.set(fill=opening)
+        instance.step(0.0, 0.001, 20)
+        pressures[opening] = instance.get("pressure")
+        assert instance.get("fill") == opening
+    assert pressures[1.5] == pressures[1.0]
+    (text,) = [text for _, text in instance.log if "the input fill" in text]
+    assert "the input fill is limited to its range, 0 to 1 (" in text
 
 
 @pytest.mark.parametrize(

@@ -92,7 +92,10 @@ def maximum(a: Value, b: Value) -> Value:
     """
     if type(a) in _PLAIN and type(b) in _PLAIN:
         return b if b > a or b != b else a
-    return np.maximum(a, b) if _library(a, b) is np else where(a >= b, a, b)
+    library = _library(a, b)
+    if library is np:
+        return np.maximum(a, b)
+    return where(_or_nan(a >= b, a, library), a, b)
 
 
 def minimum(a: Value, b: Value) -> Value:
@@ -101,7 +104,20 @@ def minimum(a: Value, b: Value) -> Value:
     """
     if type(a) in _PLAIN and type(b) in _PLAIN:
         return b if a >= b or b != b else a
-    return np.minimum(a, b) if _library(a, b) is np else where(a >= b, b, a)
+    library = _library(a, b)
+    if library is np:
+        return np.minimum(a, b)
+    return where(_or_nan(a >= b, b, library), b, a)
+
+
+def _or_nan(condition: Value, value: Value, library: ModuleType | None) -> Value:
+    """A condition, which in JAX also holds where the value is NaN.
+
+    Programs that are traced check their inputs before they evaluate equations; JAX cannot.
+    """
+    if library is None or library.__name__ != "jax.numpy":
+        return condition
+    return condition | (value != value)
 
 
 def clip(x: Value, low: Value, high: Value) -> Value:

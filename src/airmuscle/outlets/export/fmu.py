@@ -238,7 +238,7 @@ def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, fl
         slack = 1e-9 * (given.maximum - given.minimum)
         unit = f" {given.unit}" if has_unit(given.unit) else ""
         text = (
-            f"the input {given.name} is outside its range, {given.minimum:.4g} to"
+            f"the input {given.name} is limited to its range, {given.minimum:.4g} to"
             f" {given.maximum:.4g}{unit}"
         )
         limits.append(

@@ -56,8 +56,10 @@ static const struct {
 @ranges@  {0, 0.0, 0.0, ""}
 };
 
+/* `u` are the inputs that act: `requested`, which were set, within their ranges. */
 typedef struct {
   model_solver s;
+  double requested[MODEL_INPUTS + 1];
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], p[MODEL_PARAMETERS + 1], c[MODEL_PRECOMPUTED + 1];
   double f[MODEL_STATES], o[MODEL_OUTPUTS + 1];
   int unprepared, old_rates, old_outputs, jumped;
@@ -74,6 +76,7 @@ static void model_reset(model_instance *m)
   model_begin(&m->s, @start@, model_start_states);
   m->s.rtol = MODEL_RTOL_START;
   memcpy(m->u, model_start_inputs, sizeof m->u);
+  memcpy(m->requested, model_start_inputs, sizeof m->requested);
   memcpy(m->p, model_defaults, sizeof m->p);
   memcpy(m->pressure, model_start_pressures, sizeof m->pressure);
   m->unprepared = m->old_rates = m->old_outputs = m->jumped = 1;
@@ -154,7 +157,7 @@ static int model_get(model_instance *m, unsigned v, double *value)
   if (v == 0) *value = m->s.t;
   else if (v < MODEL_FIRST_RATE) *value = m->s.x[v - MODEL_FIRST_STATE];
   else if (v < MODEL_FIRST_INPUT) *value = model_rates_now(m)[v - MODEL_FIRST_RATE];
-  else if (v < MODEL_FIRST_OUTPUT) *value = m->u[v - MODEL_FIRST_INPUT];
+  else if (v < MODEL_FIRST_OUTPUT) *value = m->requested[v - MODEL_FIRST_INPUT];
   else if (v < MODEL_FIRST_PARAMETER) *value = model_outputs_now(m)[v - MODEL_FIRST_OUTPUT];
   else if (v < MODEL_TOLERANCE) *value = m->p[v - MODEL_FIRST_PARAMETER];
   else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0) *value = m->s.rtol;
@@ -186,6 +189,12 @@ static const char *model_refusal(unsigned v, double value, char *text, size_t si
   return text;
 }
 
+/* An input within its range. */
+static double model_limited(int i, double value)
+{
+  return fmin(fmax(value, model_input_minimum[i]), model_input_maximum[i]);
+}
+
 /* Set a state, an input, a parameter or the tolerance; 1 for any other variable, a value that is not finite, or a
    parameter beyond its bounds. */
 static int model_set(model_instance *m, unsigned v, double value)
@@ -195,9 +204,12 @@ static int model_set(model_instance *m, unsigned v, double value)
     m->s.x[v - MODEL_FIRST_STATE] = value;
     m->jumped = 1;
   } else if (v >= MODEL_FIRST_INPUT && v < MODEL_FIRST_OUTPUT) {
-    if (m->u[v - MODEL_FIRST_INPUT] != value) m->jumped = 1;
-    m->u[v - MODEL_FIRST_INPUT] = value;
-    m->w[v - MODEL_FIRST_INPUT] = 0.0;
+    const int i = (int)(v - MODEL_FIRST_INPUT);
+    const double limited = model_limited(i, value);
+    if (m->u[i] != limited) m->jumped = 1;
+    m->requested[i] = value;
+    m->u[i] = limited;
+    m->w[i] = 0.0;
   } else if (v >= MODEL_FIRST_PARAMETER && v < MODEL_TOLERANCE) {
     if (value < model_lowest[v - MODEL_FIRST_PARAMETER] || value > model_highest[v - MODEL_FIRST_PARAMETER]) return 1;
     m->p[v - MODEL_FIRST_PARAMETER] = value;
@@ -217,7 +229,7 @@ static int model_set(model_instance *m, unsigned v, double value)
 static double model_column(const model_instance *m, int k)
 {
   if (k < MODEL_STATES) return m->s.x[k];
-  if (k < MODEL_STATES + MODEL_INPUTS) return m->u[k - MODEL_STATES];
+  if (k < MODEL_STATES + MODEL_INPUTS) return m->requested[k - MODEL_STATES];
   return m->o[k - MODEL_STATES - MODEL_INPUTS];
 }
 
@@ -247,6 +259,7 @@ static int model_check(model_instance *m, model_report report, void *owner)
 static int model_advance(model_instance *m, double t, double h, model_report report, void *owner)
 {
   const double end = t + h;
+  double slope[MODEL_INPUTS + 1] = {0.0};
   int i, status = MODEL_DONE;
   if (!(h > 0.0 && isfinite(end)) || fabs(t - m->s.t) > 1e-6 * h + 1e-12 * fabs(t)) {
     report(owner, 1, "a step must begin where the last one ended, and have a positive, finite size");
@@ -254,11 +267,20 @@ static int model_advance(model_instance *m, double t, double h, model_report rep
   }
   model_ready(m);
   m->s.t = t;
-  model_set_segment(&m->s, end, m->u, m->w);
+  for (i = 0; i < MODEL_INPUTS; i++) {
+    const double requested = m->requested[i] + m->w[i] * h;
+    const double limited = model_limited(i, requested);
+    /* An input that would leave its range goes to its limit. */
+    slope[i] = limited == requested && m->u[i] == m->requested[i] ? m->w[i] : (limited - m->u[i]) / h;
+  }
+  model_set_segment(&m->s, end, m->u, slope);
   if (m->jumped) m->s.h = MODEL_FIRST_STEP;
   m->jumped = 0;
   while (m->s.t < end && status == MODEL_DONE) status = model_step(&m->s, m->c);
-  for (i = 0; i < MODEL_INPUTS; i++) m->u[i] += m->w[i] * h;
+  for (i = 0; i < MODEL_INPUTS; i++) {
+    m->requested[i] += m->w[i] * h;
+    m->u[i] = model_limited(i, m->requested[i]);
+  }
   m->old_rates = m->old_outputs = 1;
   if (status != MODEL_DONE) {
     report(owner, 1, status == MODEL_STEP_TOO_SMALL ? "the internal step became too small" : "a rate is not finite");

@@ -28,7 +28,7 @@ function r = simulate(model, changes)
     end
     [wanted, rows.piece] = setpoints_now(run.setpoint, rows.piece, start, run.start);
     [rows.command, memory] = control_sample(rows.measured, wanted, memory, run.controller_parameters);
-    if ~all(isfinite([rows.measured; rows.command]))
+    if ~all(isfinite([rows.measured; wanted(:); rows.command]))
       status = 3;
       break
     end

@@ -77,7 +77,7 @@ export function simulate(changes = {}) {
     loop.measuredAt.forEach(([kind, i], j) => (measured[j] = kind === 0 ? s.x[i] : o[i]));
     setpointsNow(begin, wanted);
     control_sample(measured, wanted, memory, ofController, command, later);
-    if (![...measured, ...command].every(Number.isFinite)) result = status.notFinite;
+    if (![...measured, ...wanted, ...command].every(Number.isFinite)) result = status.notFinite;
     else {
       memory.set(later);
       samples++;

@@ -21,6 +21,7 @@ extern "C" {
 #define MODEL_DONE 0
 #define MODEL_STEP_TOO_SMALL 2
 #define MODEL_NOT_FINITE 3
+#define MODEL_OUT_OF_RANGE 5
 
 /* Names, and units in SI; one empty text follows the last, because an array cannot be empty. */
 extern const char *const model_state_names[MODEL_STATES + 1];
@@ -45,7 +46,7 @@ typedef struct {
   double x[MODEL_STATES], x_before[MODEL_STATES], d2[MODEL_STATES], d3[MODEL_STATES];
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1];
   long steps, rejected;
-  int moving, done;
+  int moving, done, refusal;
 } model_solver;
 
 /* c[MODEL_PRECOMPUTED + 1]: all that the functions need of the parameters p[MODEL_PARAMETERS + 1]; call it first. */
@@ -56,7 +57,8 @@ void model_rhs(const double *x, const double *u, const double *c, double *f);
 void model_outputs(const double *x, const double *u, const double *c, double *o);
 /* Begin a run at time t in state x. */
 void model_begin(model_solver *s, double t, const double *x);
-/* Inputs from now until `end`: u now, with slopes w. Set s->h = 0 where the inputs jump (Rodas4 finds a step anew). */
+/* Inputs from now until `end`: u now, with slopes w. Set s->h = 0 where the inputs jump (Rodas4 finds a step anew).
+   Where one is not finite, or beyond its range now or at the end, every step until then does nothing, and returns why. */
 void model_set_segment(model_solver *s, double end, const double *u, const double *w);
 /* One step, which meets the end of the segment exactly. */
 int model_step(model_solver *s, const double *c);

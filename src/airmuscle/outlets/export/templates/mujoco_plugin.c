@@ -107,7 +107,7 @@ static void reset(const mjModel *m, mjtNum *state, void *data, int instance)
   memset(((muscle *)data)->force, 0, (size_t)m->nu * sizeof(double));
 }
 
-/* Inputs and states of an actuator. */
+/* Inputs, within their ranges, and states of an actuator. */
 static void point_of(const mjModel *m, const mjData *d, const muscle *own, int i, double *u, double *x)
 {
   double control = d->ctrl[i];
@@ -118,6 +118,7 @@ static void point_of(const mjModel *m, const mjData *d, const muscle *own, int i
   for (k = 0; k < MODEL_INPUTS; k++) u[k] = 0.0;
   if (SECOND >= 0 && control < 0.0) u[SECOND >= 0 ? SECOND : 0] = -control;
   else if (FIRST >= 0) u[FIRST >= 0 ? FIRST : 0] = control;
+  for (k = 0; k < MODEL_INPUTS; k++) u[k] = fmin(fmax(u[k], model_input_minimum[k]), model_input_maximum[k]);
   for (k = 0; k < MODEL_STATES - 2; k++) x[own_states[k]] = act[k];
   x[POSITION] = own->rest - d->actuator_length[i];
   x[SPEED] = -d->actuator_velocity[i];
@@ -262,6 +263,11 @@ static void act_dot(const mjModel *m, mjData *d, int instance)
   int i, k;
   for (i = 0; i < m->nu; i++)
     if (m->actuator_plugin[i] == instance) {
+      if (!isfinite(d->ctrl[i])) { /* states and force remain; of NaN MuJoCo warns by itself */
+        if (isinf(d->ctrl[i])) mj_warning(d, mjWARN_BADCTRL, i);
+        mju_zero(d->act_dot + m->actuator_actadr[i], ACT);
+        continue;
+      }
       point_of(m, d, own, i, u, x);
       if (m->opt.integrator != mjINT_RK4) {
         integrate(m, d, own, i, u, x);

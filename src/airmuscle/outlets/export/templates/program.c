@@ -14,6 +14,7 @@ int main(int argc, char **argv)
   }
   if (status != MODEL_DONE)
     fputs(status == MODEL_STEP_TOO_SMALL ? "the step became too small\n"
+         : status == MODEL_OUT_OF_RANGE  ? "an input is beyond its range\n"
 @failures@                                         : "a state or an output is not finite, or below its limit\n", stderr);
   return status;
 }

@@ -24,7 +24,7 @@ export interface Changes {
 export interface Run {
   /** One array a column, in SI units. */
   columns: Record<Column, number[]>;
-  /** 0: complete, 2: the step became too small, 3: a value is not finite. */
+  /** 0: complete, 2: the step became too small, 3: a value is not finite, 5: an input is beyond its range. */
   status: number;
   /** Time reached [s]. */
   time: number;
@@ -41,6 +41,6 @@ export const defaults: readonly number[];
 export const nominal: readonly number[];
 export const inputMinimum: readonly number[];
 export const inputMaximum: readonly number[];
-export const status: {done: 0; stepTooSmall: 2; notFinite: 3};
+export const status: {done: 0; stepTooSmall: 2; notFinite: 3; outOfRange: 5};
 /** Run with these changes; without any that of the export. Throws RangeError for what it does not know. */
 export function simulate(changes?: Changes): Run;

@@ -24,6 +24,8 @@ function s = begin_run(model, run)
   s.c = prepare(run.parameters);
   s.n = numel(model.states);
   s.nominal = model.nominal;
+  s.input_minimum = model.input_minimum(:);
+  s.input_maximum = model.input_maximum(:);
   s.t = run.start;
   s.t_before = run.start;
   s.x = run.initial(:);
@@ -42,7 +44,22 @@ function s = begin_segment(s, finish, u, w)
   s.w = w;
   s.moving = any(w);
   s.done = 0;
+  last = u;
+  last(w ~= 0) = u(w ~= 0) + (finish - s.start) * w(w ~= 0);
+  s.refusal = input_refusal(s, u, last);
   s.h = @first_step@;
+end
+
+% Why inputs cannot go from `first` to `last`: 3 where one is not finite, 5 where one is beyond its range, which the
+% rounding of a ramp may pass by 1e-9 of its size.
+function refusal = input_refusal(s, first, last)
+  slack = 1e-9 * max(abs(first), abs(last));
+  refusal = 0;
+  if ~all(isfinite([first; last]))
+    refusal = 3;
+  elseif any(min(first, last) < s.input_minimum - slack) || any(max(first, last) > s.input_maximum + slack)
+    refusal = 5;
+  end
 end
 
 function r = ended(r, s, status)

@@ -4,7 +4,7 @@ function r = run_@file@(file)
   model = @file@();
   r = model.simulate();
   if r.status ~= 0
-    warning('the run ended at %.9g s with status %d: step too small (2) or not finite (3)', r.time, r.status);
+    warning('the run ended at %.9g s with status %d: step too small (2), not finite (3) or beyond its range (5)', r.time, r.status);
   end
   if nargin > 0
     [found, columns] = ismember(@columns@, r.names);

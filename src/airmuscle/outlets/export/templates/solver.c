@@ -10,7 +10,17 @@ void model_begin(model_solver *s, double t, const double *x)
   s->rtol = MODEL_RTOL;
   s->steps = s->rejected = s->done = 0;
   s->moving = 0;
+  s->refusal = MODEL_DONE;
   for (i = 0; i < MODEL_STATES; i++) s->x[i] = s->x_before[i] = x[i];
+}
+
+/* Why an input cannot go from `first` to `last`: a status. Rounding of a ramp may pass the limit by 1e-9 of its size. */
+static int input_refusal(int i, double first, double last)
+{
+  const double slack = 1e-9 * fmax(fabs(first), fabs(last));
+  if (!isfinite(first) || !isfinite(last)) return MODEL_NOT_FINITE;
+  if (fmin(first, last) < model_input_minimum[i] - slack) return MODEL_OUT_OF_RANGE;
+  return fmax(first, last) > model_input_maximum[i] + slack ? MODEL_OUT_OF_RANGE : MODEL_DONE;
 }
 
 void model_set_segment(model_solver *s, double end, const double *u, const double *w)
@@ -20,10 +30,13 @@ void model_set_segment(model_solver *s, double end, const double *u, const doubl
   s->end = end;
   s->done = 0;
   s->moving = 0;
+  s->refusal = MODEL_DONE;
   for (i = 0; i < MODEL_INPUTS; i++) {
     s->u[i] = u[i];
     s->w[i] = w[i];
     if (w[i] != 0.0) s->moving = 1;
+    if (s->refusal == MODEL_DONE)
+      s->refusal = input_refusal(i, u[i], w[i] != 0.0 ? u[i] + (end - s->t) * w[i] : u[i]);
   }
 }
 
@@ -37,6 +50,7 @@ int model_step(model_solver *s, const double *c)
   @single_step_work@
   double reached, taken, following;
   int i, rejections, result;
+  if (s->refusal != MODEL_DONE) return s->refusal;
   @single_step@
   s->rejected += rejections;
   s->h = following;

@@ -1,4 +1,8 @@
 function [s, result] = step(s)
+  result = s.refusal;
+  if result ~= 0
+    return
+  end
   @single_step_work@
   @single_step@
   s.rejected = s.rejected + rejections;

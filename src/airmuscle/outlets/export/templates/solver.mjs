@@ -16,6 +16,7 @@ export class Solver extends Segment {
   /** One step, which meets the end of the segment exactly; returns a status. */
   step() {
     const {work} = this;
+    if (this.refusal !== status.done) return this.refusal;
     let result, reached, taken, following, rejections;
     @single_step@
     this.rejected += rejections;
