@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import datetime
+import functools
 import os
 import platform
 import random
@@ -61,11 +62,15 @@ class Times:
         return statistics.median(a / b for a, b in zip(self.rounds, other.rounds, strict=True))
 
 
-def time_variants(variants: Mapping[str, Callable[[], Any]], rounds: int) -> dict[str, Times]:
+def time_variants(
+    variants: Mapping[str, Callable[[], Any]],
+    rounds: int,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, Times]:
     """Time the variants, after one warm-up call each, in an order that is the same in each
     process.
     """
-    once = {name: _seconds(run, 1, warm=True) for name, run in variants.items()}
+    once = {name: _seconds(run, 1, True, clock) for name, run in variants.items()}
     calls = {name: max(1, round(MIN_DURATION / seconds)) for name, seconds in once.items()}
     durations: dict[str, list[float]] = {name: [] for name in variants}
     order = list(variants)
@@ -73,23 +78,59 @@ def time_variants(variants: Mapping[str, Callable[[], Any]], rounds: int) -> dic
     for _ in range(rounds):
         shuffle(order)
         for name in order:
-            durations[name].append(_seconds(variants[name], calls[name], once[name] < MAX_WARM_UP))
+            warm = once[name] < MAX_WARM_UP
+            durations[name].append(_seconds(variants[name], calls[name], warm, clock))
     return {name: Times(tuple(times)) for name, times in durations.items()}
 
 
-def _seconds(run: Callable[[], Any], calls: int, warm: bool) -> float:
+def _seconds(
+    run: Callable[[], Any],
+    calls: int,
+    warm: bool,
+    clock: Callable[[], float] = time.perf_counter,
+) -> float:
     if warm:
         run()
-    start = time.perf_counter()
+    start = clock()
     for _ in range(calls):
         run()
-    return max((time.perf_counter() - start) / calls, 1e-9)
+    return max((clock() - start) / calls, 1e-9)
+
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+PER_SECOND = {"M steps/s": 1e6}
+NOMINAL = 0.2e-6
+"""Duration [s] of the yardstick by which limits in seconds become limits in yardsticks (chosen)."""
+YARDSTICK_STEPS = 20_000
+
+
+def oscillate(steps: int) -> dict[str, float]:
+    """The state of an oscillator after so many steps, in Python."""
+    state = {"position": 0.0, "speed": 1.0}
+    for _ in range(steps):
+        force = -4.0 * state["position"] - 0.1 * state["speed"]
+        state = {
+            "position": state["position"] + 1e-3 * state["speed"],
+            "speed": state["speed"] + 1e-3 * force,
+        }
+    return state
+
+
+@functools.cache
+def yardstick() -> float:
+    """Duration of a step of `oscillate` in this run [s], the least of many."""
+    return min(_seconds(lambda: oscillate(YARDSTICK_STEPS), 1, warm=False) for _ in range(60)) / (
+        YARDSTICK_STEPS
+    )
 
 
 @dataclasses.dataclass(frozen=True)
 class Target:
     """Target of a benchmark: a measured value with an upper limit or, if `at_least`, a lower
     limit.
+
+    A time or a rate is compared as a ratio to the yardstick of the same run, so that a slower
+    processor has the same targets; its limit is given for a yardstick of NOMINAL.
     """
 
     name: str
@@ -101,18 +142,38 @@ class Target:
     """Known reason, printed if the target is missed."""
 
     @property
+    def ratio(self) -> float:
+        """The measured value; of a time or a rate, in yardsticks."""
+        return self._in_yardsticks(self.measured, yardstick) if self.absolute else self.measured
+
+    @property
+    def bar(self) -> float:
+        """The limit; of a time or a rate, in yardsticks."""
+        return self._in_yardsticks(self.limit, lambda: NOMINAL) if self.absolute else self.limit
+
+    @property
+    def absolute(self) -> bool:
+        """Whether a time or a rate is measured."""
+        return self.unit in {*SECONDS, *PER_SECOND}
+
+    @property
     def met(self) -> bool:
-        return self.measured >= self.limit if self.at_least else self.measured <= self.limit
+        return self.ratio >= self.bar if self.at_least else self.ratio <= self.bar
 
     @property
     def cells(self) -> tuple[str, ...]:
-        target = f"{'>=' if self.at_least else '<='} {self.limit:g} {self.unit}"
-        return (
-            self.name,
-            f"{self.measured:.3g} {self.unit}",
-            target,
-            "met" if self.met else "**missed**",
-        )
+        measured = f"{self.measured:.3g} {self.unit}"
+        unit = self.unit
+        if self.absolute:
+            unit = "y" if self.unit in SECONDS else "a y"
+            measured = f"{measured} = {self.ratio:.3g} {unit}"
+        target = f"{'>=' if self.at_least else '<='} {self.bar:.3g} {unit}"
+        return self.name, measured, target, "met" if self.met else "**missed**"
+
+    def _in_yardsticks(self, value: float, duration: Callable[[], float]) -> float:
+        if self.unit in SECONDS:
+            return value * SECONDS[self.unit] / duration()
+        return value * PER_SECOND[self.unit] * duration()
 
 
 @dataclasses.dataclass(frozen=True)

@@ -40,7 +40,16 @@ import sensitivities
 import startup
 import static_fit
 import studio_latency
-from measure import Section, Target, describe_machine, package_versions, print_section, table, today
+from measure import (
+    Section,
+    Target,
+    describe_machine,
+    package_versions,
+    print_section,
+    table,
+    today,
+    yardstick,
+)
 
 RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
 SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
@@ -49,6 +58,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (peers.section, 9),
     (ode8.section, 15),
     (batch.section, 7),
+    (batch.section_of_widths, 7),
     (loops.section, 3),
     (mujoco_peer.section, 5),
     (derivative.section, 25),
@@ -77,8 +87,9 @@ Written by `benchmarks/run.py` on {date}. {machine}. {versions}.
 All variants are timed in one process, in each round once and in random order, fast ones several times per round and
 after a call that is not timed: the first call after another variant takes up to half longer, because it fills the
 caches of the processor again. The tables state the median and the minimum of the rounds; ratios are medians of the
-ratios within a round. Targets in seconds apply to the minimum, because other load can only increase a time. Each
-table also states the errors. Linear algebra uses one thread in all variants.
+ratios within a round. Times of targets are minima, because other load can only increase a time, and are compared in
+yardsticks: y is a step of an oscillator in Python, the least of this run, {yardstick:.3g} us. Each table also states the
+errors. Linear algebra uses one thread in all variants.
 Total time {seconds:.0f} s.
 """  # noqa: E501
 
@@ -100,7 +111,11 @@ def report(sections: Sequence[Section], seconds: float) -> str:
     """The text of RESULTS.md."""
     targets = [target for section in sections for target in section.targets]
     head = HEAD.format(
-        date=today(), machine=describe_machine(), versions=package_versions(), seconds=seconds
+        date=today(),
+        machine=describe_machine(),
+        versions=package_versions(),
+        yardstick=yardstick() * 1e6,
+        seconds=seconds,
     )
     summary = table(("quantity", "measured", "target", ""), [target.cells for target in targets])
     return "\n".join(

@@ -188,6 +188,29 @@ def test_a_section_and_its_targets_are_printed():
     assert "## title" in text
 
 
+@pytest.mark.parametrize("unit", [*measure.SECONDS, *measure.PER_SECOND])
+def test_a_time_is_compared_in_yardsticks_so_that_a_slow_machine_has_the_same_targets(
+    unit, monkeypatch
+):
+    """A machine that takes three times as long for everything meets and misses the same."""
+    results = []
+    for pace in (1.0, 3.0):
+        monkeypatch.setattr(measure, "yardstick", lambda pace=pace: pace * measure.NOMINAL)
+        change = pace if unit in measure.SECONDS else 1 / pace
+        for measured in (0.9, 1.1):
+            target = measure.Target("time", measured * change, 1.0, unit)
+            results.append((target.met, *target.cells[2:], target.cells[1].split(" = ")[1]))
+    assert results[:2] == results[2:]
+    assert [met for met, *_ in results[:2]] == [True, False]
+
+
+def test_the_yardstick_is_a_short_time_that_is_measured():
+    assert 1e-8 < measure.yardstick() < 1e-5
+    energies = [measure.oscillate(steps)["speed"] ** 2 for steps in (0, 1000)]
+    assert energies[0] == 1.0
+    assert energies[1] != 1.0
+
+
 def test_a_new_plant_is_traced_and_compiled_again():
     system = runs()[3].system
     assert new_plant.compile_anew(system).address != compile_system(system).program.address

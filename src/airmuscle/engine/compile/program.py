@@ -173,13 +173,13 @@ class Program:
         """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of
         `c`.
         """
+        made_for = processor()
+        key = tableau, number, made_for
         with self._compiling:
-            if (tableau, number) not in self._lane_modules:
-                groups = LaneGroups(number, processor().register)
-                self._lane_modules[tableau, number] = Module(
-                    *lanes_module(self.traced, *tableau, groups)
-                )
-        module = self._lane_modules[tableau, number]
+            if key not in self._lane_modules:
+                groups = LaneGroups(number, made_for.register)
+                self._lane_modules[key] = Module(*lanes_module(self.traced, *tableau, groups))
+        module = self._lane_modules[key]
         return (
             module.address("prepare"),
             module.address("step"),
