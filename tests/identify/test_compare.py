@@ -219,8 +219,11 @@ def test_levels_are_what_was_held():
     assert all(len(set(names)) == 1 for names in labels)
     assert len({names[0] for names in labels}) == 7
     assert [labels[0][0], labels[-1][0]] == ["contraction 0 %", "contraction 20 %"]
+    joined = Recording(
+        {name: np.concatenate([run[name] for run in runs]) for name in runs[0]}, "joined"
+    )
     with pytest.raises(IdentificationError, match="one run"):
-        compare(runs[0], CANDIDATES, leave_out=RunSplit())
+        compare(joined, CANDIDATES, leave_out=RunSplit())
 
 
 def test_laws_of_every_direction_are_judged_in_force():
@@ -510,14 +513,14 @@ def test_a_law_without_a_guess_is_not_started_and_says_so():
 @pytest.mark.parametrize(
     ("name", "factor", "cause"),
     [
-        ("force", 0, "positive force"),
-        ("force", -1, "positive force"),
-        ("pressure", 0, "pressure is 0 Pa in every row"),
+        ("force", 0, "the muscle is slack, or the load cell is not connected"),
+        ("force", -1, "the sign of the force is wrong"),
+        ("pressure", 0, "the pressure is at most 0 Pa, without which no muscle pulls"),
     ],
 )
 def test_data_without_tension_or_pressure_determine_no_law_and_say_so(name, factor, cause):
     runs = [run.with_columns(**{name: factor * run[name]}) for run in bench()]
-    with pytest.raises(IdentificationError, match=f"the data determine none of the(.|\n)*{cause}"):
+    with pytest.raises(IdentificationError, match=cause):
         compare(runs)
 
 

@@ -331,12 +331,12 @@ CASES: dict[
         "use fixed=....",
         "To fix parameters, use --fix PARAMETER.",
     ),
-    "all rows censored": (
+    "slack in every row": (
         lambda path: points(path, zero=True),
         lambda file: fit(law(2), read(file)),
         ("fit", *SURFACE, 2),
-        "use censoring=UNCENSORED.",
-        "To treat them as measured values, use --uncensored.",
+        "To state the unit, use units={'force': ...} of ColumnMapping.",
+        "To state the unit, use --unit 'force=...'.",
     ),
     "levels drawn": (
         points,

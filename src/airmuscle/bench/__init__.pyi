@@ -1,3 +1,8 @@
+from .checks import DataUse as DataUse
+from .checks import LevelRecord as LevelRecord
+from .checks import Support as Support
+from .checks import level_record as level_record
+from .checks import support_of as support_of
 from .identify import UNCENSORED as UNCENSORED
 from .identify import Band as Band
 from .identify import BenchLimits as BenchLimits

@@ -13,8 +13,19 @@ from collections.abc import Callable, Iterator, Sequence
 from ...core import AirmuscleWarning
 from ...recording.recording import Recording
 from . import contractions, pressures
+from .level_records import LevelRecord, level_record, level_tables
+from .support import DataUse, Support, support_of
 
-__all__ = ["find_suspicious", "warn_of_suspicious_values"]
+__all__ = [
+    "DataUse",
+    "LevelRecord",
+    "Support",
+    "find_suspicious",
+    "level_record",
+    "level_tables",
+    "support_of",
+    "warn_of_suspicious_values",
+]
 
 BenchCheck = Callable[[Sequence[Recording]], Iterator[str]]
 CHECKS: tuple[BenchCheck, ...] = (

@@ -18,6 +18,7 @@ from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter, Plot, Table, TableColumn
 from ...report.formatting import symbol_formula, to_mathtext
+from ..checks import DataUse, support_of
 from . import Fit
 from .candidate_scores import RankedModel
 from .candidates import MIN_POOLED, Candidate
@@ -70,6 +71,7 @@ def select_for_both(
     fewest parameters is recommended. Raises IdentificationError where no candidate is determined
     for both purposes.
     """
+    support_of(recordings).check(DataUse.COMPARISON)
     comparisons = compare_splits(
         recordings, candidates, SPLITS, loss=loss, workers=workers, progress=progress
     )

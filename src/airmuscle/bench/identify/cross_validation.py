@@ -20,6 +20,7 @@ from ...core import (
     IdentificationError,
     ParameterError,
     check_field_types,
+    counted,
     level_text,
 )
 from ...recording import Recording
@@ -246,10 +247,19 @@ def default_split(recordings: Sequence[Recording], least: int = 3) -> GroupSplit
         LevelSplit("contraction"),
         LevelSplit("pressure"),
     )
+    counts = []
     for split in splits:
-        if len({name for array in split.labels(recordings) for name in array.tolist()}) >= least:
+        count = len({name for array in split.labels(recordings) for name in array.tolist()})
+        if count >= least:
             return split
+        subject = f" of {split.quantity}" if isinstance(split, LevelSplit) else ""
+        counts.append(f"{counted(count, split.group_name)}{subject}")
+    origin = recordings[0].origin if recordings else "no recording"
     raise IdentificationError(
-        f"{least} groups or more are needed, but there are fewer than {least} specimens, runs,"
-        " levels of contraction and levels of pressure. Measure at more levels."
+        HintedText(
+            f"{origin}: cross-validation leaves out one of {least} groups or more in turn, but the"
+            f" recordings have {', '.join(counts)} (a sweep without a gap is one level). Give more"
+            " runs, or hold the pressure or the length at more levels.",
+            Hint("To leave out parts of each run", "leave_out", BlockSplit()),
+        )
     )

@@ -12,6 +12,7 @@ from ...core import HintedText, IdentificationError, check_known
 from ...engine.processes import Workers
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
+from ..checks import DataUse, support_of
 from ..reported import Reported
 from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, score_candidates
 from .candidates import Candidate, ExcludedModel, started_candidates
@@ -298,9 +299,11 @@ def compare(
     fewer than six groups (chosen) the standard error is uncertain, and a simpler law is preferred
     only where AICc on the rows of the fit does not exclude it. A law that pulls where a muscle was
     measured slack, and no measured force contradicts it, is not recommended. Raises
-    IdentificationError where no candidate is determined.
+    IdentificationError where the data cannot compare laws (`support_of`), or no candidate is
+    determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    support_of(runs).check(DataUse.COMPARISON)
     splits = (leave_out or default_split(runs),)
     (comparison,) = compare_splits(
         runs, candidates, splits, loss=loss, workers=workers, progress=progress

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ...core import Array, Hint, HintedText, IdentificationError, ParameterError, one_line, tree
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
-from ..checks import find_suspicious
+from ..checks import find_suspicious, support_of
 from ..checks.contractions import MAX_CONTRACTION
 from ..segment.runs import RIPPLE_BAND
 from .branch_residuals import branch_distance, branch_notes
@@ -100,13 +100,18 @@ def fit(
 
     Residuals are taken in the quantity that the law gives (force, contraction or pressure), and the
     parameters stay within their declared bounds. Raises IdentificationError where the data do not
-    determine the parameters, and names these.
+    determine the parameters, and names these; first the cause in the data, if they have one
+    (`support_of`).
     """
     check_arguments(law, recordings)
     points = FitPoints.from_recordings(recordings)
     try:
         return fit_to_points(law, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
     except IdentificationError as error:
+        support = support_of(points.recordings)
+        if support.cause is not None:
+            refusal = HintedText(support.refusal, " ", error.message)
+            raise IdentificationError(refusal, cause=support.cause.name) from None
         # What the recordings show without a law may be the cause; `read` has stated the rest.
         known = find_suspicious(points.recordings)
         remarks = [

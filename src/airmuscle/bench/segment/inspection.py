@@ -81,14 +81,17 @@ def inspect_all(recordings: Sequence[Recording]) -> tuple[Inspection, ...]:
 
 def check_contents(recordings: Sequence[Recording]) -> None:
     """Raise ColumnError where a recording contradicts its file, or where a single recording
-    contains no variation.
+    contains no variation. What the rows of pressure, contraction and force support is judged by
+    what uses them (`support_of`).
     """
     sensors = estimate_sensors(recordings) if recordings else {}
     for recording in recordings:
         runs = find_runs(
             recording, {name: s for name, s in sensors.items() if name in recording.columns}
         )
-        if len(recordings) == 1 or all(run.kind != AT_REST for run in runs):
+        is_at_rest = any(run.kind == AT_REST for run in runs)
+        is_judged = all(name in recording for name in ("pressure", "contraction", "force"))
+        if not is_at_rest or (len(recordings) == 1 and not is_judged):
             check_swept(recording, runs)
 
 

@@ -177,8 +177,7 @@ def campaign(
     chapters = [result.chapter(unread, named, validation), *campaign_chapters(result, entry)]
     notes = []
     if entry is None and isinstance(result.static, LeftOutStage):
-        reason = f"{result.static.reason}; {result.static.remedy}"
-        notes.append(f"muscle: not written, because it needs a static law: {reason}")
+        notes.append("muscle: not written, because it needs a static characteristic")
     if scenarios and not any(scenario.text for scenario in scenarios):
         notes.append(
             f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}"

@@ -11,6 +11,7 @@ import typer
 
 import airmuscle as am
 
+from ...bench.checks import level_tables
 from ...bench.readers import ColumnMapping, Decimation, RecordedTime, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
@@ -114,9 +115,15 @@ def inspect(
     )  # stamps that repeat or decrease are shown
     with progress_bars() as progress:
         recordings = read(files, reading.column_mapping(unordered), progress=progress)
+    tables = level_tables(recordings)
+    levels = (
+        [Chapter("level-records", "Isometric and isobaric records", "", tables=tables)]
+        if tables
+        else []
+    )
     deliver(
         "inspect",
-        inspection_chapters(inspect_all(recordings)),
+        [*inspection_chapters(inspect_all(recordings)), *levels],
         json=json,
         out=out,
         title="Inspection",

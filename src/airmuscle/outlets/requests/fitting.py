@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...bench.checks import DataUse, support_of
 from ...bench.identify import (
     UNCENSORED,
     Fit,
@@ -76,6 +77,8 @@ def fit_requested(
     if request.compare:
         return _compare(request, names, recordings, progress, workers)
     assert request.characteristic is not None
+    if not request.uncensored:  # else forces of zero and below are measured values
+        support_of(recordings).check(DataUse.FIT)
     initial, scaling = find_initial_law(request.characteristic, recordings, request.degree)
     start = with_braid(initial, request.braid, recordings)
     law = start.characteristic

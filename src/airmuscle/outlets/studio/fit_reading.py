@@ -10,6 +10,7 @@ from pathlib import Path
 
 import airmuscle as am
 
+from ...bench.checks import DataUse, support_of
 from ...bench.readers.channels import RawTable
 from ...bench.readers.constants import parse_constant_name, split_specimens
 from ...bench.readers.interpret import interpret, resolve_headings, unit_conversion
@@ -97,6 +98,7 @@ def read_set(folder: Path, settings: FitSettings) -> ReadSet:
     if not read.problems and read.recordings:
         try:
             check_contents(read.recordings)
+            support_of(read.recordings).check(DataUse.FIT)
         except AirmuscleError as error:
             read.complain(error, "files")
     return read

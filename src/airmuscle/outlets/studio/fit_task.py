@@ -17,6 +17,7 @@ import numpy as np
 
 import airmuscle as am
 
+from ...bench.checks import DataUse, support_of
 from ...bench.identify.compare_chapter import LawSelection
 from ...bench.identify.hysteresis import (
     LoopFit,
@@ -134,6 +135,7 @@ def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording]
     recordings = selected(read.recordings, settings.rules, read.outliers)
     try:
         check_contents(recordings)
+        support_of(recordings).check(DataUse.FIT)
     except AirmuscleError as error:
         raise as_field_error(error, "rules" if settings.rules else "files") from None
     return recordings, [Path(name) for name in dict.fromkeys(read.files)]

@@ -11,6 +11,7 @@ from ....core import AirmuscleError, IdentificationError
 from ....engine.processes import Workers, process_pool
 from ....physics import CreepElements, Geometry, NoFriction, ValidityRange
 from ....recording import Recording
+from ...checks import DataUse, support_of
 from ..data_checks import level_text
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN
@@ -52,11 +53,16 @@ def identify_campaign(
     workers   number of processes, as in `compare`: of the fits of loops and of the candidates of
               the static law
 
-    Raises IdentificationError where no record can be used.
+    Raises IdentificationError where no record can be used, with the cause in the data if there is
+    one (`support_of`).
     """
     steps = _Steps(progress, finished, known or {})
     records = classify_records(named(recordings))
-    if all(record.kind is RecordKind.UNUSED for record in records):
+    support = support_of(recordings)
+    is_unused = [record.kind is RecordKind.UNUSED for record in records]
+    if all(record.kind.is_static or record.kind is RecordKind.UNUSED for record in records):
+        support.check(DataUse.FIT)
+    if all(is_unused):
         reasons = (
             "; ".join(f"{record.origin}: {record.reason}" for record in records)
             or "there is no recording"

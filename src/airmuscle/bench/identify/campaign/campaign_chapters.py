@@ -1,5 +1,5 @@
-"""Report chapters of a campaign beside its overview: next experiments, muscle, and a part for each
-stage.
+"""Report chapters of a campaign beside its overview: records at one level, muscle, and a part for
+each stage.
 """
 
 import dataclasses
@@ -21,6 +21,7 @@ from ....core import (
 )
 from ....physics import CreepElements
 from ....report import Chapter, Plot, Table, TableColumn, as_data
+from ...checks import level_tables
 from ...segment import level_intervals
 from ..compare_chapter import compare_chapter
 from ..data_checks import level_text
@@ -30,7 +31,6 @@ from ..dynamic.dynamic_chapter import (
     residual_panels,
     running_extreme,
 )
-from ..experiment_design import run_table
 from ..hysteresis import loops_not_joined
 from ..hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ..static_fit_chapter import MuscleDescription, fit_chapter
@@ -44,7 +44,6 @@ from . import (
     ReleaseStage,
     StaticStage,
 )
-from .result import MAX_NEXT
 from .transient import thinned_rows
 
 
@@ -66,7 +65,14 @@ def campaign_chapters(campaign: Campaign, entry: MuscleDescription | None) -> li
     )
     chapters = [muscle, *(chapter for stage in stages for chapter in stage_chapters(stage, entry))]
     parts = [dataclasses.replace(chapter, brief=False) for chapter in chapters]
-    return [_next(campaign), *parts]
+    tables = level_tables(
+        [record.recording for record in campaign.records if record.kind.is_static]
+    )
+    text = "What the records show without a law."
+    records = Chapter("level-records", "Isometric and isobaric records", text, tables=tables)
+    is_brief = not isinstance(campaign.static, StaticStage)
+    levels = [dataclasses.replace(records, brief=is_brief)] if tables else []
+    return [*levels, *parts]
 
 
 def stage_chapters(stage: object, entry: MuscleDescription | None = None) -> list[Chapter]:
@@ -108,31 +114,6 @@ def stage_data(name: str, stage: object) -> dict[str, Any]:
     if isinstance(stage, tuple):
         return data | {"count": len(stage)}
     return data | {"identified": True, **as_data(stage_chapters(stage))}
-
-
-def _next(campaign: Campaign) -> Chapter:
-    """Return the chapter of the next experiments."""
-    experiments = campaign.next_experiments
-    columns = {
-        "measure": [each.measure for each in experiments],
-        "because of": TableColumn([each.purpose for each in experiments], brief=False),
-    }
-    tables = (
-        [Table("campaign-next", "Experiments", columns, brief=MAX_NEXT, key="experiments")]
-        if experiments
-        else []
-    )
-    title = "D-optimal static runs to measure next"
-    plans = [each.plan for each in experiments if each.plan is not None]
-    tables += [
-        dataclasses.replace(run_table(plan.runs, "campaign-plan", title), brief=0)
-        for plan in plans[:1]
-    ]
-    summary = (
-        "Missing stages first, then parameters that the records do not determine, then further"
-        " static runs."
-    )
-    return Chapter("campaign-next", "What to measure next", summary, tables=tuple(tables))
 
 
 def creep_chapter(

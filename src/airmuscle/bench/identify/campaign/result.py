@@ -3,7 +3,7 @@ overview of them.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from ....recording import Recording
 from ....report.chapter import Chapter, Table, TableColumn
 from ...reported import Reported
 from ..compared_points import law_of_length
-from ..experiment_design import ExperimentPlan
+from ..experiment_design import ExperimentPlan, run_table
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
 from .friction_and_release import FrictionStage, ReleaseStage, predicted_force
@@ -204,8 +204,7 @@ class Campaign(Reported):
         sentences += [f"{counted(len(unread), 'file')} could not be read."] if unread else []
         names = ", ".join(name for name, _ in left_out)
         sentences.append(f"Not identified: {names}." if left_out else "All stages are identified.")
-        notes = list(self.static.data_notes) if isinstance(self.static, StaticStage) else []
-        notes += [f"{name}: {stage.reason}; {stage.remedy}" for name, stage in left_out]
+        notes = self.static.data_notes if isinstance(self.static, StaticStage) else ()
         columns: dict[str, Any] = {
             "stage": [name for name, _ in stages],
             "records": [sum(name in USES[record.kind] for record in records) for name, _ in stages],
@@ -227,11 +226,10 @@ class Campaign(Reported):
                 brief=MAX_NEXT,
                 key="unread",
             ),
+            *_next_tables(self.next_experiments),
         )
         tables = tuple(filter(len, tables))
-        return Chapter(
-            "campaign", "Overview", " ".join(sentences), tables=tables, notes=tuple(notes)
-        )
+        return Chapter("campaign", "Overview", " ".join(sentences), tables=tables, notes=notes)
 
 
 def main_length(records: Sequence[CampaignRecord]) -> float | None:
@@ -280,6 +278,25 @@ def stage_result(stage: StageResult) -> str:
         damping = stage.fit["muscle.damper.damping"]
         return f"Damping {damping.value:.3g} N s/m (2 standard errors {damping.format_interval()})."
     return stage.verdict
+
+
+def _next_tables(experiments: Sequence[NextExperiment]) -> Iterator[Table]:
+    """The table of the next experiments, and that of the first plan of static runs."""
+    columns = {
+        "measure": [each.measure for each in experiments],
+        "because of": TableColumn([each.purpose for each in experiments], brief=False),
+    }
+    text = (
+        "Missing stages first, then parameters that the records do not determine, then further"
+        " static runs."
+    )
+    yield Table(
+        "campaign-next", "What to measure next", columns, text, brief=MAX_NEXT, key="experiments"
+    )
+    plan = next((each.plan for each in experiments if each.plan is not None), None)
+    if plan is not None:
+        runs = run_table(plan.runs, "campaign-plan", "D-optimal static runs to measure next")
+        yield dataclasses.replace(runs, brief=0)
 
 
 def _half_widths(rows: Sequence[Any]) -> TableColumn:

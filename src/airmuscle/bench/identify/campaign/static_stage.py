@@ -11,6 +11,7 @@ import numpy as np
 from ....core import AirmuscleError, Array, PhysicsError, ShortRepr, counted
 from ....physics import ChebyshevGeometry, CreepElements, ForceLaw, Friction
 from ....recording import Recording
+from ...checks import support_of
 from ..compared_points import FORCE_MARGIN, force_residuals, law_of_length
 from ..data_checks import check_data
 from ..fit_points import FitPoints
@@ -243,6 +244,9 @@ def fit_static_stage(
     friction and creep forces along the motion of each record are added to the measured force, so
     that the law is that of the muscle without them."""
     slow = [record for record in records if record.kind.is_static]
+    support = support_of([record.recording for record in slow])
+    if support.cause is not None:
+        return LeftOutStage(NAME, support.reason, support.cause.remedy)
     cleaned = {record: rows for record in slow if len(rows := freed_rows(record, friction, creep))}
     if not cleaned:
         remedy = (

@@ -30,10 +30,8 @@ class LeftOutStage:
 
     @property
     def verdict(self) -> str:
-        """The reason and what to measure, as sentences."""
-        return (
-            f"Not identified: {self.reason.rstrip('.')}. To identify it, {self.remedy.rstrip('.')}."
-        )
+        """The reason, as a sentence; what to measure is in the table of the next experiments."""
+        return f"Not identified: {self.reason.rstrip('.')}."
 
 
 MAX_ROWS = 1000

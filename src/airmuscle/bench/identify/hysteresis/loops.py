@@ -13,6 +13,7 @@ from ....physics import Characteristic, Friction, LoopScales
 from ....physics.muscle import friction as laws
 from ....recording import Recording
 from ... import segment
+from ...checks import DataUse, support_of
 from ...segment.resolution import CONTRACTION_BAND, RELATIVE_BAND
 from . import loop_data as data
 from .loop_result import HysteresisLoop, LoopFit
@@ -41,8 +42,10 @@ def find_loops(
     The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or
     `law` with an offset. The fitted rows have a positive force below the limit of the sensor and,
     unless `all_rows`, are quasi-static. Raises IdentificationError if no run gives a loop: each has
-    one branch, or is neither isobaric nor isometric while no characteristic is given.
+    one branch, or is neither isobaric nor isometric while no characteristic is given; and where the
+    rows support no fit (`support_of`).
     """
+    support_of(recordings).check(DataUse.FIT)
     sensors = segment.estimate_sensors(recordings)
     loops = list[HysteresisLoop]()
     muscles = list[Sequence[object]]()

@@ -22,6 +22,7 @@ from ....engine.run.integrators import Integrator, Rodas4
 from ....physics import Characteristic, CreepElements, ForceLaw, Friction, NoFriction, ValidityRange
 from ....recording import Recording
 from ....recording.columns import displayed
+from ...checks import DataUse, support_of
 from ...segment import Mask, rate_of_change
 from .. import dynamic
 from ..campaign.friction_and_release import predicted_force
@@ -73,8 +74,10 @@ def predict_static(
                     likely reason where far fewer than 95 % of the rows are within the band
 
     Rows without tension are compared where the predicted force exceeds the half width, or 0 without
-    one. Raises ColumnError for a recording without these columns or without tension.
+    one. Raises ColumnError for a recording without these columns, IdentificationError where its
+    rows are not those of a pulling muscle (`support_of`).
     """
+    support_of([recording]).check(DataUse.PREDICTION)
     complete, tension = _rows_with_tension(recording)
     quantity = fitted_quantity_of(law)
     remarks = list[str]()
@@ -128,7 +131,7 @@ def predict_static(
 
 def _rows_with_tension(recording: Recording) -> tuple[Mask, Mask]:
     """Masks (N,) of the complete rows, and of those with tension. Raises ColumnError without
-    columns or tension.
+    columns.
     """
     missing = [name for name in COLUMNS if name not in recording]
     if missing:
@@ -139,13 +142,7 @@ def _rows_with_tension(recording: Recording) -> tuple[Mask, Mask]:
             hint=by_length if missing == ["contraction"] else None,
         )
     complete = np.isfinite(sum(recording[name] for name in COLUMNS))
-    tension = (recording["force"] > 0.0) & complete
-    if not tension.any():
-        raise ColumnError(
-            f"{recording.origin}: no row has a positive force, so that no prediction can be"
-            " compared; a force of tension is positive."
-        )
-    return complete, tension
+    return complete, (recording["force"] > 0.0) & complete
 
 
 LIMIT_MARGIN = 1e-3
