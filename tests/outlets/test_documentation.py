@@ -14,6 +14,8 @@ import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
 
+import make_front_figure
+import numpy as np
 import printed
 import pytest
 import typer
@@ -25,9 +27,13 @@ from book.docstrings import to_markdown
 from book.formulas_in_text import markdown
 from book.search_index import page_rows
 from book.sources import COPIED, index, site_text
+from code_blocks import alternatives, python_blocks
+from matplotlib.image import imread as image_of
 
 import airmuscle
+from airmuscle.bench import write
 from airmuscle.core import parameters
+from airmuscle.core.plotting import save
 from airmuscle.files.library import model_class, model_names
 from airmuscle.outlets.cli import COMMANDS, app
 from airmuscle.report import to_display_mathml
@@ -264,6 +270,58 @@ def test_the_first_figure_of_the_gallery_is_made():
 @pytest.mark.parametrize("example", gallery.examples(), ids=lambda each: each.title)
 def test_every_figure_of_the_gallery_is_made(example: gallery.Example):
     assert gallery.figure_of(example).axes
+
+
+# Code of the pages
+
+
+def test_an_alternative_in_a_comment_replaces_the_value_that_it_follows():
+    block = 'a = f(\n    1\n)  # or g("x", b=2)\nc = a  # or simply the same\nd = h(a)\n'
+    assert alternatives(block) == ['a = g("x", b=2)\nc = a  # or simply the same\nd = h(a)\n']
+
+
+@pytest.mark.parametrize(
+    ("page", "block"),
+    [
+        pytest.param(page, block, id=page.name)
+        for page in (DOCS / "book" / "index.md", ROOT / "README.md", *documents())
+        for text in python_blocks(page)
+        for block in alternatives(text)
+    ],
+)
+def test_code_in_comments_runs_as_the_code_beside_it(page: Path, block: str, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(airmuscle.load_data("dmsp-20-300"), Path("bench.csv"))
+    exec(compile(block, page.name, "exec"), {})
+
+
+def test_the_first_page_and_the_readme_give_an_alternative_in_a_comment():
+    for page in (DOCS / "book" / "index.md", ROOT / "README.md"):
+        assert any(map(alternatives, python_blocks(page)))
+
+
+@pytest.mark.drawn
+def test_the_picture_of_the_first_page_is_what_its_block_draws(tmp_path: Path):
+    """The same picture in squares of 8 by 8 pixels, whose mean brightness differs by a few per cent
+    between versions of the fonts."""
+    save(make_front_figure.first_figure(), tmp_path / "drawn.png")
+    pictures = [brightness(path) for path in (tmp_path / "drawn.png", make_front_figure.PICTURE)]
+    assert pictures[0].shape == pictures[1].shape
+    assert np.abs(pictures[0] - pictures[1]).mean() < 0.01
+    assert np.corrcoef(pictures[0].ravel(), pictures[1].ravel())[0, 1] > 0.9
+    text = (DOCS / "book" / "index.md").read_text(encoding="utf-8")
+    block = text.index("```python")
+    image = re.search(r"!\[[^]]*\]\(([^)]+)\)", text[block:])
+    assert image is not None
+    assert DOCS / image[1] == make_front_figure.PICTURE
+
+
+def brightness(path: Path, size: int = 8) -> np.ndarray:
+    """The mean brightness of squares of pixels, from 0 to 1."""
+    pixels = image_of(path)[..., :3].mean(axis=2)
+    rows, columns = (length // size * size for length in pixels.shape)
+    squares = pixels[:rows, :columns].reshape(rows // size, size, columns // size, size)
+    return squares.mean(axis=(1, 3))
 
 
 # Site

@@ -7,6 +7,7 @@ is rejected with its name. Very long files are downsampled in bounded memory, wi
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 import re
 import sys
@@ -17,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import airmuscle as am
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, RecordedTime, read
 from airmuscle.bench.readers import (
     Selection,
@@ -1032,3 +1034,51 @@ def test_a_message_quotes_little_of_hostile_text(tmp_path, cell, place):
     with pytest.raises(ColumnError) as caught:
         read(path)
     assert len(str(caught.value)) <= 700
+
+
+# Fields of a mapping as arguments
+
+
+def readers_with_a_mapping() -> list[str]:
+    """The public functions and classes of the face that take a ColumnMapping."""
+    names = []
+    for name in am.bench.__all__:
+        reader = getattr(am.bench, name)
+        if callable(reader):
+            mapping = inspect.signature(reader).parameters.get("mapping")
+            is_taken = mapping is not None and "ColumnMapping" in str(mapping.annotation)
+            names += [name] * is_taken
+    return names
+
+
+def test_every_reader_takes_the_fields_of_a_mapping(tmp_path: Path):
+    pandas = pytest.importorskip("pandas")
+    path = tmp_path / "bench.csv"
+    path.write_text("pressure [kPa],length [mm],force [N]\n100,270,50\n200,260,90\n")
+    calls = {
+        "read": lambda **fields: am.read(path, **fields)[0]["contraction"],
+        "read_csv": lambda **fields: am.read_csv(path, **fields)["contraction"],
+        "from_pandas": lambda **fields: am.bench.from_pandas(pandas.read_csv(path), **fields)[
+            "contraction"
+        ],
+        "RowReader": lambda **fields: second_row(path, **fields),
+    }
+    assert sorted(calls) == sorted(readers_with_a_mapping())
+    by_argument = inspect.signature(am.ColumnMapping).parameters
+    for call in calls.values():
+        expected = call(mapping=am.ColumnMapping(resting_length=0.3))
+        assert expected == pytest.approx(call(resting_length="300 mm"))
+        stated = am.ColumnMapping(resting_length=0.25)
+        assert expected == pytest.approx(call(mapping=stated, resting_length=0.3))
+        for name in by_argument:
+            call(
+                **{"resting_length": 0.3, name: getattr(am.ColumnMapping(resting_length=0.3), name)}
+            )
+        with pytest.raises(ParameterError, match=r"no field 'resting_lenght'.*'resting_length'"):
+            call(resting_lenght=0.3)
+
+
+def second_row(path: Path, **fields) -> float:
+    reader = am.bench.RowReader("bench", **fields)
+    rows = [reader.read(line) for line in path.read_text().splitlines(keepends=True)]
+    return rows[-1]["contraction"]

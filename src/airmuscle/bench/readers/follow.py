@@ -42,18 +42,21 @@ class RowReader:
 
     mapping  columns, units, constants and `skip_rows` of the stream; nothing else of a mapping
              applies to one
+    fields   fields of the mapping, as in `read`
 
     `skipped` counts rows that could not be read, such as damaged lines. `notes` are those of
     `read_csv` on units.
     """
 
-    def __init__(self, origin: str, mapping: ColumnMapping = ColumnMapping()) -> None:
+    def __init__(
+        self, origin: str, mapping: ColumnMapping = ColumnMapping(), **fields: Any
+    ) -> None:
         if not isinstance(mapping, ColumnMapping):
             raise ParameterError(
                 f"RowReader: mapping must be a ColumnMapping; it is {abridged(mapping)}."
             )
         self.origin = origin
-        self.mapping = mapping
+        self.mapping = mapping.with_fields(fields)
         self.skipped = 0
         self.notes: tuple[str, ...] = ()
         self._names = {str(key): heading for key, heading in mapping.columns.items()}

@@ -120,6 +120,14 @@ class ColumnMapping:
     missing: MissingValues = RefuseMissing()
     drop_outliers: bool = False
 
+    def with_fields(self, fields: Mapping[str, Any]) -> "ColumnMapping":
+        """This mapping with other values of the named fields. Raises ParameterError for a name that
+        is no field.
+        """
+        names = [field.name for field in dataclasses.fields(self)]
+        check_known("ColumnMapping has no field", fields, names, "it has")
+        return dataclasses.replace(self, **fields)
+
     def __post_init__(self) -> None:
         check_field_types(self)
         for name in set(STATED) & set(self.constants):

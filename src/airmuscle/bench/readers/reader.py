@@ -5,8 +5,9 @@ gives the format.
 import dataclasses
 import glob
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from ...core import FileError, ParameterError, abridged, printable
 from ...recording.recording import Recording
@@ -33,6 +34,7 @@ def read(
     *,
     downsampling: Downsampling = Decimation(),
     progress: Progress | None = None,
+    **fields: Any,
 ) -> tuple[Recording, ...]:
     """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in
     SI units; `-` is a table of text on the standard input, which may be a pipe.
@@ -41,6 +43,7 @@ def read(
                   mm")`, or a TOML file
     downsampling  reduction of very long files, which a note reports
     progress      called with the name of a file and the fraction that has been read
+    fields        fields of the mapping, `resting_length="300 mm"`, in place of those of `mapping`
 
     The extension gives the format: text (CSV), LVM, Excel, OpenDocument, MAT, TDMS, MDF, Parquet or
     HDF5. A load in kg becomes a force with standard gravity. Files whose units contradict each
@@ -49,7 +52,7 @@ def read(
     Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value
     and remedy.
     """
-    mapping = _as_mapping(mapping)
+    mapping = _as_mapping(mapping, fields)
     recordings = [
         each
         for path in find_files(source)
@@ -58,8 +61,11 @@ def read(
     return tuple(complete_bench(recordings, mapping))
 
 
-def read_csv(path: str | Path, mapping: str | Path | ColumnMapping = ColumnMapping()) -> Recording:
-    """Read one text file, of any extension, as one Recording in SI units; `mapping` as in `read`.
+def read_csv(
+    path: str | Path, mapping: str | Path | ColumnMapping = ColumnMapping(), **fields: Any
+) -> Recording:
+    """Read one text file, of any extension, as one Recording in SI units; `mapping` and `fields` as
+    in `read`.
 
     Each column heading states the unit (`pressure [kPa]`, `p / bara`, `length_mm`), or a row of
     units follows the headings. Delimiter (comma, semicolon, tab), decimal comma, encoding and
@@ -70,18 +76,19 @@ def read_csv(path: str | Path, mapping: str | Path | ColumnMapping = ColumnMappi
     Raises FileError, ColumnError, UnitError or ParameterError; the message names file, line, value
     and remedy.
     """
-    mapping = _as_mapping(mapping)
+    mapping = _as_mapping(mapping, fields)
     table = apply_mapping(read_csv_table(path, mapping.text_format), mapping)
     return interpret(table, mapping, mapping.constants_of(Path(path)))
 
 
-def _as_mapping(mapping: str | Path | ColumnMapping) -> ColumnMapping:
+def _as_mapping(mapping: str | Path | ColumnMapping, fields: Mapping[str, Any]) -> ColumnMapping:
     if not isinstance(mapping, str | Path | ColumnMapping):
         raise ParameterError(
             f"mapping is {abridged(mapping)}; it must be a ColumnMapping or the path of a mapping"
             ' file (TOML), such as mapping=ColumnMapping(resting_length="300 mm").'
         )
-    return mapping if isinstance(mapping, ColumnMapping) else read_mapping(mapping)
+    stated = mapping if isinstance(mapping, ColumnMapping) else read_mapping(mapping)
+    return stated.with_fields(fields)
 
 
 def read_file(

@@ -127,15 +127,20 @@ EXTENSIONS = tuple(_WRITERS)
 
 
 def from_pandas(
-    frame: Any, mapping: ColumnMapping = ColumnMapping(), *, origin: str = "data frame"
+    frame: Any,
+    mapping: ColumnMapping = ColumnMapping(),
+    *,
+    origin: str = "data frame",
+    **fields: Any,
 ) -> Recording:
     """A recording of a pandas.DataFrame, by the rules for files: `pressure [bar]` is converted to
-    SI units.
+    SI units; `mapping` and `fields` as in `read`.
 
     An index with a name, or each named level, becomes a column, such as `time [s]`. Dates are
     counted in seconds from the first. Raises ParameterError for another type, ColumnError or
     UnitError as `read`.
     """
+    mapping = mapping.with_fields(fields)
     if (
         not hasattr(frame, "columns")
         or not hasattr(frame, "index")
