@@ -26,8 +26,8 @@ FORCE = "force [N]"
 
 @dataclasses.dataclass(frozen=True)
 class Muscle:
-    """True law of a laboratory: F = pi r0^2 p (a (1 - k eps)^2 - b) - elasticity eps, not below
-    0.
+    """True law of a laboratory: F = pi r0^2 p (a (1 - k eps)^2 - b) - elasticity eps + wall, not
+    below 0; `wall` is the tension of a neo-Hookean tube that follows the braid.
     """
 
     radius: float = 0.011
@@ -35,13 +35,32 @@ class Muscle:
     k: float = 1.15
     elasticity: float = 400.0
     friction: float = 8.0
+    wall: float = 0.0
+    """Shear modulus times the cross section of the wall [N]."""
+
+    def wall_force(self, contraction: np.ndarray) -> np.ndarray:
+        """The tension [N] of the wall, dU/dL of U = wall L0/2 (l1^2 + l2^2 + l3^2 - 3), where l1 is
+        the axial stretch, l2 that around, of the braid, and l1 l2 l3 = 1; 0 at rest.
+        """
+        axial = 1.0 - contraction
+        ratio = 1.0 / np.tan(self.angle) ** 2
+        around = 1.0 + ratio * (1.0 - axial**2)  # l2^2
+        slope = -2.0 * axial * ratio
+        return (
+            0.5
+            * self.wall
+            * (2.0 * axial + slope - 2.0 / (axial**3 * around) - slope / (axial * around) ** 2)
+        )
 
     def force(self, pressure: np.ndarray, contraction: np.ndarray) -> np.ndarray:
         a = 3.0 / np.tan(self.angle) ** 2
         b = 1.0 / np.sin(self.angle) ** 2
         shape = a * (1.0 - self.k * contraction) ** 2 - b
         return np.maximum(
-            np.pi * self.radius**2 * pressure * shape - self.elasticity * contraction, 0.0
+            np.pi * self.radius**2 * pressure * shape
+            - self.elasticity * contraction
+            + self.wall_force(contraction),
+            0.0,
         )
 
 

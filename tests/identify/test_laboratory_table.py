@@ -43,6 +43,8 @@ from airmuscle.errors import AirmuscleError, AirmuscleWarning
 MAX_ERROR = 0.02
 INVISIBLE = "no data can show it"
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
+WALLED = dataclasses.replace(MUSCLE, elasticity=0.0, wall=60.0)
+WALLED_GREATEST = float(WALLED.force(np.array(6e5), np.array(0.0)))
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
 ROUGH = dataclasses.replace(MUSCLE, friction=60.0)
 
@@ -112,6 +114,14 @@ def unequal() -> dict[str, Table]:
     return {name: {h: v[kept[name]] for h, v in table.items()} for name, table in ramps().items()}
 
 
+def pulling(muscle: Muscle = WALLED, most: float = 0.14) -> dict[str, Table]:
+    """Sweeps that end before the muscle is slack."""
+    return {
+        name: {h: v[table[LENGTH] > 1e3 * RESTING_LENGTH * (1.0 - most)] for h, v in table.items()}
+        for name, table in sweeps(muscle).items()
+    }
+
+
 def fast(muscle: Muscle = FRICTIONLESS, delay: float = 0.0) -> dict[str, Table]:
     return ramps(muscle, duration=1.0, sample_time=0.005, delay=delay)
 
@@ -162,6 +172,17 @@ VARIANTS: dict[str, Variant] = {
     ),
     "07e ramps absolute": Variant(
         lambda: changed(ramps(), PRESSURE, lambda p: p + ATMOSPHERE), "may be absolute"
+    ),
+    "07f walled muscle, isobars absolute": Variant(
+        lambda: changed(pulling(), PRESSURE, lambda p: p + ATMOSPHERE), "are probably absolute"
+    ),
+    "07g walled muscle, isobars absolute in psi": Variant(
+        lambda: renamed(
+            changed(pulling(), PRESSURE, lambda p: p + ATMOSPHERE),
+            {PRESSURE: "pressure [psi]"},
+            {PRESSURE: 1 / 6.894757293},
+        ),
+        "are probably absolute",
     ),
     "08 load in kg": Variant(lambda: renamed(sweeps(), {FORCE: "load [kg]"}, {FORCE: 1 / 9.80665})),
     "08b load in g": Variant(
@@ -227,6 +248,13 @@ VARIANTS: dict[str, Variant] = {
     "13f force zero -60 N, ramps": Variant(
         lambda: changed(ramps(), FORCE, lambda f: f - 60.0), "zero|offset"
     ),
+    "13g walled muscle, force zero +3 %": Variant(
+        lambda: changed(pulling(), FORCE, lambda f: f + 0.03 * WALLED_GREATEST),
+        "zero of the force sensor",
+    ),
+    "13h walled muscle, force zero -4 %": Variant(
+        lambda: changed(sweeps(WALLED), FORCE, lambda f: f - 0.04 * WALLED_GREATEST), "zero of the"
+    ),
     "14 delay of 40 ms": Variant(lambda: fast(delay=0.04), "delay between the sensors"),
     "14b drift, outliers, rounding": Variant(
         lambda: with_glitches(
@@ -257,12 +285,25 @@ VARIANTS: dict[str, Variant] = {
         )
     ),
     "15h psi under kPa": Variant(
-        lambda: changed(sweeps(), PRESSURE, lambda p: p / 6.894757), INVISIBLE
+        lambda: changed(sweeps(), PRESSURE, lambda p: p / 6.894757), "The unit of force or pressure"
+    ),
+    "15j psi under kPa, ramps": Variant(
+        lambda: changed(ramps(WALLED), PRESSURE, lambda p: p / 6.894757),
+        "The unit of force or pressure",
+    ),
+    "15k kN under N": Variant(
+        lambda: changed(sweeps(WALLED), FORCE, lambda f: f / 1e3), "The unit of force or pressure"
     ),
     "15i kgf under N": Variant(lambda: changed(sweeps(), FORCE, lambda f: f / 9.80665), INVISIBLE),
     "16 points by hand": Variant(by_hand),
     "17 resting length 3 % too long": Variant(
         sweeps, INVISIBLE, {"resting_length": 1.03 * RESTING_LENGTH}
+    ),
+    "17b length under pressure for the resting length": Variant(
+        sweeps, "not the length under pressure", {"resting_length": 0.9 * RESTING_LENGTH}
+    ),
+    "17c resting length of another muscle": Variant(
+        sweeps, "Check the resting length", {"resting_length": 1.2 * RESTING_LENGTH}
     ),
     "18 time restarts": Variant(
         lambda: {
@@ -283,6 +324,7 @@ QUICK = (
     "01 isobaric sweeps",
     "02 isometric ramps",
     "11b two muscles, 1 and 2",
+    "07f walled muscle, isobars absolute",
     "14 delay of 40 ms",
     "16 points by hand",
 )

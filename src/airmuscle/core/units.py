@@ -254,6 +254,9 @@ def _angle_factor(given: Any, wanted: Any, unit: str, target: str, where: str) -
     """
     counted = _counted(given)
     expected = _counted(wanted)
+    cycles = sum(power for name, power in given._units.items() if name.endswith("hertz"))
+    if cycles == -1 and not counted and expected == {"radian": -1}:  # per cycle per second
+        return 1.0 / (2.0 * math.pi)
     if counted == expected or (not counted and expected == {"radian": -1}):
         return 1.0
     if counted == {"radian": 1} and target == "Hz":

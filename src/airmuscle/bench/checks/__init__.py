@@ -36,6 +36,7 @@ CHECKS: tuple[BenchCheck, ...] = (
     pressures.check_force_signs,
     pressures.check_force_zero,
     contractions.check_contraction_signs,
+    contractions.check_resting_length,
     contractions.check_contraction_limit,
     contractions.check_length_and_contraction,
     contractions.check_elongation,

@@ -35,6 +35,11 @@ MIN_RANGE = 0.05
 """Minimum number of contractions whose lines of force over pressure show a zero, and their minimum
 range (chosen).
 """
+REST_DEGREE = 3
+MIN_REST_LINES = 6
+MAX_REST_DISTANCE = 0.05
+"""Degree in the contraction by which such lines are extrapolated to zero contraction, the minimum
+number of lines, and the maximum contraction of the first (chosen)."""
 LEVELS = 8
 """Number of intervals of the contraction, with equal numbers of rows, in which force is taken as
 linear in pressure.
@@ -154,6 +159,42 @@ class PressureLine(NamedTuple):
     def zero_force_pressure(self) -> float:
         """The pressure [Pa] at which the line gives no force."""
         return -self.intercept / self.slope
+
+
+class RestLine(NamedTuple):
+    """The line of force over pressure at zero contraction, where a wall of rubber has no force: the
+    lines at the measured contractions, extrapolated. Beside zero contraction the wall moves the
+    intercept, so that only here it shows the zeros of the sensors."""
+
+    intercept: float
+    """Force at zero pressure [N]."""
+    slope: float
+    """Slope [N/Pa]."""
+    error: float
+    """Standard error of the intercept [N]."""
+
+    @property
+    def zero_force_pressure(self) -> float:
+        """The pressure [Pa] at which the line gives no force."""
+        return -self.intercept / self.slope
+
+
+def rest_line(lines: Sequence[PressureLine]) -> RestLine | None:
+    """The line at zero contraction, by polynomials of intercept and slope over the contraction;
+    None where the lines are too few, or too far from it.
+    """
+    if len(lines) < MIN_REST_LINES or lines[0].contraction > MAX_REST_DISTANCE:
+        return None
+    contraction = np.array([line.contraction for line in lines])
+    matrix = np.vander(contraction, REST_DEGREE + 1, increasing=True)
+    observed = np.array([[line.intercept, line.slope] for line in lines])
+    values = np.linalg.lstsq(matrix, observed, rcond=None)[0]
+    rest = observed[:, 0] - matrix @ values[:, 0]
+    scatter = float(rest @ rest) / (contraction.size - matrix.shape[1])
+    errors = np.array([line.error for line in lines])
+    inverse = np.linalg.pinv(matrix)
+    error = np.sqrt(np.sum(inverse[0] ** 2 * np.maximum(errors**2, scatter)))
+    return RestLine(float(values[0, 0]), float(values[0, 1]), float(error))
 
 
 def pressure_lines(rows: BenchRows) -> list[PressureLine]:

@@ -18,6 +18,12 @@ from .pressures import REVERSED
 
 MAX_STRETCH = 0.05
 """Maximum elongation by the resting length (chosen)."""
+STRETCHED_SHARE = 0.05
+"""Minimum share of the rows that pull with a stretched muscle (chosen)."""
+FAR_FROM_REST = 0.12
+LONG_STROKE = 0.33
+"""Least contraction of rows that begin far from the resting length, and contraction beyond which a
+braided muscle hardly pulls (chosen: 25 to 30 % of muscles on sale)."""
 SMALL_CONTRACTION = 0.01
 """Contraction in percent below which the numbers may be ratios (chosen)."""
 NOISE_RANGE = 10.0
@@ -68,6 +74,32 @@ def check_contraction_signs(recordings: Sequence[Recording]) -> Iterator[str]:
                 " only. If these numbers are ratios and not percent, state the unit '1'."
             )
             return
+
+
+def check_resting_length(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A resting length that the rows that pull contradict: a muscle stretched far beyond it, as
+    where the length under pressure was taken for it, or one that begins to shorten far from it and
+    pulls beyond its stroke.
+    """
+    rows = bench_rows(recordings)
+    pulling = rows.pulling.contraction
+    if pulling.size < MIN_LEVEL_ROWS or not rows.greatest > 0:
+        return
+    low, high = limits(pulling)
+    files = file_list([run.origin for run in recordings_with(recordings, *BenchRows._fields)])
+    is_stretched = low < -MAX_STRETCH and np.mean(pulling < -MAX_STRETCH) > STRETCHED_SHARE
+    if is_stretched and -low <= REVERSED * max(high, 0.0):
+        yield (
+            f"{files}: the muscle pulls at contractions down to {100 * low:.3g} %, longer than at"
+            " rest. The resting length is that without pressure and load: check it, and that it is"
+            " not the length under pressure."
+        )
+    elif limits(rows.contraction)[0] > FAR_FROM_REST and high > LONG_STROKE:
+        yield (
+            f"{files}: the muscle pulls at contractions of {100 * low:.3g} to {100 * high:.3g} %,"
+            " but was nowhere near its resting length, and a braided muscle hardly pulls beyond"
+            f" {100 * LONG_STROKE:.3g} %. Check the resting length."
+        )
 
 
 def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:

@@ -10,7 +10,17 @@ import numpy as np
 from ...core import AMBIENT_PRESSURE, Hint, HintedText, UnitError, conversion
 from ...recording.recording import Recording
 from . import bench_rows as of_bench
-from .bench_rows import BenchRows, bench_rows, file_list, limits, pressure_lines, recordings_with
+from .bench_rows import (
+    BenchRows,
+    PressureLine,
+    RestLine,
+    bench_rows,
+    file_list,
+    limits,
+    pressure_lines,
+    recordings_with,
+    rest_line,
+)
 
 ATMOSPHERE = (95e3, 106e3)
 """Range of the lowest pressure that may be the atmosphere [Pa] (chosen)."""
@@ -105,7 +115,17 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
     small = [line.zero_force_pressure for line in lines if line.contraction < limit]
     low, high = ZERO_FORCE_PRESSURES
     least = min(line.zero_force_pressure for line in lines)
-    if len(small) > 1 and low <= least and max(small) <= high:
+    at_rest = rest_line(lines)
+    if at_rest is not None and low <= at_rest.zero_force_pressure <= high:
+        yield HintedText(
+            f"{file_list([each.origin for each in unstated])}: at zero contraction, where the wall"
+            " has no force, the force extrapolates to zero at"
+            f" {at_rest.zero_force_pressure / 1e3:.3g} kPa, near the pressure of the atmosphere"
+            f" ({AMBIENT_PRESSURE / 1e3:.4g} kPa). The pressures are probably absolute, but read as"
+            " gauge.",
+            _STATE,
+        )
+    elif len(small) > 1 and low <= least and max(small) <= high:
         yield HintedText(
             f"{file_list([each.origin for each in unstated])}: the force extrapolates to zero at"
             f" {least / 1e3:.3g} kPa or more at every contraction, {max(small) / 1e3:.3g} kPa or"
@@ -203,10 +223,20 @@ COMPRESSED = 0.3
 """Range of the forces at zero pressure, as a fraction of the lowest force, above which they are no
 offset (chosen).
 """
-AREAS = (1e-7, 5e-2)
-"""Range of the maximum force divided by the highest pressure [m2] (chosen: 1e-5 to 1e-2 of muscles
-on sale).
-"""
+BORES = (5e-3, 80e-3)
+"""Range of the inner diameters of pneumatic muscles [m] (chosen: 5 to 40 mm of those on sale)."""
+RATED_FORCE = 8.0
+"""Force of a muscle near its resting length, over pressure times the area of its bore (chosen: 8.0
+of the rated forces of DMSP-20 and -40 at 600 kPa, 13 of DMSP-10)."""
+USUAL_BORE = 40e-3
+USUAL_PRESSURE = 150e3
+"""Largest bore on sale, and highest pressure of an experiment [Pa] below which a larger one is
+unlikely (chosen: makers permit 600 to 800 kPa)."""
+MIN_REACH = 0.04
+"""Ratio of the force of a muscle that was measured only far from its resting length to that near it
+(chosen)."""
+NEAR_RATED = 0.08
+"""Contraction up to which the force is comparable to the rated one (chosen)."""
 
 
 def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
@@ -236,7 +266,9 @@ def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
 
 
 def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
-    """A maximum force that is too great or too small for the highest pressure."""
+    """A maximum force that no bore of a muscle explains at the highest pressure, or only a bore
+    beyond those on sale at an unusually low pressure.
+    """
     given = recordings_with(recordings, "pressure", "force")
     greatest = _greatest_force(given)
     highest, _ = _highest_pressure(recordings)
@@ -245,14 +277,27 @@ def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
     )
     if greatest <= 0 or highest <= 0 or (highest < 1e3 and not varied):
         return
-    area = greatest / highest
-    if not AREAS[0] <= area <= AREAS[1]:
-        yield (
-            f"the maximum force, {greatest:.4g} N, divided by the highest pressure,"
-            f" {highest / 1e3:.4g} kPa, is {area:.3g} m2; allowed range: {AREAS[0]:g} to"
-            f" {AREAS[1]:g} m2 for pneumatic muscles. The unit of force or pressure is probably"
-            " wrong."
-        )
+    bore = float(np.sqrt(4.0 / np.pi * greatest / (RATED_FORCE * highest)))
+    least, largest = BORES
+    if not _reaches_rest(given):
+        least *= float(np.sqrt(MIN_REACH))
+    is_unlikely = bore > USUAL_BORE and highest < USUAL_PRESSURE
+    if least <= bore <= largest and not is_unlikely:
+        return
+    range_text = f"allowed range: {1e3 * BORES[0]:g} to {1e3 * BORES[1]:g} mm"
+    if is_unlikely and bore <= largest:
+        range_text = f"on sale: up to {1e3 * USUAL_BORE:g} mm, for 600 to 800 kPa"
+    yield (
+        f"the maximum force, {greatest:.4g} N, at the highest pressure, {highest / 1e3:.4g} kPa, is"
+        f" that of a muscle with a bore of {1e3 * bore:.2g} mm ({range_text}). The unit of force or"
+        " pressure is probably wrong."
+    )
+
+
+def _reaches_rest(recordings: Sequence[Recording]) -> bool:
+    """Whether the force was measured near the resting length, or at lengths that are not known."""
+    lengths = recordings_with(recordings, "contraction")
+    return not lengths or min(limits(each["contraction"])[0] for each in lengths) < NEAR_RATED
 
 
 MAX_EXTRAPOLATED = 0.015
@@ -291,9 +336,11 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
             return
     if rows.slack.force.size >= MIN_ROWS:
         return
+    lines: list[PressureLine | RestLine] = [*pressure_lines(rows)]
+    at_rest = rest_line(pressure_lines(rows))
+    lines += [] if at_rest is None else [at_rest]
     offset = max(
-        (line.intercept for line in pressure_lines(rows) if line.intercept > 3.0 * line.error),
-        default=0.0,
+        (line.intercept for line in lines if line.intercept > 3.0 * line.error), default=0.0
     )
     if offset > MAX_EXTRAPOLATED * rows.greatest:
         yield (

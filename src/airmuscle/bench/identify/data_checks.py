@@ -24,9 +24,9 @@ from .matched_rows import match_rows
 from .weighting import Huber
 
 MAX_MISFIT = 3.0
-MIN_MISFIT = 0.02
-"""Residual above which the law does not follow the data: ratio to their scatter and to the maximum
-force (chosen).
+MIN_MISFIT = 0.002
+"""Residual above which the law does not follow the data: ratio to their scatter, and to the maximum
+force, below which it is within the accuracy of load cells (chosen).
 """
 
 
