@@ -251,6 +251,7 @@ ARGUMENTS = {
     "correlation_index": "correlation indices IK and R^2 of a fit",
     "fitted_quantity": "quantity whose residuals are minimised, with its arguments",
     "residual": "residual in the SI unit of the fitted quantity",
+    "fields": "fields of a mapping that replace its own",
     "fixed": "parameters excluded from a fit",
     "force_degree": "degree of a polynomial in force",
     "pressure_degree": "degree of a polynomial in pressure",
