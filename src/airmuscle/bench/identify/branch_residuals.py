@@ -202,6 +202,17 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
     return 0.0 if random else mean
 
 
+def row_directions(run: Recording) -> Array:
+    """The direction (N,) of the motion of each row of a recording: 1 inflating or contracting, -1
+    back, 0 where it is not known.
+    """
+    known, direction, *_ = _branch_bins(run)
+    signs = np.zeros(len(run))
+    if direction.size:
+        signs[known] = direction
+    return signs
+
+
 def branch_notes(
     runs: Sequence[Recording], distance: float, quantity: str, *, delayed: bool = False
 ) -> list[str]:

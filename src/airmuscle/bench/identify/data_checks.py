@@ -28,6 +28,9 @@ MIN_MISFIT = 0.002
 """Residual above which the law does not follow the data: ratio to their scatter, and to the maximum
 force, below which it is within the accuracy of load cells (chosen).
 """
+MIN_UNREPEATABLE = 0.005
+"""Residual above which a difference of repeated runs is named that exceeds the noise by the first
+ratio, as a fraction of the maximum force (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,15 +63,25 @@ class Scatter:
         the middle of two branches. `greatest` is the maximum force of the data [N], `lengths` the
         number of resting lengths that a law without an effect of the length is fitted to."""
         known = [each for each in (self.noise, self.repeatability) if each is not None]
-        expected = max([*known, 0.5 * self.branches], default=0.0)
-        if not known or rmse <= MAX_MISFIT * expected or rmse <= MIN_MISFIT * greatest:
-            return []
+        noise = known[0] if known else 0.0
+        within = max(noise, 0.5 * self.branches)
+        expected = max([*known, within])
         parts = ", ".join(f"{each.name} {each.value:.3g} N" for each in self.values())
+        if not known or rmse <= MAX_MISFIT * within or rmse <= MIN_MISFIT * greatest:
+            return []
+        if rmse > MAX_MISFIT * expected:
+            return [
+                f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the"
+                f" data ({parts}): the law does not follow them. "
+                + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
+                + "Compare other laws, and check the remarks on contradicting or suspicious data."
+            ]
+        if rmse <= MIN_UNREPEATABLE * greatest:
+            return []
         return [
-            f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data"
-            f" ({parts}): the law does not follow them. "
-            + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
-            + "Compare other laws, and check the remarks on contradicting or suspicious data."
+            f"The rms error, {rmse:.3g} N, is {rmse / within:.2g} times the scatter within a run"
+            f" ({parts}): repeated runs differ, and no law follows them all. Check whether another"
+            " muscle, its temperature or a zero has changed between the runs."
         ]
 
 
@@ -81,6 +94,9 @@ class Remarks:
     scatter: Scatter
     delay: SensorDelay | None
     """Delay of the force after the pressure; None without one."""
+    misfit: tuple[str, ...] = ()
+    """The remark that the law does not follow the data, with the causes that explain the residuals;
+    it is among the notes."""
 
 
 MIN_DISTANCE = 0.02

@@ -94,6 +94,13 @@ class Fit(Reported):
         return self._remarks.notes
 
     @property
+    def misfit(self) -> tuple[str, ...]:
+        """The remark that the law does not follow the data, with the causes; empty if it does. It
+        is among the notes.
+        """
+        return self._remarks.misfit
+
+    @property
     def scatter(self) -> Scatter | None:
         """Noise and repeatability of the measured force; None for laws that give contraction or
         pressure.

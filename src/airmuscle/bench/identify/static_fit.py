@@ -20,6 +20,7 @@ from .branch_residuals import branch_distance, branch_notes
 from .data_checks import HELD, Remarks, level_text
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
+from .misfit_causes import causes_text, misfit_causes
 from .pooling import check_poolable, make_pooling, pool, population_of
 from .problem import FORCE, RESTING_LENGTH, FitProblem, evaluate
 from .result import Fit
@@ -238,6 +239,7 @@ def examine(
     own = collect_notes(problem, modelled, measured, by_recording, fit)
     notes = (*checks.notes, *map(str, points.repeated), *own, *branches)
     ranges = fit.data_ranges
+    misfit: tuple[str, ...] = ()
     notes += tuple(
         f"The {name} was measured at one level, {level_text(name, sum(ranges[name]) / 2)}: how the"
         " force depends on it follows from the form of the law, not from the data. Measure other"
@@ -259,8 +261,13 @@ def examine(
     if quantity == FORCE:
         lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
-        notes += tuple(scatter.misfit_notes(fit.rmse, ranges["force"][1], count))
-    return dataclasses.replace(checks, notes=notes, scatter=scatter)
+        by_run = np.split(residuals, ends[:-1])
+        misfit = tuple(
+            f"{note} {causes_text(misfit_causes(points.recordings, by_run))}"
+            for note in scatter.misfit_notes(fit.rmse, ranges["force"][1], count)
+        )
+        notes += misfit
+    return dataclasses.replace(checks, notes=notes, scatter=scatter, misfit=misfit)
 
 
 def _row_notes(problem: FitProblem, measured: int, fit: Fit) -> Iterator[str]:
