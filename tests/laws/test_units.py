@@ -215,3 +215,20 @@ def test_a_text_of_a_hundred_thousand_characters_is_no_unit():
 def test_a_hint_has_the_usual_unit(text: str, target: str, example: str):
     with pytest.raises(UnitError, match=f"write it like '{example}'"):
         units.quantity(text, target)
+
+
+@pytest.mark.parametrize(
+    ("numerator", "target"),
+    [("N m", "N m s/rad"), ("V", "V s/rad"), ("mN m", "N m s/rad"), ("N mm", "N m s/rad")],
+)
+def test_a_coefficient_per_frequency_is_one_per_cycle(numerator: str, target: str):
+    """1/Hz is 1 s/rev, as 1/rpm is: the same coefficient, whichever frequency it refers to."""
+    per_revolution = units.quantity(f"3 {numerator} s/rev", target)
+    assert units.quantity(f"3 {numerator}/Hz", target) == pytest.approx(per_revolution, rel=1e-12)
+    assert units.quantity(f"3 {numerator}/kHz", target) == pytest.approx(
+        per_revolution / 1e3, rel=1e-12
+    )
+    assert units.quantity(f"3 {numerator}/rpm", target) == pytest.approx(
+        60 * per_revolution, rel=1e-12
+    )
+    assert units.quantity("3 N m/Hz", "N m s/rad") == pytest.approx(0.4775, rel=1e-3)
