@@ -47,6 +47,7 @@ def test_two_branches_are_named_with_their_distance_and_the_remedy():
     distance = re.search(r"two branches, ([\d.]+) N apart on average", note)
     assert distance is not None
     assert float(distance[1]) == pytest.approx(78.0, abs=3.0)
+    assert "that of a lag or filter of a sensor grows with the speed" in note
     assert note.endswith("To identify the friction, use bench.fit_hysteresis.")
 
 

@@ -213,6 +213,15 @@ def row_directions(run: Recording) -> Array:
     return signs
 
 
+_BRANCH_CAUSES = (
+    " Friction keeps this distance at any speed; that of a lag or filter of a sensor grows with the"
+    " speed, that of creep with the duration. Repeat a run at another speed before it is taken for"
+    " friction.",
+    Hint("To identify the friction", function="bench.fit_hysteresis"),
+)
+"""What two branches may come from, and what tells the causes apart; not where a delay is known."""
+
+
 def branch_notes(
     runs: Sequence[Recording], distance: float, quantity: str, *, delayed: bool = False
 ) -> list[str]:
@@ -232,11 +241,7 @@ def branch_notes(
         HintedText(
             f"The residuals follow two branches, {text} apart on average"
             f" ({'; '.join(dict.fromkeys(names))}).",
-            *(
-                []
-                if delayed
-                else [Hint("To identify the friction", function="bench.fit_hysteresis")]
-            ),
+            *([] if delayed else _BRANCH_CAUSES),
         )
     ]
 
