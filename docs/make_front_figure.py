@@ -24,10 +24,10 @@ def first_figure() -> Any:
     return eval(figure, names)
 
 
-def main() -> None:
+def main(path: Path = PICTURE) -> None:
     """Write the figure."""
-    save(first_figure(), PICTURE)
-    print(f"wrote {PICTURE}")
+    save(first_figure(), path)
+    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

@@ -17,9 +17,17 @@ import pytest
 from command_line import airmuscle
 
 import airmuscle as am
-from airmuscle.bench import DataUse, compare, find_loops, fit, level_record, support_of
-from airmuscle.bench.identify.campaign import LeftOutStage, identify_campaign
-from airmuscle.bench.identify.cross_validation import default_split
+from airmuscle.bench import (
+    DataUse,
+    LeftOutStage,
+    compare,
+    find_loops,
+    fit,
+    identify_campaign,
+    level_record,
+    support_of,
+)
+from airmuscle.bench.identify import default_split
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
