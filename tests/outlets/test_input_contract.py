@@ -21,6 +21,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+import plants
 import printed
 import pytest
 
@@ -37,7 +38,7 @@ from airmuscle.engine import (
     simulate_batch,
 )
 from airmuscle.errors import AirmuscleError
-from airmuscle.files import load, load_scenario
+from airmuscle.files import load_scenario
 from airmuscle.outlets import (
     C99,
     JavaScript,
@@ -45,13 +46,11 @@ from airmuscle.outlets import (
     OnnxStack,
     TorchStack,
     WarpStack,
-    regulated_plant,
     write_actuator,
     write_fmu,
     write_mujoco_plugin,
     write_program,
 )
-from airmuscle.physics import open_plant
 
 LIFT = load_scenario("lift-dmsp-20").plant
 START = LIFT.state_at(pressure=2e5)
@@ -605,18 +604,23 @@ def test_an_exported_loop_refuses_a_set_point_that_is_not_finite(setpoint, tmp_p
 
 
 @pytest.mark.tool
-def test_in_jax_an_input_that_is_not_a_number_gives_no_number():
-    """A program of JAX cannot refuse: NaN passes through the limits of a regulator and a valve."""
+@pytest.mark.parametrize(
+    ("name", "control"),
+    [
+        ("dmsp-20-300", "fill"),
+        ("check valve and cracking pressure", "fill"),
+        ("three positions through a tube", "valve"),
+        ("manifold on tank and regulator", "two.valve"),
+    ],
+)
+def test_in_jax_an_input_that_is_not_a_number_gives_no_number(name, control):
+    """A program of JAX cannot refuse: NaN passes through the limits of valves."""
     jax = pytest.importorskip("jax", reason="needs the package jax")
     jax.config.update("jax_enable_x64", True)
-    regulated = regulated_plant(load("dmsp-20-300").muscle)
-    for plant in (LIFT, open_plant(regulated)):
-        state = plant.state_at(pressure=2e5)
-        finite = {name: jax.numpy.asarray(0.0) for name in plant.inputs}
-        rates = jax.jit(plant.rates)
-        usual = rates(state, finite)
-        assert all(math.isfinite(float(rate)) for rate in usual.values())
-        for name in plant.inputs:
-            if "shortening" not in name:
-                wrong = rates(state, {**finite, name: jax.numpy.asarray(math.nan)})
-                assert any(math.isnan(float(rate)) for rate in wrong.values())
+    plant = plants.EXAMPLES[name]
+    state = {key: jax.numpy.asarray(value) for key, value in plant.state_at(pressure=2e5).items()}
+    closed = {key: jax.numpy.asarray(0.0) for key in plant.inputs}
+    usual = plant.rates(state, closed)
+    assert all(math.isfinite(float(rate)) for rate in usual.values())
+    wrong = plant.rates(state, {**closed, control: jax.numpy.asarray(math.nan)})
+    assert any(math.isnan(float(rate)) for rate in wrong.values())
