@@ -16,7 +16,7 @@ returns the states as they are, and `observe` gives NaN, NaN and 0.
 import dataclasses
 import functools
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,8 +35,8 @@ MAX_STEP = 1e-3
 """Largest product of the default step and the fastest rate of the plant, of which 2.8 is the limit
 of the method, and longest default step [s] (chosen)."""
 LARGEST = float(np.finfo(np.float32).max)
-"""Largest magnitude of an input that counts as finite: that of single precision, in which an
-actuator may compute."""
+"""Largest sum of inputs that counts as finite: that of single precision, in which an actuator may
+compute."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,21 +62,31 @@ class ActuatorModel:
     def _traced(self) -> TracedSystem:
         return compile_system(self.part).program.traced
 
-    def _inputs(self, z: Any, p: Any) -> Any:
-        """The inputs of the plant at command, length and speed."""
+    def _rest(self, p: Any) -> Any:
+        """The resting length of the muscle."""
         import casadi
 
         model, vector = autodiff.symbolic(self.part)
-        rest = casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
+        return casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
+
+    def _replaced(self, z: Any, usable: Any, p: Any) -> list[Any]:
+        """Command, length and speed, or usual numbers where these are not usable, so that no
+        derivative of the choice in `step` and `observe` is NaN.
+        """
+        import casadi
+
+        low, _ = control_range(self.controls)
+        usual = (low, self._rest(p), 0.0)
+        pairs = zip(casadi.vertsplit(z), usual, strict=True)
+        return [casadi.if_else(usable, value, number) for value, number in pairs]
+
+    def _inputs(self, z: Any, p: Any) -> Any:
+        """The inputs of the plant at a finite command, length and speed."""
+        import casadi
+
         low, high = control_range(self.controls)
-        # What is not finite is replaced, so that no derivative of the choice in `step` and
-        # `observe` is NaN.
-        length, speed = (
-            casadi.if_else(_is_finite(z[i]), z[i], usual) for i, usual in ((1, rest), (2, 0.0))
-        )
-        command = casadi.if_else(_is_finite(z[0]), z[0], low)
-        command = casadi.fmin(casadi.fmax(command, low), high)
-        values = {SHORTENING: rest - length, SHORTENING_SPEED: -speed}
+        command = casadi.fmin(casadi.fmax(z[0], low), high)
+        values = {SHORTENING: self._rest(p) - z[1], SHORTENING_SPEED: -z[2]}
         pair = [casadi.fmax(command, 0.0), casadi.fmax(-command, 0.0)]
         openings = pair if len(self.controls) == 2 else [command]
         values |= {
@@ -95,14 +105,15 @@ class ActuatorModel:
         rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
         rows, weights = RungeKutta4(self.step).tableau()
         slopes: list[Any] = []
+        usable = _all_finite([z[0], z[1] + h * z[2], z[2]])
+        command, length, speed = self._replaced(z, usable, t.p)
         for row in ((), *rows):
             increment = sum((a * k for a, k in zip(row, slopes, strict=True) if a), casadi.SX(0))
-            at = casadi.vertcat(z[0], z[1] + sum(row) * h * z[2], z[2])
+            at = casadi.vertcat(command, length + sum(row) * h * speed, speed)
             slopes.append(rates(t.x + h * increment if row else t.x, self._inputs(at, t.p), t.p))
         later = t.x + h * sum(
             (b * k for b, k in zip(weights, slopes, strict=True) if b), casadi.SX(0)
         )
-        usable = _all_finite([z[0], z[1] + h * z[2], z[2]])
         states = [
             casadi.if_else(usable, after, before)
             for after, before in zip(casadi.vertsplit(later), casadi.vertsplit(t.x), strict=True)
@@ -116,10 +127,10 @@ class ActuatorModel:
 
         t = self._traced
         z = casadi.SX.sym("z", 3)
-        o = casadi.substitute(t.o, t.u, self._inputs(z, t.p))
+        usable = _all_finite(casadi.vertsplit(z))
+        o = casadi.substitute(t.o, t.u, self._inputs(self._replaced(z, usable, t.p), t.p))
         names = (*(s.name for s in self.part.states), *t.output_names)
         known = dict(zip(names, casadi.vertsplit(casadi.vertcat(t.x, o)), strict=True))
-        usable = _all_finite(casadi.vertsplit(z))
         results = [known["force"], known["pressure"]]
         valid = casadi.logic_and(usable, _all_finite(results))
         for limit in (each for each in self.part.column_limits if each.column in known):
@@ -249,18 +260,11 @@ def control_range(controls: Sequence[Input]) -> tuple[float, float]:
     return (controls[0].minimum, controls[0].maximum) if controls else (0.0, 0.0)
 
 
-def _is_finite(value: Any) -> Any:
-    """Whether a symbol is a finite number, as a condition that is false for NaN."""
+def _all_finite(values: Sequence[Any]) -> Any:
+    """Whether all symbols are finite numbers, and with them their sum, as a condition."""
     import casadi
 
-    return casadi.fabs(value) <= LARGEST
-
-
-def _all_finite(values: Iterable[Any]) -> Any:
-    """Whether all symbols are finite numbers."""
-    import casadi
-
-    return functools.reduce(casadi.logic_and, map(_is_finite, values))
+    return casadi.fabs(sum(values)) <= LARGEST
 
 
 def _stable_step(part: Plant) -> float:
