@@ -188,6 +188,14 @@ def test_a_section_and_its_targets_are_printed():
     assert "## title" in text
 
 
+@pytest.mark.skipif("gcc" not in ode8.compilers(), reason="gcc is needed")
+def test_the_library_and_gcc_compute_the_same_for_each_width_of_registers():
+    section = batch.section_of_widths(rounds=1, count=32, seconds=0.1)
+    assert len(section.rows) == 2 * 3
+    assert [target.limit for target in section.targets] == [1.15, 0.95] * 2
+    assert all("-O3 -ffast-math -march=" in target.name for target in section.targets)
+
+
 @pytest.mark.parametrize("unit", [*measure.SECONDS, *measure.PER_SECOND])
 def test_a_time_is_compared_in_yardsticks_so_that_a_slow_machine_has_the_same_targets(
     unit, monkeypatch
