@@ -1,6 +1,6 @@
 """Workflow on one page: measured points, fitted muscle, plant with valves and load, simulation.
 
-python examples/A0_chain.py        writes chain.png to the working directory
+python examples/A0_chain.py        writes report/examples/chain.png
 """
 
 import numpy as np
@@ -48,5 +48,5 @@ position = right.twinx()
 position.plot(run["time"], run["position"] * 1e3, color=plotting.LINES[1], linestyle="--")
 position.set_ylabel("position [mm]", color=plotting.LINES[1])
 position.grid(False)
-plotting.save(figure, "chain.png")
-print("wrote chain.png")
+plotting.save(figure, "report/examples/chain.png")
+print("wrote report/examples/chain.png")

@@ -1,7 +1,7 @@
 """A controller defined by the user in the control benchmark of a joint: feed-forward with
 compensation of friction.
 
-python examples/A10_own_controller.py        writes own_controller.png to the working directory
+python examples/A10_own_controller.py        writes report/examples/own_controller.png
 
 A controller is a class with two members: `initial_memory`, the values that it keeps from one sample
 to the next, and `step`, its commands. It is tuned as the controllers of the package are, for
@@ -86,5 +86,7 @@ for name, score in result.scores().items():
         for task, error in errors
     )
     print(f"{name}: score {score.median:.2f}; rms error {texts}")
-plotting.save(result.run_plot([task.name for task in tasks]).draw(), "own_controller.png")
-print("wrote own_controller.png")
+plotting.save(
+    result.run_plot([task.name for task in tasks]).draw(), "report/examples/own_controller.png"
+)
+print("wrote report/examples/own_controller.png")

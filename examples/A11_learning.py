@@ -4,7 +4,7 @@ environment, beside a PI.
 python examples/A11_learning.py        one seed of each method, about 5 minutes of one core
 python examples/A11_learning.py 3      three seeds of each method
 
-Writes learning.png to the working directory; needs stable-baselines3. Environment
+Writes report/examples/learning.png; needs stable-baselines3. Environment
 `airmuscle/Joint-v0`; networks, settings of PPO and SAC, ranges of the PI gains and numbers of
 episodes are chosen.
 """
@@ -271,8 +271,8 @@ def draw(curves, pi):
         ylim=(0, 500),
     )
     axes.legend(loc="lower right", framealpha=1.0)
-    plotting.save(figure, "learning.png")
-    print("wrote learning.png")
+    plotting.save(figure, "report/examples/learning.png")
+    print("wrote report/examples/learning.png")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Solenoid valve with pulse-width modulation: command, coil current and opening; mean opening over
 the duty ratio.
 
-python examples/A2_drivers.py        writes drivers.png to the working directory
+python examples/A2_drivers.py        writes report/examples/drivers.png
 """
 
 import numpy as np
@@ -62,5 +62,5 @@ for i, frequency in enumerate((5.0, 25.0, 50.0, 100.0)):
 right.plot((0, 1), (0, 1), color=plotting.BLACK, linewidth=0.6)
 right.set(xlabel="duty ratio", ylabel="mean opening", title="mean opening over duty ratio")
 plotting.legend_outside(right, title="PWM frequency")
-plotting.save(figure, "drivers.png")
-print("wrote drivers.png")
+plotting.save(figure, "report/examples/drivers.png")
+print("wrote report/examples/drivers.png")

@@ -1,7 +1,7 @@
 """Position control of a load: PID with a proportional valve, and on/off control with two small
 solenoid valves.
 
-python examples/A4_control.py        writes control.png to the working directory
+python examples/A4_control.py        writes report/examples/control.png
 
 The muscle is the DMSP-20-300 of Martens and Boblan; load, size and dynamics of the small valves,
 gains and sample times are chosen.
@@ -68,7 +68,7 @@ left.plot(
 left.set_ylabel("position [mm]")
 right.set(xlabel="time [s]", ylabel="command")
 plotting.legend_below(figure, left, columns=3)
-plotting.save(figure, "control.png")
+plotting.save(figure, "report/examples/control.png")
 
 plant = am.Plant(muscle, proportional_valve, am.HangingMass(10.0))
 start = am.find_equilibrium(plant, pressure=0.8 * bar)
@@ -78,4 +78,4 @@ second = solve(first.continuation(duration=1.0))
 same = second.final_state == complete.final_state
 print(f"stopped after 2 s and resumed, the run has the same final state: {same}")
 print(*am.cite(pid), sep="\n")
-print("wrote control.png")
+print("wrote report/examples/control.png")

@@ -1,7 +1,7 @@
 """Control laws at one lifted load, and two at a joint: tracking, on/off valves, learning, angle and
 stiffness.
 
-python examples/A6_control_laws.py        writes control_laws.png to the working directory
+python examples/A6_control_laws.py        writes report/examples/control_laws.png
 
 The muscle is the DMSP-20-300 of Martens and Boblan; loads, valves, gains, defects of the sensors
 and sample times are chosen. The plant is not the model of the feed-forward: its load is 20 %
@@ -194,5 +194,5 @@ joint_axes.set(xlabel="time [s]", ylabel="share of the final set point")
 for each, top in ((upper, 23.5), (valves, 24.5), (joint_axes, 1.9)):
     each.set_ylim(top=top)
     each.legend(fontsize=7, loc="upper left", frameon=False)
-plotting.save(figure, "control_laws.png")
-print("wrote control_laws.png")
+plotting.save(figure, "report/examples/control_laws.png")
+print("wrote report/examples/control_laws.png")

@@ -1,8 +1,8 @@
 """Estimation from pressures alone, predictive choice of valve states, and compensation of
 hysteresis.
 
-python examples/A7_estimation_and_prediction.py    writes estimation_and_prediction.png to the
-                                                   working directory
+python examples/A7_estimation_and_prediction.py        writes
+report/examples/estimation_and_prediction.png
 
 The muscle is the DMSP-20-300 of Martens and Boblan; joints, loads, friction, valves, noise and
 sample times are chosen.
@@ -179,5 +179,5 @@ for each, top in (
 ):
     each.set_ylim(top=top)
     each.legend(fontsize=7, loc="best", frameon=False)
-plotting.save(figure, "estimation_and_prediction.png")
-print("wrote estimation_and_prediction.png")
+plotting.save(figure, "report/examples/estimation_and_prediction.png")
+print("wrote report/examples/estimation_and_prediction.png")

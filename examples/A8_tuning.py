@@ -1,6 +1,6 @@
 """Tuning of a position controller for the nominal plant alone, and for a family of plants.
 
-python examples/A8_tuning.py        writes tuning.png to the working directory
+python examples/A8_tuning.py        writes report/examples/tuning.png
 
 The muscle is the DMSP-20-300 of Martens and Boblan; load, valve, sensor, perturbations, ranges and
 budget are chosen.
@@ -121,5 +121,5 @@ print(
         *objectives
     )
 )
-plotting.save(figure, "tuning.png")
-print("wrote tuning.png")
+plotting.save(figure, "report/examples/tuning.png")
+print("wrote report/examples/tuning.png")

@@ -688,7 +688,7 @@ def test_the_program_of_the_example_runs(tmp_path: Path):
     )
     assert done.returncode == 0, done.stderr
     assert "stopped after 2 s and resumed, the run has the same final state: True" in done.stdout
-    assert (tmp_path / "control.png").stat().st_size > 10_000
+    assert (tmp_path / "report" / "examples" / "control.png").stat().st_size > 10_000
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ of a caller.
 import functools
 import io
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,8 +85,11 @@ def _picture(figure: Any) -> bytes:
 
 
 def save(figure: Any, path: Any) -> None:
-    """Write a figure in the format of the path's suffix; equal content gives identical bytes."""
+    """Write a figure in the format of the path's suffix, in a folder that is made where it is
+    missing; equal content gives identical bytes.
+    """
     suffix = str(path).rpartition(".")[2]
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
     with open(path, "wb") as file:
         file.write(rendered(figure, (suffix,))[suffix])
 

@@ -143,7 +143,7 @@ def export(
           pressure_loop
       airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
       airmuscle export examples/pressure_loop.toml --controller --to fmu --out controller.fmu
-      airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
+      airmuscle export examples/joint_cascade.toml --to ssp --out loop.ssp
     """
     request = (
         request

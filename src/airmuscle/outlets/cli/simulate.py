@@ -28,7 +28,7 @@ class SimulateRequest:
 
     set: tuple[Any, ...] = many(
         "Another value of a number of the scenario, by its path as in a study: 'mechanism.mass=12"
-        " kg', run.duration=10. Repeatable.",
+        " kg', 'run.duration=10 s'. Repeatable.",
         metavar="PATH=VALUE",
         read=read_pair,
     )
@@ -50,7 +50,7 @@ def simulate(
       airmuscle simulate examples/fill_discharge.toml --out run
       airmuscle simulate joint-dmsp-20-matrix --out run
       airmuscle simulate examples/fill_discharge.toml --set "mechanism.mass=12 kg" --set
-          run.duration=10 --out run
+          "run.duration=10 s" --out run
     """
     loaded = (
         changed_scenario(scenario, dict(request.set)) if request.set else load_scenario(scenario)
