@@ -30,7 +30,7 @@ from airmuscle.recording.plot import panels_of
 
 MAX_BYTES = 200_000
 BULKY = re.compile(
-    r"\b(\w*Array|NDArray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b"
+    r"\b(\w*Array|ndarray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b"
 )
 """Annotations of fields that may fill pages."""
 TITLE = "<script>alert('1')</script> & \"quoted\".csv"

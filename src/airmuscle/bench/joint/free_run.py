@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from scipy.optimize import least_squares
 
-from ...core import Array, tree
+from ...core import Array, ShortRepr, tree
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
 from ..baselines import ARX, DEPTH, PERSISTENCE, fit_arx
 from .descent import Descent, SearchStage, with_slopes
@@ -258,8 +258,8 @@ LOSS = 0.05
 and loss of a law that is accepted."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ResidualGain:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ResidualGain(ShortRepr):
     """Errors (N, rows, J) [rad] of the free run of physics alone and of the hybrid law over the
     same windows.
 

@@ -186,9 +186,10 @@ def _metric(name: str, unit: str, shown: str) -> Any:
     return dataclasses.field(metadata={"column": (name, unit, shown)})
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class TrackingMetrics:
-    """Metrics of one run of a task; NaN where a metric does not exist for the task.
+    """Metrics of one run of a task; NaN where a metric does not exist for the task, as which it
+    equals another one.
 
     rmse, max_error    root mean square and largest magnitude of the error r - y [degree], from the
                        task's begin on
@@ -217,6 +218,19 @@ class TrackingMetrics:
     strokes: float = _metric("valve strokes", "1/s", "1/s")
     valve_life: float = _metric("valve life", "s", "h")
     stiffness_error: float = _metric("stiffness error", "1", "%")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, TrackingMetrics):
+            return NotImplemented
+        return self._comparable() == other._comparable()
+
+    def __hash__(self) -> int:
+        return hash(self._comparable())
+
+    def _comparable(self) -> tuple[float | None, ...]:
+        """The metrics, None where one does not exist."""
+        values = dataclasses.astuple(self)
+        return tuple(None if math.isnan(value) else value for value in values)
 
 
 METRICS = {field.name: field.metadata["column"] for field in dataclasses.fields(TrackingMetrics)}
