@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 from click.testing import Result
@@ -10,6 +11,12 @@ from json_keys import undocumented
 from typer.testing import CliRunner
 
 from airmuscle.outlets.cli import app
+
+
+def command_names() -> list[str]:
+    """All commands, in the order of the help text."""
+    listed = airmuscle("--help").output.partition("Commands:")[2]
+    return re.findall(r"^  ([\w-]+)  +.*$", listed, re.MULTILINE)
 
 
 def airmuscle(*arguments: object, width: int = 160, **options: Any) -> Result:

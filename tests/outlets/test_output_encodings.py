@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import command_names
 
 from airmuscle import __main__ as entry_point
-from airmuscle.outlets.cli.commands import COMMANDS
 from airmuscle.outlets.cli.streams import plain
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -32,7 +32,11 @@ PRINTING = {
     "schema": ("schema",),
     "wrong usage": ("evaluate", "dmsp-20-300", "--presure", "1 µbar"),
     "refused": ("inspect", "Überlast – μ.csv"),
-    **{f"{row.name}, refused": (row.name, "α–β≤γ.csv") for row in COMMANDS if row.name != "studio"},
+    **{
+        f"{command}, refused": (command, "α–β≤γ.csv")
+        for command in command_names()
+        if command != "studio"
+    },
 }
 BENCH = "time [s];pressure [kPa];Kraft Δ µ [N];length [mm]\n" + "".join(
     f"{0.1 * i:.1f};{100 + i};{50 + i};{300 - i}\n" for i in range(12)
@@ -107,7 +111,7 @@ def test_a_command_prints_the_same_to_every_output(arguments: tuple[str, ...]):
                 assert encoding != "ascii" or (said[1] + said[2]).isascii()
 
 
-@pytest.mark.parametrize("command", [row.name for row in COMMANDS])
+@pytest.mark.parametrize("command", command_names())
 def test_a_help_text_is_ascii(command: str):
     """Typer prints it, in UTF-8 where ASCII is asked for."""
     code, text, _ = lines_of((command, "--help"), "ascii", "file")
