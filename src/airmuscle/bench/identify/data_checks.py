@@ -80,8 +80,7 @@ class Scatter:
             return []
         return [
             f"The rms error, {rmse:.3g} N, is {rmse / within:.2g} times the scatter within a run"
-            f" ({parts}): repeated runs differ, and no law follows them all. Check whether another"
-            " muscle, its temperature or a zero has changed between the runs."
+            f" ({parts}), although repeated runs differ by a similar amount."
         ]
 
 

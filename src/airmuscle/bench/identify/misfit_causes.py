@@ -32,6 +32,10 @@ EVEN = 0.1
 from which they are those of a coarse sensor (chosen)."""
 FORM = "the form of the law"
 RUNS = "offsets and gains of single runs (another muscle, a temperature, a zero)"
+RUNS_REMEDY = (
+    "No law follows such runs: check whether the muscle, its temperature or a zero has changed"
+    " between them."
+)
 DIRECTION = "the direction of the motion (friction, or a lag of a sensor)"
 STEPS = "the steps of the pressure readings"
 
@@ -75,7 +79,8 @@ def causes_text(causes: Sequence[MisfitCause]) -> str:
     if not causes:
         return "No form of the law, run, direction or step of the readings explains it."
     parts = [f"{100 * cause.share:.2g} % by {cause.name}" for cause in causes]
-    return f"Of the squared residuals are explained: {', '.join(parts)}."
+    remedy = f" {RUNS_REMEDY}" if causes[0].name == RUNS else ""
+    return f"Of the squared residuals are explained: {', '.join(parts)}.{remedy}"
 
 
 class _Rows(NamedTuple):
