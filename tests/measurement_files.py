@@ -178,3 +178,17 @@ columns = ["angle"]
 [pressures]
 columns = ["p1", "p2"]
 """
+
+
+def table_of_cells(path: Path, rows: list[list[object]]) -> None:
+    """A text table or a workbook of these cells; None is an empty one."""
+    if path.suffix == ".csv":
+        path.write_text(
+            "\n".join(",".join("" if c is None else str(c) for c in row) for row in rows) + "\n"
+        )
+        return
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    book.save(path)

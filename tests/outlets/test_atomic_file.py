@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -35,6 +36,43 @@ def test_a_file_is_unchanged_and_nothing_is_left_if_writing_fails(tmp_path: Path
         fail()
     assert path.read_text(encoding="utf-8") == "complete"
     assert list(tmp_path.iterdir()) == [path]
+
+
+WRITES = """
+import pathlib, sys, time
+from airmuscle.core import atomic_file
+with atomic_file(pathlib.Path(sys.argv[1])) as unfinished:
+    unfinished.write_text("half")
+    print("ready", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("ending", ["SIGKILL", "SIGTERM"])
+def test_what_a_killed_writer_has_left_is_removed_by_the_next_one(tmp_path: Path, ending: str):
+    path = tmp_path / "run.csv"
+    path.write_text("complete")
+    writers = [
+        subprocess.Popen(
+            [sys.executable, "-c", WRITES, tmp_path / name], stdout=subprocess.PIPE, text=True
+        )
+        for name in ("run.csv", "other.csv")
+    ]
+    killed = writers[0]
+    try:
+        assert [writer.stdout.readline() for writer in writers] == ["ready\n"] * 2
+        killed.send_signal(getattr(signal, ending))
+        killed.wait()
+        assert len(list(tmp_path.glob(".*.part"))) == 2
+        with atomic_file(path) as unfinished:
+            unfinished.write_text("new")
+        (left,) = tmp_path.glob(".*.part")  # of the writer that still runs
+        assert left.name.startswith(".other.csv.of-")
+        assert path.read_text() == "new"
+    finally:
+        for writer in writers:
+            writer.kill()
+            writer.communicate()
 
 
 def test_several_writers_of_one_file_leave_one_complete_text(tmp_path: Path):

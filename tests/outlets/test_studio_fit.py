@@ -409,12 +409,24 @@ def test_the_number_of_sets_is_bounded_and_those_in_use_are_kept(tmp_path, monke
     for name in (first, second):
         (store.folder(name) / "files" / "a.csv").touch()
     with pytest.raises(BadRequest, match="all are in use"):
-        store.new_set(lambda name: False)
-    monkeypatch.setattr(fit_uploads, "MAX_IDLE", -1.0)
+        store.new_set(lambda name: True)
     store.new_set(lambda name: name == first)
     assert store.folder(first).is_dir()
     with pytest.raises(BadRequest, match="drop them again"):
         store.folder(second)
+
+
+def test_of_too_many_sets_the_one_that_is_idle_for_the_longest_time_goes(tmp_path):
+    store = UploadStore(tmp_path)
+    names = []
+    for _ in range(2 * fit_uploads.MAX_SETS):
+        names.append(store.new_set(lambda name: False))
+        (store.folder(names[-1]) / "files" / "a.csv").touch()
+        store.folder(names[0])  # is in use
+    with pytest.raises(BadRequest, match="drop them again"):
+        store.folder(names[1])
+    kept = [name for name in names if name in store._used]
+    assert kept == [names[0], *names[-fit_uploads.MAX_SETS + 1 :]]
 
 
 def test_refused_uploads_and_removed_files_occupy_no_set(app, tmp_path, monkeypatch):

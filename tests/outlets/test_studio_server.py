@@ -12,10 +12,11 @@ import re
 import time
 import tomllib
 from concurrent.futures import ThreadPoolExecutor
+from urllib.parse import urljoin, urlsplit
 
 import pytest
 from scenario_files import LIFT
-from studio_pages import HOST, InThisProcess, request, run_script
+from studio_pages import HOST, WEB, InThisProcess, request, run_script
 from widths import widened
 
 pytest.importorskip("starlette", reason="needs starlette")
@@ -165,6 +166,7 @@ def test_the_names_of_this_machine_are_accepted(app, host):
         {"origin": "http://evil.example"},
         {"origin": "null"},
         {"origin": "http://127.0.0.1:9999"},
+        {"origin": f"https://{HOST}"},
         {"origin": "https://["},
         {"origin": ""},
         {"sec-fetch-site": "cross-site"},
@@ -376,6 +378,44 @@ def test_a_text_may_contain_units_and_references_but_no_paths():
             read_text_tables(text)
 
 
+def prefixed(app, *, is_stripped: bool):
+    """The application below a path, as a proxy that strips the path serves it, or one that does
+    not.
+    """
+
+    async def handle(scope, receive, send):
+        path = scope["path"].removeprefix("/lab/studio") if is_stripped else scope["path"]
+        root = "" if is_stripped else "/lab/studio"
+        await app(
+            {**scope, "path": path, "raw_path": path.encode(), "root_path": root}, receive, send
+        )
+
+    return handle
+
+
+@pytest.mark.parametrize("is_stripped", [True, False])
+def test_the_page_works_below_a_path(is_stripped):
+    app = prefixed(create_app(Access(), pool=InThisProcess()), is_stripped=is_stripped)
+    base = "http://127.0.0.1/lab/studio/"
+    page = request(app, "GET", "/lab/studio/")
+    linked = re.findall(r"(?:src|href)=\"([^\"#:]+)\"", page.text)
+    assert linked
+    for address in linked:  # as a browser resolves them
+        target = urljoin(base, address)
+        assert target.startswith(base)
+        assert request(app, "GET", urlsplit(target).path).status == 200, address
+    script = (WEB / "scripts" / "source.js").read_text("utf-8")
+    assert not re.findall(r"[\"'`]/(?:api|web|program)", script)
+    assert request(app, "GET", "/lab/studio/api/library").status == 200
+    own = {"x-airmuscle": None}  # a request that costs computation needs its header here, too
+    assert request(app, "GET", "/lab/studio/api/law/saga2007", headers=own).status == 403
+    token = create_app(Access((), "t"), pool=InThisProcess())
+    answer = request(
+        prefixed(token, is_stripped=is_stripped), "GET", "/lab/studio/", query=b"token=t"
+    )
+    assert urljoin(base, answer.headers["location"]) == base
+
+
 def test_other_machines_need_the_token():
     token = "secret-of-the-test"
     app = create_app(Access((), token), pool=InThisProcess())
@@ -384,7 +424,7 @@ def test_other_machines_need_the_token():
     assert request(app, "GET", "/", headers={"cookie": "airmuscle_token_8765=wrong"}).status == 401
     assert request(app, "GET", "/", query=b"token=" + b"&token=" * 50).status == 401
     first = request(app, "GET", "/", query=f"token={token}".encode())
-    assert (first.status, first.headers["location"]) == (303, "/")
+    assert (first.status, first.headers["location"]) == (303, "./")
     cookie = first.headers["set-cookie"]
     assert "HttpOnly" in cookie
     assert "samesite=lax" in cookie.lower()

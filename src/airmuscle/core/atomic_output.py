@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import glob
 import os
 import shutil
 import socket
@@ -23,6 +24,15 @@ limit names to 255.
 """
 
 
+_OF_PROCESS = f".of-{socket.gethostname().replace('/', '')}-"
+_PART = ".part"
+"""Parts of the name of a temporary file: the machine, because folders may be shared, and a process
+follow the name of the file.
+"""
+_searched: set[Path] = set()
+"""Folders in which this process has removed what killed ones have left."""
+
+
 _held: dict[Path, tuple[int, list[Path]]] | None = None
 """Descriptors of the folders that are kept from other processes, and the folders that were created
 for it.
@@ -35,15 +45,17 @@ def atomic_file(path: Path) -> Iterator[Path]:
     without an exception.
 
     If the block raises, `path` is unchanged and the temporary file is removed. Its name is that of
-    the process and the thread, so that several writers do not meet. Errors of the operating system
-    are those of `open` and `os.replace`.
+    the machine, the process and the thread, so that several writers do not meet. What killed
+    processes of this machine have left in the folder is removed, once in a process. Errors of the
+    operating system are those of `open` and `os.replace`.
     """
     if not path.name:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     if path.is_char_device() or path.is_block_device():  # which would be replaced by a file
         raise OSError(errno.EINVAL, "it is a device, not a file", str(path))
+    _remove_abandoned_files(path.parent)
     temporary = path.with_name(
-        f".{path.name[:_MAX_NAME]}.{os.getpid()}-{threading.get_ident()}.part"
+        f".{path.name[:_MAX_NAME]}{_OF_PROCESS}{os.getpid()}-{threading.get_ident()}{_PART}"
     )
     try:
         yield temporary
@@ -51,6 +63,26 @@ def atomic_file(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):  # renamed, or never created
             temporary.unlink()
+
+
+def _remove_abandoned_files(folder: Path) -> None:
+    """Remove the temporary files of processes of this machine, and of this user, that were
+    killed.
+    """
+    if folder in _searched:
+        return
+    _searched.add(folder)
+    for file in folder.glob(f".*{glob.escape(_OF_PROCESS)}*{_PART}"):
+        process = file.name.rpartition(_OF_PROCESS)[2].partition("-")[0]
+        with contextlib.suppress(OSError):  # removed by another process
+            if process.isdecimal() and _is_own(file) and not is_running(int(process)):
+                file.unlink()
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a path is no link, and of this user."""
+    owned = not hasattr(os, "getuid") or path.lstat().st_uid == os.getuid()
+    return owned and not path.is_symlink()
 
 
 _UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
@@ -113,13 +145,7 @@ def _remove_abandoned(target: Path, prefix: str = _UNFINISHED) -> None:
     for folder in target.glob(f"{prefix}*"):
         process = folder.name.removeprefix(prefix).partition("-")[0]
         with contextlib.suppress(OSError):  # removed by another process
-            own = not hasattr(os, "getuid") or folder.lstat().st_uid == os.getuid()
-            if (
-                own
-                and process.isdecimal()
-                and not folder.is_symlink()
-                and not is_running(int(process))
-            ):
+            if process.isdecimal() and _is_own(folder) and not is_running(int(process)):
                 shutil.rmtree(folder, ignore_errors=True)
 
 

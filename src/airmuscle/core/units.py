@@ -174,7 +174,7 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-_NAMES_OF_PINT = {"kp": "kgf", "rev": "turn", "Nm": "N m"}
+_NAMES_OF_PINT = {"kp": "kgf", "rev": "turn", "Nm": "N m", "mNm": "mN m", "kNm": "kN m"}
 """Kilopond, revolution and newton metre in names of pint, to which Nm is the metre number, a unit
 of yarns.
 """

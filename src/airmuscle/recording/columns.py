@@ -230,6 +230,7 @@ _SYNONYMS = {
     "velocity": "speed",
     "a": "acceleration",
     "zeit": "time",
+    **dict.fromkeys(("timestamp", "time_stamp", "stamp", "epoch", "unix_time"), "time"),
     "temperatur": "temperature",
     "volumen": "volume",
     "verkürzung": "shortening",
@@ -285,6 +286,24 @@ UNIT_SPELLINGS: dict[str, tuple[str, ...]] = {
 in `pressure_kPa`.
 """
 
+_FURTHER_SUFFIXES: dict[str, tuple[str, ...]] = {
+    "Pa": ("hPa", "torr", "atm", "mmHg", "inHg"),
+    "m": ("um", "µm", "in", "inch", "ft", "km"),
+    "1": ("percent",),
+    "N": ("mN", "MN", "lbf", "kgf", "gf", "kp", "kg", "g", "lb"),
+    "s": ("us", "µs", "ns", "h"),
+    "m/s": ("cm/s", "in/s", "km/h"),
+    "m/s^2": ("mm/s^2", "mm/s2"),
+    "m3": ("l", "ml", "dm3", "mm3", "m^3", "cm^3"),
+    "kg": ("mg", "lb"),
+    "kg/s": ("g/min", "kg/h"),
+    "K": ("degC", "degF"),
+    "rad": ("degree", "degrees", "°", "mrad"),
+    "rad/s": ("rpm", "mrad/s"),
+    "N m": ("Nm", "mNm", "kNm"),
+}
+"""Further units of each quantity that are recognised as a suffix, as in `force_lbf`."""
+
 _MARKED_FORMS = (
     re.compile(r"(?P<name>.*?)\s*\[(?P<unit>.*)\]"),
     re.compile(r"(?P<name>.*?)\s*\((?P<unit>.*)\)"),
@@ -332,11 +351,19 @@ def parse_heading(text: str) -> Heading:
         match = form.fullmatch(text)
         name = find_quantity_name(match["name"]) if match else None
         if match and name:
-            usual = UNIT_SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]
-            if form is not _SUFFIX_FORM or match["unit"] in usual:  # after a blank or underscore
+            target = QUANTITIES[name.rpartition(".")[2]].unit
+            usual = form is not _SUFFIX_FORM or match["unit"] in known_suffixes(target)
+            if usual:  # after a blank or underscore
                 return Heading(text, name, match["unit"].strip(), True)
     name_only = find_quantity_name(text)
     return Heading(text, name_only or text, None, name_only is not None)
+
+
+def known_suffixes(target: str) -> tuple[str, ...]:
+    """The units of a quantity with this SI unit that are recognised behind a blank or an
+    underscore.
+    """
+    return (*UNIT_SPELLINGS[target], *_FURTHER_SUFFIXES.get(target, ()))
 
 
 def split_unit(text: str) -> tuple[str, str | None]:

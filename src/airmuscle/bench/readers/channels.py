@@ -12,8 +12,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError
-from ...recording.columns import find_quantity_name, split_unit
+from ...core import Array, ColumnError, Hint, listed
+from ...recording.columns import find_quantity_name, parse_heading, split_unit
+from ...recording.recording import RowNote
+
+MAX_QUOTED = 180
+"""Maximum number of characters of names in a message (chosen)."""
 
 Cells = npt.NDArray[np.float64] | list[str]
 """A column: numbers if the reader found only numbers, otherwise texts."""
@@ -37,6 +41,12 @@ class RawTable:
     notes: tuple[str, ...] = ()
     fields: frozenset[str] = frozenset()
     """Headings that are names of fields of a message and state no quantity."""
+    numbers: tuple[int, ...] = ()
+    """Numbers of the columns in the file, from 1 on; empty if they are those of the table."""
+
+    def number(self, column: int) -> int:
+        """The number in the file, from 1 on, of a column by its index."""
+        return self.numbers[column] if self.numbers else column + 1
 
     def of_columns(self, kept: Sequence[int], **changes: Any) -> "RawTable":
         """The table with these columns alone, by their indices, and with further changes of its
@@ -49,7 +59,10 @@ class RawTable:
         )
         headings = tuple(self.headings[i] for i in kept)
         columns = tuple(self.columns[i] for i in kept)
-        return dataclasses.replace(self, headings=headings, units=units, columns=columns, **changes)
+        numbers = tuple(self.number(i) for i in kept)
+        return dataclasses.replace(
+            self, headings=headings, units=units, columns=columns, numbers=numbers, **changes
+        )
 
     def of_rows(self, kept: npt.NDArray[np.intp], **changes: Any) -> "RawTable":
         """The table with these rows alone, by their indices, and with further changes of its
@@ -99,13 +112,16 @@ def merge_channels(
     channels: Sequence[Channel],
     constants: Mapping[str, float | str],
     row_label: str = "row",
+    mapped: Sequence[str] = (),
 ) -> RawTable:
     """The table with one column for each channel.
 
-    If the time vectors differ, the rows of the table are those of the channel with the most
-    samples, within the time that all channels cover. The other channels are interpolated linearly,
-    integer-valued ones (a valve, a counter) by zero-order hold, and a note reports each. Raises
-    ColumnError if the channels cannot be merged.
+    If the time vectors differ, the rows of the table are those of the measured channel with the
+    most samples, within the time that all measured channels cover: those of the `mapped` columns
+    and of known quantities. The other channels are interpolated linearly, integers and texts (a
+    valve, a counter) by zero-order hold; a channel that was written once is held, and one that does
+    not cover the rows is left out. Notes report each, and rows that are left out. Raises
+    ColumnError if the measured channels cannot be merged.
     """
     channels = [c for c in channels if np.ndim(c.values) == 1 and len(c.values)]
     if not channels:
@@ -116,7 +132,7 @@ def merge_channels(
     if len({len(c.values) for c in channels}) > 1 or not all(
         np.array_equal(each, times[0]) for each in times
     ):
-        channels, time, notes = _resampled(origin, channels)
+        channels, time, notes = _on_common_rows(origin, channels, mapped)
     has_time = any(
         find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels
     )
@@ -145,15 +161,74 @@ def merge_channels(
     )
 
 
-def _resampled(
-    origin: str, channels: Sequence[Channel]
-) -> tuple[list[Channel], Array, tuple[str, ...]]:
-    """The channels at the times of the longest one, these times, and a note on each that is
-    interpolated. Raises ColumnError where a channel has no time, or one that decreases, so that no
-    interpolation is defined.
+HELD = "biuUSO"
+"""Kinds of values that are held until the next sample: integers, truth values and texts."""
+
+
+def _on_common_rows(
+    origin: str, channels: Sequence[Channel], mapped: Sequence[str]
+) -> tuple[list[Channel], Array | None, tuple[str, ...]]:
+    """The channels at common rows, the times of these, and notes. Raises ColumnError where a
+    measured channel has no time, or one that decreases, so that no interpolation is defined.
+    """
+    measured = _measured(channels, mapped)
+    if len({len(c.values) for c in measured}) == 1 and all(c.time is None for c in measured):
+        time = None
+        rows = len(measured[0].values)
+        leading = measured[0]
+    else:
+        leading, time = _common_times(origin, channels, measured)
+        rows = len(time)
+    common = []
+    notes = list[str]()
+    if rows < len(leading.values):
+        notes.append(
+            RowNote(
+                f"{rows} of {len(leading.values)} rows of channel '{leading.name}' are read: those"
+                f" within the time that all measured channels cover ({_names(measured)})."
+            )
+        )
+    for channel in channels:
+        values = _at_rows(channel, time, rows)
+        if values is None:
+            notes.append(_left_out(channel, time, rows))
+            continue
+        common.append(dataclasses.replace(channel, values=values, time=time))
+        if len(channel.values) == 1 < rows:
+            notes.append(f"Channel '{channel.name}' was written once and is held in all rows.")
+        elif _differ(channel.time, leading.time):
+            verb = "held" if np.asarray(channel.values).dtype.kind in HELD else "interpolated"
+            notes.append(
+                f"Channel '{channel.name}' has its own time vector: its {len(channel.values)} rows"
+                f" are {verb} to the {rows} rows of '{leading.name}'."
+            )
+    return common, time, tuple(notes)
+
+
+def _measured(channels: Sequence[Channel], mapped: Sequence[str]) -> list[Channel]:
+    """The channels that decide which rows there are: of mapped columns and known quantities, else
+    of numbers that are no integers, else all; without those that were written once.
+    """
+    repeated = [c for c in channels if len(c.values) > 1] or list(channels)
+    known = [
+        c
+        for c in repeated
+        if c.name in mapped
+        or split_unit(c.name)[0] in mapped
+        or (c.is_quantity and parse_heading(c.name).known)
+    ]
+    real = [c for c in repeated if np.asarray(c.values).dtype.kind not in HELD]
+    return known or real or repeated
+
+
+def _common_times(
+    origin: str, channels: Sequence[Channel], measured: Sequence[Channel]
+) -> tuple[Channel, Array]:
+    """The measured channel with the most samples, and its times within those of all measured
+    ones.
     """
     times: list[Array] = []
-    for channel in channels:
+    for channel in measured:
         if channel.time is None:
             sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
             raise ColumnError(
@@ -169,38 +244,64 @@ def _resampled(
                 " file of its own."
             )
         times.append(channel.time)
-    longest = max(range(len(channels)), key=lambda i: len(channels[i].values))
-    name = channels[longest].name
+    longest = max(range(len(measured)), key=lambda i: len(measured[i].values))
     leading = times[longest]
     low = max(each[0] for each in times)
     high = min(each[-1] for each in times)
     rounding = _rounding(leading)
     time = leading[(leading >= low - rounding) & (leading <= high + rounding)]
     if not len(time):
+        late = measured[int(np.argmax([each[0] for each in times]))].name
+        early = measured[int(np.argmin([each[-1] for each in times]))].name
         raise ColumnError(
-            f"{origin}: the time ranges of the channels do not overlap. Select one group of"
-            " channels."
+            f"{origin}: the time ranges of the measured channels do not overlap: '{early}' ends"
+            f" before '{late}' begins.",
+            hint=Hint("To leave a channel out", "columns", {late: ""}, function="ColumnMapping"),
         )
-    resampled = []
-    notes = []
-    for channel, own_time in zip(channels, times, strict=True):
-        values = np.asarray(channel.values)
-        if values.dtype.kind in "biuUSO":
-            values = values[
-                np.clip(
-                    np.searchsorted(own_time, time + _rounding(time), side="right") - 1, 0, None
-                )
-            ]
-        else:
-            values = np.interp(time, own_time, values)
-        resampled.append(dataclasses.replace(channel, values=values, time=time))
-        if not np.array_equal(own_time, leading):
-            rows = (
-                f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of"
-                f" '{name}'"
-            )
-            notes.append(f"Channel '{channel.name}' has its own time vector: {rows}.")
-    return resampled, time, tuple(notes)
+    return measured[longest], time
+
+
+def _at_rows(channel: Channel, time: Array | None, rows: int) -> Any:
+    """The values of a channel at the common rows; None if it does not cover them."""
+    values = np.asarray(channel.values)
+    if len(values) == 1:
+        return np.repeat(values, rows)
+    if time is None or channel.time is None:
+        return values if len(values) == rows else None
+    steps = np.diff(channel.time)
+    if np.any(steps < 0.0):
+        return None
+    tolerance = float(np.median(steps)) + _rounding(time)  # its next sample is as far away
+    is_held = values.dtype.kind in HELD
+    begins = channel.time[0] <= time[0] + tolerance
+    ends = is_held or channel.time[-1] >= time[-1] - tolerance
+    if not (begins and ends):
+        return None
+    if is_held:
+        last = np.searchsorted(channel.time, time + _rounding(time), side="right") - 1
+        return values[np.clip(last, 0, None)]
+    return np.interp(time, channel.time, values)
+
+
+def _left_out(channel: Channel, time: Array | None, rows: int) -> str:
+    """The note on a channel that is left out, with the time that it covers."""
+    count = f"{len(channel.values)} of {rows} rows"
+    if time is None or channel.time is None:
+        return f"Channel '{channel.name}' is left out: it has {count}, and no time."
+    start, end = (float(instant - time[0]) for instant in (channel.time[0], channel.time[-1]))
+    return (
+        f"Channel '{channel.name}' is left out: it has {count}, from {start:.4g} s to {end:.4g} s,"
+        f" and the measured channels cover 0 s to {float(time[-1] - time[0]):.4g} s. Map it to a"
+        " quantity to read the rows that it covers."
+    )
+
+
+def _differ(one: Array | None, other: Array | None) -> bool:
+    return one is not None and other is not None and not np.array_equal(one, other)
+
+
+def _names(channels: Sequence[Channel]) -> str:
+    return listed([channel.name for channel in channels], MAX_QUOTED)
 
 
 def _rounding(time: Array) -> float:

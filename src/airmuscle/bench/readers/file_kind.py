@@ -143,6 +143,7 @@ def check_is_data(path: Path) -> None:
 def check_text_file(path: Path) -> None:
     """Raise FileError unless the path is a regular file that begins with text."""
     check_regular_file(path)
+    check_is_data(path)
     with readable(path), path.open("rb") as file:
         check_beginning(path.name, file.read(4096))
 

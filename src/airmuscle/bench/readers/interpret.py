@@ -4,6 +4,7 @@ Units are converted, absolute pressures become gauge pressures, and implausible 
 """
 
 import contextlib
+import datetime
 import difflib
 from collections.abc import Mapping
 
@@ -21,14 +22,12 @@ from ...recording.columns import (
 )
 from ...recording.recording import Recording
 from . import constants as fixed
-from .channels import Cells, RawTable
+from .channels import MAX_QUOTED, Cells, RawTable
 from .constants import constant_from_column, parse_constant_name
 from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
-from .time_base import seconds_from_clock
+from .time_base import epoch_unit, seconds_from_clock
 
-MAX_QUOTED = 180
-"""Maximum number of characters of headings in a message (chosen)."""
 MAX_LABELS = 8
 MIN_LABEL_ROWS = 3
 """Maximum number of different texts of a column that is kept, and minimum number of rows of each
@@ -157,8 +156,11 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
         )
     row = table.units or ()
     headings = []
-    for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False):
+    below_all = [*row, *[""] * (len(parsed) - len(row))]
+    for h, below, cells in zip(parsed, below_all, table.columns, strict=False):
         stated = user_units.get(h.name, user_units.get(h.text))
+        if h.name == "time" and not (stated or below or h.unit):
+            stated = epoch_unit(cells)
         if not stated and h.known:
             _check_unit_row(table, h, below)
         headings.append(Heading(h.text, h.name, stated or below or h.unit, h.known))
@@ -214,6 +216,13 @@ def _convert_column(
             )
     change = unit_conversion(table, heading, ambient)
     values = np.array(cells, dtype=float)
+    if heading.name == "time" and heading.unit == epoch_unit(cells):
+        began = datetime.datetime.fromtimestamp(change(values[0]), datetime.UTC)
+        seconds = change(values - values[0])
+        return seconds, (
+            f"The time is in {heading.unit} from 1970; it is counted from the first row,"
+            f" {began:%Y-%m-%d %H:%M:%S} UTC."
+        )
     if change.assumed_gauge:
         reason = (
             f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute"

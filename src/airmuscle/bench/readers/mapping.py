@@ -26,14 +26,17 @@ spare = ""
 """
 
 import dataclasses
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...core import (
     AirmuscleError,
+    AirmuscleWarning,
     ColumnError,
     ParameterError,
+    UnitError,
     abridged,
     check_field_types,
     listed,
@@ -41,9 +44,22 @@ from ...core import (
 )
 from ...core.errors import check_known
 from ...core.units import AMBIENT_PRESSURE
-from ...recording.columns import QUANTITIES, parse_heading
+from ...recording.columns import (
+    QUANTITIES,
+    UNIT_SPELLINGS,
+    Heading,
+    parse_heading,
+    split_unit,
+)
 from .channels import RawTable
-from .constants import SPECIMEN, check_constants, collect_constants, held_value, parse_constant_name
+from .constants import (
+    SPECIMEN,
+    check_constants,
+    collect_constants,
+    file_conversion,
+    held_value,
+    parse_constant_name,
+)
 from .file_kind import read_toml
 from .header import FileNamePattern, bare_heading
 from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
@@ -282,6 +298,7 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
     units = list(table.units or ("",) * len(table.headings))
     notes = list(table.notes)
     for index, heading in mapped.items():
+        _warn_of_contradiction(table, index, heading)
         action = f"read as {heading}" if heading else "ignored"
         notes.append(f"Column '{table.headings[index]}' is {action}, according to the mapping.")
         headings[index] = heading
@@ -296,6 +313,51 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
     )
 
 
+_USUAL_UNITS = {
+    unit for spellings in UNIT_SPELLINGS.values() for unit in spellings if unit not in ("1", "-")
+}
+
+
+def _warn_of_contradiction(table: RawTable, index: int, heading: str) -> None:
+    """Warn where a mapping reads a column as another quantity, or in another unit, than its heading
+    or the row of units states.
+    """
+    written = parse_heading(table.headings[index])
+    read_as = parse_heading(heading)
+    if not heading or not read_as.known:
+        return
+    row = table.units[index] if table.units else ""
+    unit = row or written.unit or split_unit(table.headings[index])[1] or ""
+    another = written.known and written.target != read_as.target
+    if not another and not _contradict(unit, read_as):
+        return
+    warnings.warn(
+        f"{table.origin}: column {table.number(index)}, '{table.headings[index]}',"
+        f"{f' in {row},' if row else ''} is read as '{heading}' according to the mapping, which"
+        " contradicts its heading. Check the name or the number of the column in the mapping.",
+        AirmuscleWarning,
+        stacklevel=2,
+    )
+
+
+def _contradict(unit: str, read_as: Heading) -> bool:
+    """Whether a unit of a file is another one than that of the heading in the mapping, if that
+    states one.
+    """
+    target = read_as.target or "1"
+    if unit not in _USUAL_UNITS:
+        return False
+    try:
+        of_file = file_conversion(unit, target)
+    except UnitError:  # of another quantity
+        return True
+    stated = None if read_as.unit is None else file_conversion(read_as.unit, target)
+    if stated is None:
+        return False
+    known = not (of_file.assumed_gauge or stated.assumed_gauge)
+    return of_file.factor != stated.factor or (known and of_file.offset != stated.offset)
+
+
 def _column_index(table: RawTable, column: str) -> int:
     """The index of a column, by its heading, by its heading without unit, or by its number from
     1.
@@ -303,8 +365,9 @@ def _column_index(table: RawTable, column: str) -> int:
     for names in (table.headings, tuple(map(bare_heading, table.headings))):
         if names.count(column) == 1:
             return names.index(column)
-    if column.isdecimal() and 1 <= int(column) <= len(table.headings):
-        return int(column) - 1
+    numbers = [str(table.number(index)) for index in range(len(table.headings))]
+    if column in numbers:
+        return numbers.index(column)
     raise ColumnError(
         f"{table.origin}: the mapping names column '{column}', but the columns are"
         f" {listed(table.headings)}.{suggestion(column, table.headings)}"

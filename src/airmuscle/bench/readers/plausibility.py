@@ -7,19 +7,29 @@ units is wrong.
 
 import itertools
 import operator
+import re
 import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
+from ...core import (
+    AirmuscleWarning,
+    Array,
+    ColumnError,
+    Hint,
+    HintedText,
+    UnitError,
+    conversion,
+    listed,
+)
 from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
 from ..checks.contractions import code_of
 from .channels import Cells, RawTable
 from .constants import file_conversion
 from .missing_values import DropMissing, Mask
-from .time_base import AS_RECORDED, UNIFORM, WITHOUT_TIME
+from .time_base import AS_RECORDED, MAP_TIME, UNIFORM, WITHOUT_TIME
 
 CONTRACTION_RANGE = (-0.5, 1.0)
 """Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the
@@ -109,6 +119,39 @@ def _refuse(
         raise ColumnError(
             f"{table.location(row)}: {text.replace('{}', f'{values[row] / unit:.4g}')}", hint=hint
         )
+
+
+RATES = (
+    "speed",
+    "acceleration",
+    "angular_speed",
+    "angular_acceleration",
+    "shortening_speed",
+    "mass_flow",
+)
+"""Quantities that a steady state does not have."""
+_RATE_WORD = re.compile(r"(?<![a-z])(speed|vel|velocity|rate|omega|dq|qd)(?![a-z])", re.IGNORECASE)
+
+
+def warn_of_rates_without_time(recordings: Sequence[Recording]) -> None:
+    """Warn (AirmuscleWarning) of a recording that has rates but no time: it is a motion, and its
+    rows would be taken as steady states.
+    """
+    for recording in recordings:
+        rates = [
+            name
+            for name, values in recording.columns.items()
+            if (name.rpartition(".")[2] in RATES or _RATE_WORD.search(name.replace("_", " ")))
+            and np.ptp(values) > 0.0
+        ]
+        if "time" in recording.columns or not rates:
+            continue
+        text = (
+            f"{recording.origin}: there is no time, but {listed(rates)} vary, so the rows are no"
+            " steady states as which they are taken."
+        )
+        message = HintedText(text, MAP_TIME, WITHOUT_TIME)
+        warnings.warn(AirmuscleWarning(message), stacklevel=2)
 
 
 SAME_MAGNITUDE = 1.5
@@ -248,24 +291,26 @@ def check_unique(table: RawTable, headings: Sequence[Heading]) -> None:
     """Raise ColumnError where several columns contain one quantity, as two tables side by side
     do.
     """
-    numbers: dict[str, list[int]] = {}
+    indices: dict[str, list[int]] = {}
     for i, heading in enumerate(headings):
         if heading.text:
-            numbers.setdefault(heading.name, []).append(i + 1)
-    several = {name: own for name, own in numbers.items() if len(own) > 1}
+            indices.setdefault(heading.name, []).append(i)
+    several = {name: columns for name, columns in indices.items() if len(columns) > 1}
     if len(several) > 1:
         places = "; ".join(
-            f"{name}: columns {' and '.join(map(str, own))}" for name, own in several.items()
+            f"{name}: columns {' and '.join(str(table.number(i)) for i in columns)}"
+            for name, columns in several.items()
         )
         raise ColumnError(
             f"{table.origin}: {len(several)} quantities are in several columns ({places}), as in"
             " two tables side by side. Write each table to a sheet or a file of its own; for"
             " several muscles, write 'left.pressure' and 'right.pressure'."
         )
-    for name, own in several.items():
-        first, second = (headings[i - 1].text for i in own[:2])
+    for name, columns in several.items():
+        first, second = (headings[i].text for i in columns[:2])
+        number, further = (table.number(i) for i in columns[:2])
         raise ColumnError(
-            f"{table.origin}: columns '{first}' and '{second}' (numbers {own[0]} and {own[1]}) both"
-            f" contain the {name}. Rename or delete one of them; for several muscles, write"
+            f"{table.origin}: columns '{first}' and '{second}' (numbers {number} and {further})"
+            f" both contain the {name}. Rename or delete one of them; for several muscles, write"
             f" 'left.{name}' and 'right.{name}'."
         )

@@ -33,7 +33,9 @@ def read_mdf_tables(path: Path, selection: Selection = Selection()) -> tuple[Raw
             for i, name in enumerate(names)
             if name in selected
         }
-        table = merge_channels(path.name, list(_channels(file, reductions)), {})
+        table = merge_channels(
+            path.name, list(_channels(file, reductions)), {}, mapped=selection.columns
+        )
         notes = [
             f"Channel group '{names[i]}': {each.note}"
             for i, each in reductions.items()

@@ -1,13 +1,14 @@
 """Reader of bags of ROS 1 and ROS 2: the numbers of all topics with the times of their messages."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core import FileError
+from ...recording.recording import RowNote
 from .channels import Channel, RawTable, merge_channels
 from .selection import Selection
 from .separate_process import import_lab_package, reading
@@ -34,6 +35,11 @@ revolute joints.
 """
 QUANTITY_FIELDS = {"fluid_pressure": "pressure", "temperature": "temperature"}
 """Fields of standard messages that are quantities, with the names of these."""
+
+LOGS = ("/Log", "/DiagnosticArray", "/DiagnosticStatus", "/ParameterEvent")
+"""Ends of the types of messages that report on programs, whose numbers are no measurements; they
+are read if their topic is selected.
+"""
 
 MAX_ELEMENTS = 64
 """Elements of a list of numbers that become columns at most (chosen): joints, not pictures."""
@@ -77,7 +83,12 @@ def read_rosbag_tables(path: Path, selection: Selection = Selection()) -> tuple[
         with highlevel.AnyReader([folder], default_typestore=default) as bag:
             names = dict.fromkeys(connection.topic for connection in bag.connections)
             selected = selection.groups(folder.name, "topic", names)
-            chosen = [each for each in bag.connections if each.topic in selected]
+            chosen = [
+                connection
+                for connection in bag.connections
+                if connection.topic in selected
+                and (selection.group is not None or not connection.msgtype.endswith(LOGS))
+            ]
             for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
                 numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
                 topic = connection.topic.strip("/").replace("/", ".")
@@ -90,7 +101,20 @@ def read_rosbag_tables(path: Path, selection: Selection = Selection()) -> tuple[
     ]
     if not channels:
         raise FileError(f"{path}: no topic contains numbers.")
-    return (merge_channels(folder.name, channels, {}, "message"),)
+    table = merge_channels(folder.name, channels, {}, "message", selection.columns)
+    return (table.noted(*_repeated_times(topics)),)
+
+
+def _repeated_times(topics: Mapping[str, Sequence[tuple[float, Any]]]) -> Iterator[RowNote]:
+    """Notes on the messages that are left out because they have the time of the one before."""
+    for topic, messages in topics.items():
+        times = [time for time, _ in messages]
+        count = int(np.sum(np.diff(times) <= 0.0))
+        if count:
+            yield RowNote(
+                f"{len(times) - count} of {len(times)} messages of topic '{topic}' are read: the"
+                " others have the time of the message before."
+            )
 
 
 def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, float]]:

@@ -49,7 +49,7 @@ def read_tdms_tables(path: Path, selection: Selection = Selection()) -> tuple[Ra
                     time = np.asarray(start + offset + step * np.arange(len(channel)))
                 channels.append(Channel(channel.name, channel[:], time, unit))
             origin = f"{path.name}, group '{each.name}'" if len(selected) > 1 else path.name
-            tables.append(merge_channels(origin, channels, constants))
+            tables.append(merge_channels(origin, channels, constants, mapped=selection.columns))
         return tuple(tables)
 
 

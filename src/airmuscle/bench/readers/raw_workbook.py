@@ -106,8 +106,18 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
                 " rows of the table."
             )
     columns = tuple(_column([row[j] for _, row in body]) for j in used)
+    numbers = tuple(j + 1 for j in used)
+    if headings == [str(i) for i in range(1, len(used) + 1)]:  # of a table without headings
+        headings = list(map(str, numbers))
     return RawTable(
-        origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants
+        origin,
+        tuple(headings),
+        units,
+        columns,
+        np.array([i for i, _ in body]),
+        "row",
+        constants,
+        numbers=numbers,
     )
 
 

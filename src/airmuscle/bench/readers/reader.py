@@ -18,9 +18,9 @@ from .constants import split_specimens
 from .formats import EXTENSIONS, TEXT, format_of
 from .interpret import interpret
 from .mapping import ColumnMapping, apply_mapping, read_mapping
-from .plausibility import check_unit_consistency
+from .plausibility import check_unit_consistency, warn_of_rates_without_time
 from .raw_csv import Progress, read_csv_table, read_text_stream, read_text_tables
-from .time_base import Decimation, Downsampling, downsample
+from .time_base import Decimation, Downsampling, NoTime, downsample
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
@@ -117,6 +117,8 @@ def complete_bench(recordings: Sequence[Recording], mapping: ColumnMapping) -> l
     """
     complete = list(without_outliers(recordings) if mapping.drop_outliers else recordings)
     check_bench(complete)
+    if not isinstance(mapping.time, NoTime):
+        warn_of_rates_without_time(complete)
     return complete
 
 

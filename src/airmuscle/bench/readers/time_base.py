@@ -37,6 +37,26 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
     return np.asarray((instants - instants[0]) / 1e6)
 
 
+EPOCH = (9e8, 4.2e9)
+"""Range of times that count from 1970 [s]: from 1998 to 2103 (chosen)."""
+_EPOCH_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+
+
+def epoch_unit(cells: Cells) -> str | None:
+    """The unit of times (N,) that count from 1970, whose sizes differ by a factor of 1000; None for
+    other times.
+    """
+    if isinstance(cells, list) or not len(cells):
+        return None
+    low, high = (float(value) for value in (np.min(cells), np.max(cells)))
+    fits = (
+        unit
+        for unit, number in _EPOCH_UNITS.items()
+        if EPOCH[0] * number <= low and high <= EPOCH[1] * number
+    )
+    return next(fits, None)
+
+
 def _parse_time(cell: str) -> float | None:
     """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not
     a clock time. Microseconds are exact as floating-point numbers. A time that states its offset
@@ -142,6 +162,7 @@ UNIFORM = Hint("For stamps that the logger rounded", "time", UniformTime(), "Col
 AS_RECORDED = Hint(
     "To keep the stamps as they are", "time", RecordedTime(ordered=False), "ColumnMapping"
 )
+MAP_TIME = Hint("To state the column of the time", "columns", {"t": "time [s]"}, "ColumnMapping")
 WITHOUT_TIME = Hint("To read without time", "time", NoTime(), "ColumnMapping")
 TIME_BASES: dict[str, TimeBase] = {
     "recorded": RecordedTime(),

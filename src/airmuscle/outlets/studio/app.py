@@ -130,6 +130,10 @@ def create_app(
     return secured(Starlette(routes=routes, exception_handlers=errors), access)
 
 
+HERE = "./"
+"""Address of the page relative to itself, because a proxy may serve it below a path."""
+
+
 class Handlers:
     """The functions that answer requests, and the sheets that were requested last, by their
     identifier.
@@ -191,7 +195,7 @@ class Handlers:
         address.
         """
         if cookie := self._access.cookie(request.scope):
-            answer = self._responses.RedirectResponse("/", status_code=303)
+            answer = self._responses.RedirectResponse(HERE, status_code=303)
             answer.set_cookie(**cookie)
             return answer
         return self._responses.HTMLResponse(self._page)

@@ -28,9 +28,6 @@ MAX_SET = 64 * 10**6
 MAX_FILES = 400
 MAX_SETS = 40
 """Maximum number of files of a set, and of sets that the server keeps (chosen)."""
-MAX_IDLE = 600.0
-"""Time [s] without a request after which a set may be removed for the sake of another one (chosen);
-one without files may be removed at once."""
 MAX_NAME = 120
 """Maximum length of the name of a file (chosen)."""
 FILES = "files"
@@ -76,18 +73,13 @@ class UploadStore:
         self._used: dict[str, float] = {}
 
     def new_set(self, is_needed: IsNeeded) -> str:
-        """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest
-        if none is idle.
+        """The identifier of a new set; of too many, the one that has been idle for the longest time
+        makes room, one without files first. Raises BadRequest if all are needed.
         """
         with self._lock:
             if len(self._used) >= MAX_SETS:
-                latest = time.monotonic() - MAX_IDLE
                 filled = {name: any((self._top / name / FILES).iterdir()) for name in self._used}
-                idle = [
-                    n
-                    for n, used in self._used.items()
-                    if (used < latest or not filled[n]) and not is_needed(n)
-                ]
+                idle = [name for name in self._used if not is_needed(name)]
                 if not idle:
                     text = (
                         f"the server keeps {MAX_SETS} sets of files, and all are in use; try again"

@@ -84,7 +84,8 @@ class Access:
             secrets.compare_digest(each.encode(), self.token.encode()) for each in tokens
         ):
             return 401, "A token is required; open the address that the command printed."
-        if scope["method"] in READING and not scope["path"].startswith(COMPUTING):
+        path = scope["path"].removeprefix(scope.get("root_path", ""))  # of a proxy
+        if scope["method"] in READING and not path.startswith(COMPUTING):
             return None
         if scope["method"] not in (*READING, "POST"):
             return 405, "This method is not allowed."
@@ -94,7 +95,9 @@ class Access:
         ):
             return 403, "This request does not come from the page of this server."
         with contextlib.suppress(ValueError):  # an origin that is no address
-            if "origin" not in headers or urlsplit(headers["origin"]).netloc == host:
+            origin = urlsplit(headers.get("origin", ""))
+            here = (scope.get("scheme", "http"), host)
+            if "origin" not in headers or (origin.scheme, origin.netloc) == here:
                 return None
         return 403, "This request comes from another origin."
 
