@@ -250,6 +250,15 @@ def test_values_of_another_file_are_refused(tmp_path, name, reading, link, watch
     assert left_out or "another file, which is not read" in said or "no column 'angle'" in said
 
 
+def test_a_link_to_another_file_that_is_left_out_of_a_recording_is_said(tmp_path):
+    WRITERS["run.h5"](tmp_path / "run.h5")
+    linked(tmp_path / "run.h5", tmp_path / "secret", "angle")
+    mapping = ColumnMapping(units={"time": "s", "force": "N"})
+    (recording,) = read(tmp_path / "run.h5", mapping)
+    assert "angle" not in recording
+    assert "Not read: 'angle', which is a link to another file." in " ".join(recording.notes)
+
+
 @KINDS
 @pytest.mark.parametrize("name", ["run.h5", "seven.mat"])
 def test_a_fill_value_of_billions_of_rows_is_refused(tmp_path, name, reading, watched):

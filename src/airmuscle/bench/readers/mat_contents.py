@@ -23,7 +23,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from ...core import Array, FileError
-from .raw_hdf5 import check_no_external_links, check_own_values
+from .raw_hdf5 import check_no_external_links, check_own_dataset, check_own_values
 from .separate_process import import_lab_package, is_installed
 from .time_base import Downsampling, Reduction, check_reduced_lengths
 
@@ -199,6 +199,7 @@ class _Hdf5Reader:
 
     def _value(self, item: Any, place: str, in_cell: bool) -> Any:
         """A variable, a field or an element of a cell array; None if it is empty or not read."""
+        check_own_dataset(self._h5py, item, self._origin)
         kind = _class_of(item)
         is_group = isinstance(item, self._h5py.Group)
         if is_group and "MATLAB_sparse" not in item.attrs:

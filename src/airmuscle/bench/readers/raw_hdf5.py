@@ -31,6 +31,7 @@ def read_hdf5_tables(path: Path, selection: Selection = Selection()) -> tuple[Ra
     h5py = import_lab_package("h5py", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
         check_own_values(h5py, file, path)
+        links = tuple(_external_links(h5py, file))
         tables = _groups(h5py, file, path.name, selection.downsampling)
         contents = {
             name: (channels, constants, kept)
@@ -48,10 +49,20 @@ def read_hdf5_tables(path: Path, selection: Selection = Selection()) -> tuple[Ra
         for name in contents
     }
     return tuple(
-        reduction.noted(merge_channels(origins[name], channels, constants))
+        reduction.noted(merge_channels(origins[name], channels, constants)).noted(*links)
         for name, (channels, constants, reduction) in contents.items()
         if name in selected
     )
+
+
+def _external_links(h5py: Any, group: Any) -> Iterator[str]:
+    """Notes on the links to other files, which are not read, in a group and in those inside it."""
+    for name in group:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            yield f"Not read: '{name}', which is a link to another file. Store its values here."
+        elif isinstance(link, h5py.HardLink) and isinstance(group[name], h5py.Group):
+            yield from _external_links(h5py, group[name])
 
 
 def read_hdf5_arrays(path: Path) -> list[Arrays]:
@@ -88,15 +99,16 @@ def check_own_values(h5py: Any, file: Any, path: Path) -> None:
     """Raise FileError if the values of a dataset are in another file, which might be any file of
     this machine.
     """
+    file.visititems(lambda name, item: check_own_dataset(h5py, item, path.name))
 
-    def is_outside(name: str, item: Any) -> bool | None:
-        return (
-            True if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual) else None
-        )
 
-    if file.visititems(is_outside):
+def check_own_dataset(h5py: Any, item: Any, origin: str) -> None:
+    """Raise FileError if the values of an item, which may also be reached by a reference, are in
+    another file.
+    """
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
         raise FileError(
-            f"{path.name}: the values of a dataset are in another file, which is not read. Store"
+            f"{origin}: the values of a dataset are in another file, which is not read. Store"
             " them in this file."
         )
 
