@@ -14,10 +14,9 @@ from command_line import airmuscle
 from measurement_files import FILES, ROWS, STEP, UNITS, WRITERS, table_of_cells
 
 from airmuscle.bench import ColumnMapping, NoTime, read
-from airmuscle.bench.readers import Channel, formats, merge_channels
-from airmuscle.bench.readers.constants import file_conversion
+from airmuscle.bench.readers import Channel, constants, formats, merge_channels
 from airmuscle.errors import AirmuscleWarning, ColumnError
-from airmuscle.recording.columns import known_suffixes, parse_heading
+from airmuscle.recording import columns
 
 TIME = STEP * np.arange(ROWS)
 PRESSURE = Channel("pressure [bar]", 1.0 + TIME, TIME)
@@ -216,13 +215,17 @@ def test_messages_and_mappings_count_the_columns_of_the_file(tmp_path: Path, nam
 
 @pytest.mark.parametrize("name", ["force", "length", "pressure", "torque", "left.angle", "volume"])
 def test_a_unit_behind_an_underscore_is_that_in_brackets(tmp_path: Path, name: str):
-    units = [unit for unit in known_suffixes(parse_heading(name).target) if " " not in unit]
+    units = [
+        unit
+        for unit in columns.known_suffixes(columns.parse_heading(name).target)
+        if " " not in unit
+    ]
     assert len(units) > 3
     for unit in units:
-        joined = parse_heading(f"{name}_{unit}")
-        bracketed = parse_heading(f"{name} [{unit}]")
+        joined = columns.parse_heading(f"{name}_{unit}")
+        bracketed = columns.parse_heading(f"{name} [{unit}]")
         assert (joined.name, joined.unit) == (bracketed.name, bracketed.unit) == (name, unit)
-        assert file_conversion(unit, joined.target).factor > 0.0
+        assert constants.file_conversion(unit, joined.target).factor > 0.0
 
 
 # A mapping against the headings of a file
