@@ -36,7 +36,7 @@ from ode8 import compilers
 import airmuscle as am
 from airmuscle.core import tree
 from airmuscle.engine import Double, Precision, Single
-from airmuscle.engine.compile.llvm.processor import VARIABLE
+from airmuscle.engine.compile.llvm.processor import VARIABLE, possible_levels
 from airmuscle.engine.processes import available_cores
 from airmuscle.engine.run.batch.variations import default_states, variations_of
 
@@ -54,8 +54,9 @@ KEEPS_NAN = "-fno-finite-math-only"
 step by them.
 """
 WIDEST = "-mprefer-vector-width=512"
-LEVELS = {"this processor": "", "x86-64-v3": "x86-64-v3"}
-"""This processor, and one without AVX-512."""
+NARROWER = "x86-64-v3"
+"""A processor with AVX2, without AVX-512."""
+LEVELS = {"this processor": ""} | ({NARROWER: NARROWER} if NARROWER in possible_levels() else {})
 LIMITS = {KEEPS_NAN: 1.15, "": 0.95}
 """Least ratio of gcc's time to the library's by a flag after -ffast-math."""
 SPREAD = 0.05

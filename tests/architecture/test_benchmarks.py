@@ -191,8 +191,8 @@ def test_a_section_and_its_targets_are_printed():
 @pytest.mark.skipif("gcc" not in ode8.compilers(), reason="gcc is needed")
 def test_the_library_and_gcc_compute_the_same_for_each_width_of_registers():
     section = batch.section_of_widths(rounds=1, count=32, seconds=0.1)
-    assert len(section.rows) == 2 * 3
-    assert [target.limit for target in section.targets] == [1.15, 0.95] * 2
+    assert len(section.rows) == len(batch.LEVELS) * 3
+    assert [target.limit for target in section.targets] == [1.15, 0.95] * len(batch.LEVELS)
     assert all("-O3 -ffast-math -march=" in target.name for target in section.targets)
 
 

@@ -46,10 +46,15 @@ def processor() -> TargetProcessor:
     return level_of(level) if level else _this_processor()
 
 
+def possible_levels() -> list[str]:
+    """The levels that this processor reaches."""
+    features = _features()
+    return [name for name, (feature, _) in LEVELS.items() if features.get(feature)]
+
+
 def level_of(level: str) -> TargetProcessor:
     """A level of x86-64, such as x86-64-v3. Raises ParameterError as `processor`."""
-    features = _features()
-    possible = [name for name, (feature, _) in LEVELS.items() if features.get(feature)]
+    possible = possible_levels()
     if level not in possible:
         allowed = f"this processor can run {', '.join(possible) or 'no such level'}"
         raise ParameterError(
