@@ -8,6 +8,7 @@ of the angle.
 from __future__ import annotations
 
 import importlib
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ import airmuscle as am
 from airmuscle.bench import RegulatorLag, estimate_angles, fit_joint, fit_regulator_lags
 from airmuscle.errors import ParameterError
 
+processes = importlib.import_module("airmuscle.engine.processes")
 EPISODES = made_episodes(30)
 WITHOUT_COMMANDS = changed(EPISODES, command=lambda u: None)
 
@@ -49,7 +51,9 @@ def test_the_free_run_is_far_better_than_persistence_and_arx(fitted):
 
 
 class Search:
-    """A search whose stages end with given costs; None is an interruption."""
+    """A search whose stages end with given costs; None is an interruption, infinity a stage that
+    runs until it is stopped.
+    """
 
     def __init__(self, *costs):
         self.costs = list(costs)
@@ -57,8 +61,16 @@ class Search:
         self.arm = self
 
     def run(self, stage):
-        if (cost := self.costs.pop(0)) is None:
+        cost = self.costs.pop(0)
+        if cost is None:
             raise KeyboardInterrupt
+        while cost == np.inf:
+            try:
+                processes.check_running()
+            except KeyboardInterrupt:
+                self.stopped = True
+                raise
+            time.sleep(0.01)
         return cost
 
 
@@ -66,11 +78,11 @@ def test_the_search_that_ends_lower_is_taken_whatever_its_first_stages_say():
     module = importlib.import_module("airmuscle.bench.joint.fit")
     ahead = Search(1.0, 1.0, 3.0)
     later = Search(2.0, 2.0, 1.0)
+    assert module._best([ahead, later], None) == (1.0, later)
     broken = Search(1.0, None)
-    assert module._best([ahead, later]) == (1.0, later)
-    other = Search(1.0, 1.0, 1.0)
-    with pytest.raises(KeyboardInterrupt):
-        module._best([other, broken])
+    other = Search(np.inf)
+    with pytest.raises(KeyboardInterrupt), processes.thread_pool(2) as threads:
+        module._best([other, broken], threads)
     assert other.stopped
 
 
@@ -85,8 +97,8 @@ def test_the_last_joint_is_judged_in_the_free_run_of_all(monkeypatch):
     )
     windows = module.cut(made_episodes(2, joints=2), 0, 40)
     arm = module.reduced_arm(np.zeros(2))
-    monkeypatch.setattr(module, "_best", lambda searches: (1.0, arm))
-    module._search(made_episodes(2, joints=2), windows, (), 0, lambda text: None)
+    monkeypatch.setattr(module, "_best", lambda searches, executor: (1.0, arm))
+    module._search(made_episodes(2, joints=2), windows, (), 0, lambda text: None, None)
     assert used == [module.joint_errors] * 2 + [module.free_errors] * 2
     alone = module.joint_errors(arm, 1, windows)
     np.testing.assert_allclose(

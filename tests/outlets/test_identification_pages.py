@@ -116,5 +116,5 @@ def test_the_code_on_studies_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "study.toml").write_text(text.replace("count = 64", "count = 2"), encoding="utf-8")
     found = run("study.md")
     assert not found["result"].failed.size
-    assert (tmp_path / "out" / "chunks").exists()
+    assert (tmp_path / "out" / "tasks").exists()
     assert re.match(r"0\.\d+ ", capsys.readouterr().out)

@@ -59,8 +59,8 @@ from .study import StudyResult as StudyResult
 from .study import dask_cluster as dask_cluster
 from .study import load_study as load_study
 from .study import process_pool as process_pool
+from .study import result_store as result_store
 from .study import run_study as run_study
-from .study import shared_folder as shared_folder
 from .tuning import CaseMetrics as CaseMetrics
 from .tuning import FirstOrderDeadTime as FirstOrderDeadTime
 from .tuning import IntegralAbsoluteError as IntegralAbsoluteError

@@ -1,96 +1,22 @@
-"""Distribution of independent calls by an executor, and claims of a process on the tasks of a
-shared folder.
-"""
+"""Distribution of independent calls by an executor, whose results a store may hold already."""
 
-import contextlib
 import functools
-import os
 import pickle
-import time
-import uuid
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
-from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ..core import SimulationError
+from .content import function_name
 from .processes import check_running
+from .result_store import TaskKeys, current_store
 
-HEARTBEAT = 1.5
-"""Interval at which a process renews its claims [s] (chosen)."""
-EXPIRY = 6.0
-"""Time without renewal after which a claim is taken over [s] (chosen)."""
+MAX_SUBMISSIONS = 512
+"""Number of submissions into which many tasks are grouped (chosen: a submission to a cluster takes
+milliseconds, whatever its tasks take)."""
 Call = Callable[[Any, Any], Any]
-
-
-class Claims:
-    """The claims of a process in a shared folder: files that it creates, renews by their time
-    stamp, and removes.
-
-    A claim that is not renewed for `EXPIRY`, by the clock of this process, is renamed and thereby
-    taken over. If two processes compute a task nevertheless, after a suspension, their results are
-    equal and the file is replaced.
-    """
-
-    def __init__(self, folder: Path, owner: str) -> None:
-        self._folder = folder
-        self._owner = owner
-        self._held: set[str] = set()
-        self._seen: dict[str, tuple[int, float]] = {}
-        self._renewed = time.monotonic()
-        self.contended = False
-
-    def take(self, key: str) -> bool:
-        """Claim a task; false if another process holds it."""
-        path = self._path(key)
-        if self._expired(key, path):
-            with contextlib.suppress(OSError):  # taken over by another process
-                path.rename(taken := path.with_name(f"{path.name}-{uuid.uuid4().hex}"))
-                taken.unlink()
-        try:
-            descriptor = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600)
-        except FileExistsError:
-            return False
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(self._owner)
-        self._held.add(key)
-        return True
-
-    def _expired(self, key: str, path: Path) -> bool:
-        """Whether the time stamp of a claim has been unchanged for too long."""
-        try:
-            stamp = path.stat().st_mtime_ns
-        except OSError:
-            self._seen.pop(key, None)
-            return False
-        now = time.monotonic()
-        last, since = self._seen.get(key, (-1, now))
-        if stamp != last:
-            self._seen[key] = stamp, now
-            return False
-        return now - since > EXPIRY
-
-    def renew(self) -> None:
-        """Renew the time stamps of the claims of this process, if it is time."""
-        if time.monotonic() - self._renewed > HEARTBEAT:
-            self._renewed = time.monotonic()
-            for key in self._held:
-                with contextlib.suppress(OSError):  # taken over
-                    os.utime(self._path(key))
-
-    def release(self, key: str) -> None:
-        """Remove a claim."""
-        self._held.discard(key)
-        with contextlib.suppress(OSError):
-            self._path(key).unlink()
-
-    def release_all(self) -> None:
-        """Remove all claims of this process."""
-        for key in list(self._held):
-            self.release(key)
-
-    def _path(self, key: str) -> Path:
-        return self._folder / f"{key}.claim"
+Indexed = Iterator[tuple[int, Any]]
+T = TypeVar("T")
 
 
 class DistributedCalls:
@@ -99,34 +25,68 @@ class DistributedCalls:
 
     `common` is pickled once, when the first call is sent, and loaded once by each worker. The
     function is one of a module; its result must not depend on which worker computes it, nor on the
-    calls before.
+    calls before. Within `result_store`, results are taken from the store and added to it.
     """
 
-    def __init__(self, executor: Executor | None, function: Call, common: Any) -> None:
+    def __init__(
+        self, executor: Executor | None, function: Call, common: Any, *, content: Any = None
+    ) -> None:
+        """`content` is what determines the results beside function and task, where `common` has
+        more, such as a function for the progress.
+        """
         self._executor = executor
         self._function = function
         self._common = common
+        self._content = common if content is None else content
 
     @functools.cached_property
     def _pickled(self) -> bytes:
         return pickle.dumps(self._common, protocol=5)
 
-    def completed(self, tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    @functools.cached_property
+    def _keys(self) -> TaskKeys:
+        return TaskKeys(function_name(self._function), self._content)
+
+    def completed(self, tasks: Sequence[Any], keys: Sequence[str | None] | None = None) -> Indexed:
         """Index and result of each task, as completed. Raises what a call raises; SimulationError
         at a crash.
+
+        keys  those of the tasks in a store, where the result depends on less than function, common
+        argument and task
         """
+        store = current_store()
+        if store is None:
+            yield from self._computed(tasks)
+            return
+        keys = self._keys.of(tasks) if keys is None else keys
+        missing = []
+        for i, key in enumerate(keys):
+            stored = None if key is None else store.load(key)
+            if stored is None:
+                missing.append(i)
+            else:
+                yield i, stored.value
+        for place, result in self._computed([tasks[i] for i in missing]):
+            key = keys[missing[place]]
+            if key is not None:
+                store.save(key, result)
+            yield missing[place], result
+
+    def _computed(self, tasks: Sequence[Any]) -> Indexed:
+        """Index and result of each task, computed by the executor or here."""
         if self._executor is None:
             yield from ((i, self._function(self._common, task)) for i, task in enumerate(tasks))
             return
+        size = -(-len(tasks) // MAX_SUBMISSIONS) or 1
         futures: dict[Future[Any], int] = {}
         try:
-            for i, task in enumerate(tasks):
-                futures[self._executor.submit(_call, self._function, self._pickled, task)] = i
+            for i in range(0, len(tasks), size):
+                group = tasks[i : i + size]
+                future = self._executor.submit(_call_each, self._function, self._pickled, group)
+                futures[future] = i
             for future in as_completed(futures):
-                yield (
-                    futures.pop(future),
-                    future.result(),
-                )  # removed at once, to bound the memory of a long study
+                # removed at once, to bound the memory of a long study
+                yield from enumerate(future.result(), futures.pop(future))
         except BrokenExecutor:
             raise SimulationError(
                 "a worker process died, possibly for lack of memory. Run the same command again,"
@@ -149,9 +109,33 @@ class DistributedCalls:
         return found
 
 
-def _call(function: Call, pickled: bytes, task: Any) -> Any:
-    check_running()
-    return function(_load(pickled), task)
+def stored_result(name: str, content: Any, compute: Callable[[], T]) -> T:
+    """The result of a computation in this process: that in the store of the present block, if there
+    is one, or that of `compute`, which is then stored.
+
+    name, content  of the computation, and all that determines its result
+    """
+    store = current_store()
+    (key,) = (None,) if store is None else TaskKeys(name, None).of([content])
+    if store is None or key is None:
+        return compute()
+    stored = store.load(key)
+    if stored is not None:
+        result: T = stored.value
+        return result
+    result = compute()
+    store.save(key, result)
+    return result
+
+
+def _call_each(function: Call, pickled: bytes, tasks: Sequence[Any]) -> list[Any]:
+    """The results of a group of tasks, in a worker."""
+    common = _load(pickled)
+    results = []
+    for task in tasks:
+        check_running()
+        results.append(function(common, task))
+    return results
 
 
 @functools.lru_cache(maxsize=1)

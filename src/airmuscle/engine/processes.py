@@ -14,7 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from typing import IO, Any
 
 from ..core import BLAS_THREADS, AirmuscleError, InputError, current_units, one_thread
@@ -51,12 +51,11 @@ def process_pool(
     """A context manager for an executor with `workers` local processes; None for one worker, the
     process itself.
 
-    If `workers` is an executor, such as that of a cluster or of a shared folder, it is yielded and
-    remains open. `one_thread_each` limits the linear algebra of each worker to one thread, also of
-    the process itself, unless the environment states a number. If the block is left by an
-    exception, the workers stop between two runs, or at once with `terminate`, for tasks that write
-    nothing; if this process is killed, they exit. Raises InputError for a number of workers below
-    1.
+    If `workers` is an executor, such as that of a cluster, it is yielded and remains open.
+    `one_thread_each` limits the linear algebra of each worker to one thread, also of the process
+    itself, unless the environment states a number. If the block is left by an exception, the
+    workers stop between two runs, or at once with `terminate`, for tasks that write nothing; if
+    this process is killed, they exit. Raises InputError for a number of workers below 1.
     """
     if isinstance(workers, Executor):
         yield workers
@@ -94,6 +93,23 @@ def process_pool(
         raise
     finally:
         executor.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def thread_pool(threads: int) -> Iterator[Executor]:
+    """A context manager for an executor with threads of this process, whose tasks call
+    `check_running`; if the block is left by an exception, they stop there.
+    """
+    stop_events.append(stopped := threading.Event())
+    executor = ThreadPoolExecutor(threads, "worker")
+    try:
+        yield executor
+    except BaseException:
+        stopped.set()
+        raise
+    finally:
+        executor.shutdown(cancel_futures=True)
+        stop_events.remove(stopped)
 
 
 class _ProcessPool(ProcessPoolExecutor):

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, Hint, IdentificationError, check_whole
-from ...engine.distribution import DistributedCalls
+from ...engine.distribution import DistributedCalls, stored_result
 from ...engine.processes import Workers, check_running, process_pool
 from ...recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
@@ -82,7 +82,12 @@ def bootstrap(
         return Bootstrap(fit, _refit_linear(fit.problem, fit.values, group, draws), count, seed)
     report = progress or (lambda fraction: None)
     blocks = [draws[i : i + REFITS_OF_A_TASK] for i in range(0, refits, REFITS_OF_A_TASK)]
-    first = _refit_iteratively((fit, group, np.empty((0, len(fit.estimates))), report), blocks[0])
+    none = np.empty((0, len(fit.estimates)))
+    first = stored_result(
+        f"{__name__}:first refits",
+        (fit, group, blocks[0]),
+        lambda: _refit_iteratively((fit, group, none, report), blocks[0]),
+    )
     # The other blocks, at once, start at the parameters found in the first.
     with process_pool(
         workers if len(blocks) > 2 else 1, one_thread_each=True, terminate=True

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core import Array, StateVariable, System, Value, Values, model, tree
 from ...engine import RungeKutta4, WithSensitivities, sensitivity, simulate_batch
+from ...engine.processes import check_running
 from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
 from .episodes import HISTORY, Windows, WindowSignal, start_of
 
@@ -107,8 +108,6 @@ class Descent:
     """Errors (N, rows) [rad] of the joint, from which the cost comes: in its own free run or in
     that of all joints.
     """
-    stopped: bool = False
-    """Whether another thread has ended the search."""
 
     def __post_init__(self) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
@@ -134,8 +133,7 @@ class Descent:
         best = self.values.copy()
         cost = self._cost(self.values, rows)
         for step in range(1, schedule.iterations + 1):
-            if self.stopped:
-                break
+            check_running()
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
             error, gradient = gradients(
                 self.arm, self.joint, self.names, self.windows.part(np.sort(which), rows)

@@ -3,13 +3,16 @@ run.
 """
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from ...core import Array, ParameterError, one_thread, tree
+from ...engine.distribution import DistributedCalls, stored_result
+from ...engine.processes import Workers, process_pool, thread_pool
 from ...physics import (
     Braid,
     Muscle,
@@ -57,6 +60,7 @@ def fit_joint(
     residual: bool = False,
     seed: int = 0,
     progress: Progress = lambda text: None,
+    workers: Workers = 1,
 ) -> ArmFit:
     """Identify a joint, or an arm of joints, from episodes of pressures and angles.
 
@@ -71,6 +75,8 @@ def fit_joint(
               one if it gains 15 % on fitted episodes held back, and loses at most 5 % on the 5 % of
               them farthest from the data
     progress  called with one line after each stage
+    workers   number of processes, as in `compare`, for the searches of a joint; 1: threads of this
+              process
 
     Forces are linear in pressure with polynomials of the angle (LinearInPressure), friction sticks
     and grows with the tensions, that of the last of coupled joints also with the load of its
@@ -96,13 +102,19 @@ def fit_joint(
     delay = inspection.delay
     judge = cut(left, delay, rows)
     train, clipped = without_saturated(cut(fitted, delay, rows), ordered)
-    arm, paths = _search(fitted, train, tuple(axes), seed, progress)
+    with thread_pool(len(STRENGTHS)) if workers == 1 else process_pool(workers) as executor:
+        arm, paths = _search(fitted, train, tuple(axes), seed, progress, executor)
     separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
     gain = None
     apart = [text for _, texts, _ in separated for text in texts]
     remarks = [*short, *inspection.remarks, *clipped, SCALE, *apart]
     if residual:
-        arm, gain, words = judged_residual(arm, fitted, judge, delay, seed, progress)
+        physics = arm
+        arm, gain, words = stored_result(
+            f"{__name__}:residual",
+            (physics, fitted, judge, delay, seed),
+            lambda: judged_residual(physics, fitted, judge, delay, seed, progress),
+        )
         remarks.append(words)
     errors = run_errors(arm, judge)
     regulators = fit_regulator_lags(fitted, rows)
@@ -140,6 +152,7 @@ def _search(
     axes: tuple[tuple[int, int, int], ...],
     seed: int,
     progress: Progress,
+    executor: Executor | None,
 ) -> tuple[PressureDriven, dict[int, list[str]]]:
     """The arm, and the parameters fitted for each joint; the most coupled joint determines what
     they share.
@@ -160,28 +173,33 @@ def _search(
             free_errors if len(paths) == episodes.joints else joint_errors
         )  # all others are identified
         starts = [stronger(arm, joint, factor) for factor in STRENGTHS]
-        cost, arm = _best(
-            [Descent(a, windows, joint, paths[joint], seed, prior, errors=judge) for a in starts]
-        )
+        searches = [
+            Descent(start, windows, joint, paths[joint], seed, prior, errors=judge)
+            for start in starts
+        ]
+        cost, arm = _best(searches, executor)
         progress(
             f"joint {joint + 1}: {np.degrees(np.sqrt(cost)):.3g} deg, robust mean over the windows"
         )
     return arm, dict(sorted(paths.items()))
 
 
-def _best(searches: Sequence[Descent]) -> tuple[float, PressureDriven]:
-    """The smallest cost, and its arm, of searches to the end in parallel threads; an interruption
-    stops them all.
-    """
-    pool = ThreadPoolExecutor(len(searches))
-    try:
-        costs = list(pool.map(lambda search: [search.run(stage) for stage in STAGES][-1], searches))
-    finally:
-        for search in searches:
-            search.stopped = True
-        pool.shutdown()
-    best = int(np.argmin(costs))
-    return costs[best], searches[best].arm
+class SearchEnd(NamedTuple):
+    """The end of a search: its cost [rad^2] and its arm."""
+
+    cost: float
+    arm: PressureDriven
+
+
+def _best(searches: Sequence[Descent], executor: Executor | None) -> SearchEnd:
+    """The end with the smallest cost of searches that the executor runs in parallel."""
+    ends: list[SearchEnd] = DistributedCalls(executor, _search_to_end, None).results(searches)
+    return min(ends, key=lambda end: end.cost)
+
+
+def _search_to_end(_: None, search: Descent) -> SearchEnd:
+    costs = [search.run(stage) for stage in STAGES]
+    return SearchEnd(costs[-1], search.arm)
 
 
 def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: int) -> list[str]:

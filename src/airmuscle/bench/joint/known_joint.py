@@ -19,6 +19,7 @@ from ...core import (
     suggestion,
     tree,
 )
+from ...engine.distribution import stored_result
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, with_slopes, with_values
 from .episode_inspection import checked_inspection, without_saturated
@@ -131,8 +132,9 @@ def fit_known_joint(
         cut(part, inspection.delay, rows) for part in (episodes[split:], episodes[:split])
     )
     train, clipped = without_saturated(whole, episodes)
-    search = KnownSearch(system, paths, train.part(range(0, len(train), -(-len(train) // SAMPLE))))
-    system = search.run()
+    sample = train.part(range(0, len(train), -(-len(train) // SAMPLE)))
+    search = KnownSearch(system, paths, sample)
+    system = stored_result(f"{__name__}:search", (system, paths, sample), search.run)
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
     progress(
         f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes"

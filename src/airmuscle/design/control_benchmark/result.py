@@ -383,9 +383,9 @@ def benchmark_controllers(
             "seeds": tuple(seeds),
             "sets_per_gain": sets_per_gain,
             "commissioning_runs": commissioning_runs,
-            "progress": show if executor is None else None,
         }
-        distribution = DistributedCalls(executor, _benchmark_task, options)
+        shown = {**options, "progress": show if executor is None else None}
+        distribution = DistributedCalls(executor, _benchmark_task, shown, content=options)
         other = {
             each.name: known.name
             for each in contenders

@@ -12,6 +12,8 @@ from typing import Any
 
 from ...bench.reported import Reported
 from ...core import AirmuscleError, AirmuscleWarning, ParameterError, SolveError, cite
+from ...engine.distribution import DistributedCalls
+from ...engine.processes import Workers, process_pool
 from ...files.library import Entry, list_products, load_law, products_of_laws
 from ...report.chapter import Chapter, Table, TableColumn
 from . import JointRequirement, MuscleChoice, Requirement, SizingConditions, by_air, choose
@@ -228,6 +230,7 @@ def size_muscles(
     muscles: Iterable[Entry] | None = None,
     sort: SortKey = by_air,
     progress: Callable[[float], None] | None = None,
+    workers: Workers = 1,
 ) -> SizingResult:
     """The muscles that meet a requirement, each at its shortest length, and the others with the
     reason.
@@ -235,7 +238,8 @@ def size_muscles(
     `muscles` are library entries; by default those of `catalogue`. Each is tried with
     `conditions.min_count` to `conditions.max_count` muscles in parallel; a number is a choice if
     fewer muscles are longer or take more air. `sort` is the criterion of the ranking, `progress` is
-    called with the fraction done. Raises ParameterError for other arguments.
+    called with the fraction done, `workers` the number of processes, as in `compare`. Raises
+    ParameterError for other arguments.
     """
     if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
         raise ParameterError(
@@ -250,10 +254,11 @@ def size_muscles(
         )
     choices: list[MuscleChoice] = []
     unsuitable: list[UnsuitableMuscle] = []
-    for done, entry in enumerate(entries):
-        if progress is not None:
-            progress(done / len(entries))
-        choices_of_entry, failed = _choices_of(entry, requirement, conditions)
+    report = progress or (lambda fraction: None)
+    with process_pool(workers) as executor:
+        calls = DistributedCalls(executor, _choices_of, (requirement, conditions))
+        of_entries = calls.results(entries, lambda done: report(done / len(entries)))
+    for choices_of_entry, failed in of_entries:
         choices += choices_of_entry
         unsuitable += [] if choices_of_entry else [failed]
     unsuitable.sort(key=lambda item: item.count == 0)
@@ -266,11 +271,12 @@ def size_muscles(
 
 
 def _choices_of(
-    entry: Entry, requirement: Requirement, conditions: SizingConditions
+    sizing: tuple[Requirement, SizingConditions], entry: Entry
 ) -> tuple[list[MuscleChoice], UnsuitableMuscle]:
     """The choices of an entry, each better than those with fewer muscles, and why the greatest
     number does not do.
     """
+    requirement, conditions = sizing
     choices: list[MuscleChoice] = []
     failed = UnsuitableMuscle(entry.name, 0, "")
     for count in range(conditions.min_count, conditions.max_count + 1):

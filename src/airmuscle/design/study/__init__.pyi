@@ -1,6 +1,6 @@
-from ...engine.executors import dask_cluster as dask_cluster
-from ...engine.executors import shared_folder as shared_folder
+from ...engine.cluster import dask_cluster as dask_cluster
 from ...engine.processes import process_pool as process_pool
+from ...engine.result_store import result_store as result_store
 from .chunk import run_study as run_study
 from .design import DESIGNS as DESIGNS
 from .design import Grid as Grid

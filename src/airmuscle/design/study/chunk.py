@@ -1,9 +1,9 @@
-"""Execution of a study in chunks: groups of runs, their simulation on any executor, and the files
+"""Execution of a study in chunks: groups of runs, their simulation on any executor, and the store
 of their results.
 
-The name of a chunk file is the fingerprint of everything that its content depends on. An existing
-chunk therefore need not be computed again, even if the study was interrupted; if an input has
-changed, no file matches, and the chunk is computed.
+The key of a chunk is the fingerprint of everything that its content depends on. A stored chunk
+therefore need not be computed again, even if the study was interrupted; if an input has changed, no
+key matches, and the chunk is computed.
 """
 
 import dataclasses
@@ -20,7 +20,6 @@ from ...core import (
     Array,
     FileError,
     SimulationError,
-    atomic_file,
     check_writable,
     program_fingerprint,
 )
@@ -28,6 +27,7 @@ from ...core.system import with_prefix
 from ...core.tree import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running
+from ...engine.result_store import STORE_FOLDER, result_store
 from ...engine.run import solve
 from ...engine.run.problem import output_times
 from ...files.scenario.scenario import Scenario
@@ -74,7 +74,7 @@ _loaded: dict[tuple[str, str], Study] = {}
 
 
 Chunk = Mapping[str, npt.NDArray[Any]]
-"""Results of n runs, by the name of the array in its file.
+"""Results of n runs, by the name of the array.
 
 scalars          scalar metrics (n, k); NaN if a run failed or does not have the metric
 failure_reasons  reason of each failed run (n,); empty for other runs
@@ -88,12 +88,10 @@ def study_fingerprint(study: Study) -> str:
     return fingerprint(program_fingerprint(), study.fingerprint(), study.values)
 
 
-def chunk_file_names(study: Study) -> list[str]:
-    """The names of the files of all chunks."""
+def chunk_keys(study: Study) -> list[str]:
+    """The keys of all chunks in a store: they do not depend on the runs of the other chunks."""
     common = program_fingerprint(), study.fingerprint()
-    return [
-        f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in study.chunks
-    ]
+    return [fingerprint(*common, study.values[each.start : each.stop]) for each in study.chunks]
 
 
 def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
@@ -144,24 +142,6 @@ def compute_chunk(study: Study, index: int) -> Chunk:
     return {"scalars": scalars, "failure_reasons": np.array(reasons), **with_prefix(SERIES, series)}
 
 
-def write_chunk(chunk: Chunk, path: Path) -> None:
-    """Write a chunk to its file atomically."""
-    with atomic_file(path) as unfinished, unfinished.open("wb") as file:
-        np.savez(file, **chunk)  # type: ignore[arg-type]
-
-
-def read_chunk(study: Study, path: Path) -> Chunk | None:
-    """The chunk of a study in a file; None if the file is missing or damaged."""
-    names = "scalars", "failure_reasons", *with_prefix(SERIES, study.time_series)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in names}
-    except Exception:  # damage to any byte of an archive: it is computed again
-        return None
-
-
-CHUNK_FOLDER = "chunks"
-"""Folder of the chunk files, next to the results."""
 Progress = Callable[[int, int], None]
 
 
@@ -171,34 +151,37 @@ def run_study(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> StudyResult:
-    """Compute the runs that are not yet saved in `folder`/chunks, and return the result of all
+    """Compute the runs that are not yet stored in `folder`/tasks, and return the result of all
     runs.
 
-    folder    None: nothing is saved, for an executor that keeps all results, as that of a shared
-              folder does
+    folder    None: nothing is stored
     executor  any executor of concurrent.futures; by default this process itself
     progress  called with the number of completed runs and the total number of runs
 
-    The result does not depend on the executor. Completed chunks are saved, even if the study is
+    The result does not depend on the executor. Completed chunks are stored, even if the study is
     interrupted or killed: the next call resumes it. A failed run is recorded with its reason.
     Raises FileError if the folder cannot be written to, SimulationError if a worker process dies.
     """
-    files = _chunk_files(study, Path(folder) / CHUNK_FOLDER) if folder is not None else []
+    if folder is None:
+        return _computed(study, executor, progress)
+    check_writable(folder)
+    with result_store(Path(folder) / STORE_FOLDER):
+        return _computed(study, executor, progress)
+
+
+def _computed(study: Study, executor: Executor | None, progress: Progress | None) -> StudyResult:
+    """The result of all runs, of which those in the store of the present block are not computed."""
     # before the workers start, so that kernels are compiled only once
     (nominal,) = simulate_all([study.template.scenario], study.metric_times)
-    chunks = {
-        index: chunk for index, file in enumerate(files) if (chunk := read_chunk(study, file))
-    }
-    missing = [index for index in range(len(study.chunks)) if index not in chunks]
-    done = len(study) - sum(len(study.chunks[index]) for index in missing)
     report = progress or (lambda done, total: None)
-    report(done, len(study))
     study_file = str(study.path.resolve()), study_fingerprint(study)
     _loaded[study_file] = study  # this process need not read its file
-    for place, chunk in DistributedCalls(executor, run_chunk, study_file).completed(missing):
-        chunks[index := missing[place]] = chunk
-        if files:
-            write_chunk(chunk, files[index])
+    chunks: dict[int, Chunk] = {}
+    done = 0
+    report(done, len(study))
+    calls = DistributedCalls(executor, run_chunk, study_file)
+    for index, chunk in calls.completed(range(len(study.chunks)), chunk_keys(study)):
+        chunks[index] = chunk
         done += len(study.chunks[index])
         report(done, len(study))
     joined = {
@@ -214,29 +197,4 @@ def run_study(
             if isinstance(nominal, str)
             else study.scalar_values(nominal)
         ),
-    )
-
-
-def _chunk_files(study: Study, folder: Path) -> list[Path]:
-    """The files of all chunks in a folder, which is created, without what a study that was killed
-    has left there.
-    """
-    check_writable(folder.parent)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or error
-        raise FileError(
-            f"{folder}: cannot be created ({reason}). Choose a folder with write permission."
-        ) from None
-    for leftover in folder.glob(".*.part"):
-        leftover.unlink(missing_ok=True)
-    return [folder / name for name in chunk_file_names(study)]
-
-
-def count_finished_runs(study: Study, folder: Path | str) -> int:
-    """The number of runs of a study that are saved in `folder`/chunks."""
-    files = (Path(folder) / CHUNK_FOLDER / name for name in chunk_file_names(study))
-    return sum(
-        len(runs) for runs, file in zip(study.chunks, files, strict=True) if read_chunk(study, file)
     )

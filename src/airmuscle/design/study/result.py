@@ -120,11 +120,8 @@ class StudyResult(Reported):
             for name in self.study.scalars
         }
 
-    def chapter(self, *, execution: str = "") -> Chapter:
-        """The description of the study: design, statistics, sensitivities and figures.
-
-        `execution` is a paragraph on the processes that have computed the runs.
-        """
+    def chapter(self) -> Chapter:
+        """The description of the study: design, statistics, sensitivities and figures."""
         study = self.study
         indices = self.indices()
         metrics = {name: self[name] for name in study.scalars}
@@ -164,7 +161,7 @@ class StudyResult(Reported):
         return Chapter(
             "study",
             study.title,
-            (*summary, execution),
+            tuple(summary),
             plots=tuple(plots),
             tables=(*tables, variation_table(study)),
             values=tuple(NamedValue(name, count, brief=False) for name, count in counts.items()),

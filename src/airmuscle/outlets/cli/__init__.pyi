@@ -1,4 +1,3 @@
-from .campaign import KeptStages as KeptStages
 from .commands import COMMANDS as COMMANDS
 from .commands import app as app
 from .interruption import check_interrupted as check_interrupted

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from ...core import InputError, SimulationError, check_known
+from ...core import InputError, SimulationError, check_known, check_writable
 from ...design import TRUTH_SEEDS
 from ...design.control_benchmark import find_tasks, learn, scenario_contender, standard_contenders
 from ...design.control_benchmark.commissioning import COMMISSIONING_RUNS
@@ -82,7 +82,7 @@ def benchmark(
           --trials 10
       airmuscle benchmark --valves on-off --truths 2 --budget 40
       airmuscle benchmark --controller PID --controller examples/joint_cascade.toml --runs 0
-      airmuscle benchmark --join /shared/benchmark    (on each machine)
+      airmuscle benchmark --cluster tcp://head-node:8786
     """
     joint = request.valves(TRUTH_SEEDS[: request.truths])
     trials = request.trials
@@ -96,9 +96,12 @@ def benchmark(
     tasks = find_tasks(request.task)
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
-    writes = execution.writes(out)
+    check_writable(out)
     seeds = range(request.seed, request.seed + request.searches)
-    with execution.executor(alone=True) as workers, counted_progress("control benchmark") as show:
+    with (
+        execution.executor(out, alone=True) as workers,
+        counted_progress("control benchmark") as show,
+    ):
         result = benchmark_controllers(
             joint,
             contenders,
@@ -118,8 +121,7 @@ def benchmark(
             )
         ]
     chapter = result.chapter(curves)
-    writes = writes or execution.takes_over(out)
-    deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)
+    deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark")
     found = [run for each in result.results for run in each.runs.values()]
     if not any(run.metrics for run in found):
         raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")

@@ -1,15 +1,8 @@
 """`airmuscle campaign`: identification of one muscle from all files of a test rig, resumed at its
 finished stages.
-
-A stage is found by a fingerprint of the recordings, the geometry and the program; other data or
-another version of the program are fitted anew. The files are removed at the end of the campaign.
 """
 
-import contextlib
 import dataclasses
-import hashlib
-import pickle
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,7 +10,6 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...bench.identify.campaign import (
-    STAGES,
     Campaign,
     LeftOutStage,
     StaticStage,
@@ -27,10 +19,8 @@ from ...bench.identify.campaign import (
 from ...bench.identify.campaign.campaign_chapters import campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
-from ...core import atomic_file, atomic_folder, program_fingerprint
+from ...core import atomic_folder, check_writable
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
-from ...core.tree import fingerprint
-from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
 from ...files.scenario.write import campaign_scenarios
 from ...physics.muscle.geometry import Braid, Geometry
@@ -48,13 +38,8 @@ from ..requests import (
 from .delivery import Execution, deliver
 from .measurements import print_row_notes, reading_chapters
 from .options import Folder, Json, argument, with_requests
-from .terminal import echo, in_options, progress_bars
+from .terminal import in_options, progress_bars
 
-OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
-"""Rooms of the program that do not affect the stages of a campaign."""
-MAX_AGE = 30 * 86400.0
-"""Age from which the stages of a campaign that was never continued are removed [s] (chosen)."""
-_HASH = hashlib.sha256().digest_size
 STAGES_FILE = "stages.json"
 SCENARIOS = "scenarios"
 """File of the finished stages, which is replaced at the end of each stage, and folder of the
@@ -63,52 +48,6 @@ scenarios.
 
 FOLDER = "Folder with the files of one rig; or its files, or a glob pattern."
 CampaignFolder = Annotated[list[Path], argument("FOLDER", FOLDER)]
-
-
-class KeptStages:
-    """The stages of one campaign in the cache folder; without a private folder none is kept."""
-
-    def __init__(self, recordings: Sequence[Recording], geometry: Geometry | None) -> None:
-        data = [[each.origin, dict(each.columns), dict(each.constants)] for each in recordings]
-        self._key = fingerprint(data, geometry, program_fingerprint(OMITTED_ROOMS))[:32]
-        self._folder = cache_folder()
-        for path in self._folder.glob("campaign-*") if self._folder is not None else ():
-            with contextlib.suppress(OSError):
-                if time.time() - path.stat().st_mtime > MAX_AGE:
-                    path.unlink()
-
-    def load(self, names: Sequence[str]) -> dict[str, Any]:
-        """The results of the stages that an interrupted run has finished, by name."""
-        known = {}
-        for name, path in self._paths(names).items():
-            content = read_private(path)
-            if content is None or hashlib.sha256(content[_HASH:]).digest() != content[:_HASH]:
-                continue
-            with contextlib.suppress(Exception):  # written with other versions of the packages
-                known[name] = pickle.loads(content[_HASH:])
-        return known
-
-    def save(self, name: str, result: object) -> None:
-        """Keep the result of a finished stage; a result that cannot be stored is fitted again."""
-        for path in self._paths([name]).values():
-            with contextlib.suppress(Exception):  # CasADi raises none of the usual errors
-                content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
-                with atomic_file(path) as unfinished:
-                    unfinished.write_bytes(hashlib.sha256(content).digest() + content)
-
-    def remove(self, names: Sequence[str]) -> None:
-        """Remove the stages of a campaign that is complete."""
-        for path in self._paths(names).values():
-            with contextlib.suppress(OSError):
-                path.unlink(missing_ok=True)
-
-    def _paths(self, names: Sequence[str]) -> dict[str, Path]:
-        if self._folder is None:
-            return {}
-        return {
-            name: self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage"
-            for name in names
-        }
 
 
 @request
@@ -168,8 +107,8 @@ def campaign(
         if size is None
         else braid_of_length(size, check_one_length(resting_lengths(recordings)))
     )
-    writes = execution.writes(out)
-    result = _identify(recordings, geometry, out if writes else None, execution)
+    check_writable(out)
+    result = _identify(recordings, geometry, out, execution)
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios = campaign_scenarios(result)
     entry = _entry(result)
@@ -200,7 +139,6 @@ def campaign(
         }
         contents = {"muscle.toml": to_toml(entry), **named_muscles, **contents}
     chapters += reading_chapters(complete)
-    writes = writes or execution.takes_over(out)
     deliver(
         "campaign",
         chapters,
@@ -208,7 +146,6 @@ def campaign(
         out=out,
         title="Bench campaign",
         files=contents,
-        writes=writes,
     )
 
 
@@ -236,36 +173,25 @@ def _read_each(
 def _identify(
     recordings: Sequence[Recording],
     geometry: Geometry | None,
-    out: Path | None,
+    out: Path,
     execution: Execution,
 ) -> Campaign:
-    """The campaign, continued from an interrupted one; each finished stage is kept, and written to
-    a given folder.
-    """
-    kept, stages, names = KeptStages(recordings, geometry), list[dict[str, Any]](), STAGES[1:-1]
-    known = kept.load(names)
-    if known:
-        echo(f"  continued after: {', '.join(known)} (finished before the interruption)", err=True)
+    """The campaign; each finished stage is written to a folder."""
+    stages = list[dict[str, Any]]()
 
-    def keep(stage: str, result: object) -> None:
+    def write(stage: str, result: object) -> None:
         stages.append(stage_data(stage, result))
-        if stage in names and stage not in known:
-            kept.save(stage, result)
-        if out is not None:
-            with atomic_folder(out) as folder:
-                (folder / STAGES_FILE).write_text(as_json(stages), encoding="utf-8")
+        with atomic_folder(out) as folder:
+            (folder / STAGES_FILE).write_text(as_json(stages), encoding="utf-8")
 
-    with execution.executor(alone=True) as workers, progress_bars("campaign") as show:
-        result = identify_campaign(
+    with execution.executor(out, alone=True) as workers, progress_bars("campaign") as show:
+        return identify_campaign(
             recordings,
             geometry=geometry,
             progress=lambda _, fraction: show("", fraction),
-            finished=keep,
-            known=known,
+            finished=write,
             workers=workers,
         )
-    kept.remove(names)
-    return result
 
 
 def _validation(result: Campaign, recording: Recording) -> list[ValidationRow]:

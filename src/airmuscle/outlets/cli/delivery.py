@@ -1,14 +1,15 @@
 """Delivery of a result: its files, all or none, and its brief view in the terminal, or JSON; the
-processes that compute it: --workers, --dask, --join."""
+processes that compute it: --workers, --cluster; and the store of what they have finished."""
 
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ...core import FolderInUseError, atomic_folder, check_writable
-from ...engine.executors import SharedFolder, dask_cluster, shared_folder
+from ...core import AirmuscleError, FileError, SimulationError, atomic_folder, counted
+from ...engine.cluster import dask_cluster
 from ...engine.processes import Workers, available_cores
+from ...engine.result_store import STORE_FOLDER, ResultStore, result_store
 from ...report.chapter import Chapter
 from ...report.data import as_data, in_words
 from ...report.text import as_text
@@ -29,21 +30,22 @@ def deliver(
     title: str = "",
     files: Files | None = None,
     others: Mapping[str, Path] | None = None,
-    writes: bool = True,
+    complete: bool = True,
 ) -> None:
     """Write the files and the report of a result into a folder, if there is one, and print the
-    result.
+    result. The stored results of its tasks are then removed.
 
     command  whose options the hints of the texts name
     title    of the report; without one no report is written
     others   files elsewhere that are named with those of the folder
-    writes   whether this process writes the files; otherwise it names those that another one writes
+    complete whether nothing remains to be computed, so that the results of tasks are removed
     """
     worded = [in_words(each, lambda text: in_options(text, command)) for each in chapters]
     paths = dict(others or {})
     if out is not None:
-        if writes:
-            write_result(out, worded, title, files or {})
+        write_result(out, worded, title, files or {})
+        if complete:
+            ResultStore(out / STORE_FOLDER).remove()
         for name in (*(files or {}), *([REPORT_FILE] if title else [])):
             path = (
                 Path(name) if len(Path(name).parts) == 1 else Path(name).parent
@@ -95,72 +97,56 @@ class Execution:
         "Number of local processes; by default as many as cores, or one that uses all cores.",
         bounds=(1, 1024),
     )
-    dask: str | None = optional(
-        "Use a running Dask cluster, such as tcp://host:8786.", metavar="ADDRESS"
-    )
-    join: Path | None = optional(
-        "Share the computation with all processes that run the same command with this folder, on"
-        " any machines.",
-        metavar="FOLDER",
+    cluster: str | None = optional(
+        "Compute on a Dask cluster: the address or the scheduler file of a running one, or a TOML"
+        " file that describes one.",
+        metavar="ADDRESS|FILE",
     )
 
     def check(self, where: Where) -> None:
         """Refuse a cluster together with local processes."""
-        if self.dask is not None and (self.workers is not None or self.join is not None):
+        if self.cluster is not None and self.workers is not None:
             raise RequestError(
-                f"{where('join' if self.workers is None else 'workers')} and {where('dask')}"
-                " exclude each other: a Dask cluster has its own workers."
+                f"{where('workers')} and {where('cluster')} exclude each other: a cluster has its"
+                " own workers."
             )
 
     @contextlib.contextmanager
-    def executor(self, tasks: int | None = None, *, alone: bool = False) -> Iterator[Workers]:
-        """Yield the executor, or the number of local processes; `tasks` limits the latter, which is
-        by default the number of cores, or 1 for what uses all cores `alone`.
+    def executor(
+        self, out: Path | None, tasks: int | None = None, *, alone: bool = False
+    ) -> Iterator[Workers]:
+        """Yield the executor, or the number of local processes; results are stored beside the
+        output, `out`, and taken from there after an interruption.
 
-        At the end it is stated which processes have computed how many tasks of a shared folder.
+        `tasks` limits the number of local processes, which is by default that of the cores, or 1
+        for what uses all cores `alone`.
         """
-        local = self.workers or (1 if alone and self.join is None else available_cores())
-        if self.dask is not None:
-            with dask_cluster(self.dask) as cluster:
+        local = self.workers or (1 if alone else available_cores())
+        with _stored_results(out):
+            if self.cluster is None:
+                yield min(local, tasks or local)
+                return
+            with dask_cluster(self.cluster, lambda text: echo(text, err=True)) as cluster:
                 yield cluster
-        elif self.join is not None:
-            with shared_folder(self.join, local) as folder:
-                try:
-                    yield folder
-                finally:
-                    echo(contributions(folder), err=True)
-        else:
-            yield min(local, tasks or local)
 
-    def writes(self, out: Path) -> bool:
-        """Whether this process writes the output; false with a message if another one does. Raises
-        FileError.
-        """
+
+@contextlib.contextmanager
+def _stored_results(out: Path | None) -> Iterator[None]:
+    """A context manager for the store in the folder of the output; says where a command resumes."""
+    if out is None:
+        yield
+        return
+    folder = out / STORE_FOLDER
+    with result_store(folder, lambda: echo(f"resuming from the results in {folder}", err=True)) as (
+        store
+    ):
         try:
-            check_writable(out)
-        except FolderInUseError:
-            if self.join is None:
-                raise
-            echo(
-                f"{out} is written by another process; this one computes for {self.join} only",
-                err=True,
-            )
-            return False
-        return True
-
-    def takes_over(self, out: Path) -> bool:
-        """Whether the process that was to write the output has ended without it, so that this one
-        writes it.
-        """
-        with contextlib.suppress(FolderInUseError):
-            if not (out / REPORT_FILE).exists():
-                check_writable(out)
-                return True
-        return False
-
-
-def contributions(folder: SharedFolder) -> str:
-    """The number of results of each process, and of the tasks that are left, in one line."""
-    shares = ", ".join(f"{count} by {name}" for name, count in sorted(folder.contributions.items()))
-    left = f"; {folder.left} are left" if folder.left else ""
-    return f"Tasks of the shared folder: {shares or 'none completed'}{left}"
+            yield
+        except (SimulationError, FileError, KeyboardInterrupt):
+            if count := store.recalled + store.saved:
+                results = counted(count, "result")
+                echo(f"{results} saved in {folder}; the same command resumes from there", err=True)
+            raise
+        except AirmuscleError:  # the data or the request do not allow a result
+            store.remove()
+            raise

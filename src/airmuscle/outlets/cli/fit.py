@@ -59,28 +59,26 @@ def fit(
           bar=18 %"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both --length-error "20 cm"
-      airmuscle fit muscles/*.csv --mapping rig.toml --compare --join /shared/fit    (on each
-          machine)
+      airmuscle fit muscles/*.csv --mapping rig.toml --compare --cluster cluster.toml
       airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length
           "200 mm" --compare
       airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    processes = (execution.workers, execution.dask, execution.join)
-    if processes != (None, None, None) and not (request.compare or request.bootstrap):
+    processes = (execution.workers, execution.cluster)
+    if processes != (None, None) and not (request.compare or request.bootstrap):
         raise RequestError(
-            "--workers, --dask and --join distribute the candidates of --compare and the refits of"
+            "--workers and --cluster distribute the candidates of --compare and the refits of"
             " --bootstrap"
         )
     recordings = read_recordings(files, reading)
-    writes = execution.writes(out)
+    check_writable(out)
     progress = progress_bars("comparison" if request.compare else "fit")
-    with execution.executor() as executor, progress as show:
+    with execution.executor(out) as executor, progress as show:
         found = fit_requested(
             request, files, recordings, lambda _, fraction: show("", fraction), executor
         )
     muscle = {"muscle.toml": to_toml(found.entry)}
-    writes = writes or execution.takes_over(out)
-    deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle, writes=writes)
+    deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle)
 
 
 @request

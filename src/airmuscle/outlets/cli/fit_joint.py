@@ -5,7 +5,7 @@ from typing import Annotated
 
 from ...core import check_writable
 from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
-from .delivery import deliver
+from .delivery import Execution, deliver
 from .options import Folder, Json, argument, with_requests
 from .terminal import echo
 
@@ -16,7 +16,11 @@ Episodes = Annotated[
 
 @with_requests
 def fit_joint_command(
-    source: Episodes, request: JointFitRequest, out: Folder = Path("joint"), json: Json = False
+    source: Episodes,
+    request: JointFitRequest,
+    execution: Execution,
+    out: Folder = Path("joint"),
+    json: Json = False,
 ) -> None:
     """Identify a joint or an arm from its episodes.
 
@@ -40,5 +44,8 @@ def fit_joint_command(
         echo(str(inspect_requested(source, request)))
         return
     check_writable(out)
-    chapter, files = fit_requested_arm(source, request, lambda text: None if json else echo(text))
+    with execution.executor(out, alone=True) as workers:
+        chapter, files = fit_requested_arm(
+            source, request, lambda text: None if json else echo(text), workers
+        )
     deliver("fit-joint", [chapter], json=json, out=out, title="Identified arm", files=files)

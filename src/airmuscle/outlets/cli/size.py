@@ -3,7 +3,7 @@
 from ...core import check_writable
 from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest
-from .delivery import deliver
+from .delivery import Execution, deliver
 from .options import Json, OptionalFolder, with_requests
 from .terminal import progress_bars
 
@@ -11,7 +11,9 @@ SCENARIO_FILE = "scenario.toml"
 
 
 @with_requests
-def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -> None:
+def size(
+    request: SizeRequest, execution: Execution, out: OptionalFolder = None, json: Json = False
+) -> None:
     """Size muscles of the catalogue for a lift or a joint.
 
     \b
@@ -32,8 +34,8 @@ def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -
     """
     if out is not None:
         check_writable(out)
-    with progress_bars("sizing") as show:
-        result = request.evaluate(lambda fraction: show("", fraction))
+    with execution.executor(out, alone=True) as workers, progress_bars("sizing") as show:
+        result = request.evaluate(lambda fraction: show("", fraction), workers)
     scenario = sizing_scenario(
         result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out"
     )

@@ -137,20 +137,17 @@ def tune(
       airmuscle tune examples/pressure_loop.toml --rules --out tuning
       airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s"
           --budget 20000
-      airmuscle tune lift.toml --join /shared/tuning    (on each machine)
+      airmuscle tune lift.toml --cluster scheduler.json
     """
     loaded = load_scenario_loop(scenario)
     target = save or scenario.with_name(f"{scenario.stem}-tuned.toml")
-    writes = execution.writes(out)
-    if writes:
-        check_writable(target.parent)
+    check_writable(out)
+    check_writable(target.parent)
     loaded.check_target(target)
     ranges = loaded.bounds(request.bounds)
-    with execution.executor(alone=True) as workers:
+    with execution.executor(out, alone=True) as workers:
         tuning, notes, rules = _search(loaded, ranges, request, workers)
-    writes = writes or execution.takes_over(out)
-    if writes:
-        loaded.save(tuning.gains, target)
+    loaded.save(tuning.gains, target)
     chapter = tuning.chapter(
         loaded.scenario.title, notes, rules, loaded.scenario.problem.integrator
     )
@@ -166,7 +163,7 @@ def tune(
         title="Tuning",
         files=files,
         others=others,
-        writes=writes,
+        complete=not tuning.interrupted,
     )
     if tuning.interrupted:
         check_interrupted()

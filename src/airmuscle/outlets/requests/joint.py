@@ -20,6 +20,7 @@ from ...bench.joint import (
 from ...bench.joint.episode_formats import propose_mapping
 from ...bench.joint.episode_inspection import EpisodeInspection, inspect_episodes
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
+from ...engine.processes import Workers
 from ...files.library import list_plants
 from ...files.library.write import entry_of, model_table, scenario_toml, to_toml
 from ...files.scenario import load_scenario
@@ -119,7 +120,10 @@ def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:
 
 
 def fit_requested_arm(
-    source: Path, request: JointFitRequest, progress: Callable[[str], None]
+    source: Path,
+    request: JointFitRequest,
+    progress: Callable[[str], None],
+    workers: Workers = 1,
 ) -> tuple[Chapter, dict[str, str]]:
     """The chapter of the fit, and scenarios and muscles by file. Raises RequestError without a
     mapping file.
@@ -135,7 +139,12 @@ def fit_requested_arm(
     }
     if request.known is None:
         fit = fit_joint(
-            episodes, axes=rules.axes, residual=request.residual, seed=request.seed, **common
+            episodes,
+            axes=rules.axes,
+            residual=request.residual,
+            seed=request.seed,
+            workers=workers,
+            **common,
         )
         names = [muscle.name for muscle in fit.arm.muscle]
         note = "supply, orifices and volumes are chosen"

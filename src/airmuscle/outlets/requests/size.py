@@ -12,6 +12,7 @@ from ...design.sizing import (
     size_muscles,
 )
 from ...design.sizing.requirement_and_choice import SORT_KEYS, Requirement
+from ...engine.processes import Workers
 from ...files.library import load_law
 from .declaration import RequestError, Where, many, option, optional, request
 
@@ -143,7 +144,9 @@ class SizeRequest:
                 f"give {load} and {stroke} for a lift, or {torque} and {angle} for a joint"
             )
 
-    def evaluate(self, progress: Callable[[float], None] | None = None) -> SizingResult:
+    def evaluate(
+        self, progress: Callable[[float], None] | None = None, workers: Workers = 1
+    ) -> SizingResult:
         """The sizing, with at least one choice. Raises ParameterError, and SolveError with what is
         reachable.
         """
@@ -162,6 +165,13 @@ class SizeRequest:
         )
         entries = tuple(map(load_law, self.muscle)) or None
         sort = self.sort
-        result = size_muscles(requirement, conditions, entries, sort, progress)  # type: ignore[arg-type]
+        result = size_muscles(
+            requirement,
+            conditions,
+            entries,
+            sort,  # type: ignore[arg-type]
+            progress,
+            workers,
+        )
         result.check_reachable()
         return result

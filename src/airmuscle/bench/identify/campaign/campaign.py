@@ -3,11 +3,12 @@ experiments.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
 from ....core import AirmuscleError, IdentificationError
+from ....engine.distribution import stored_result
 from ....engine.processes import Workers, process_pool
 from ....physics import CreepElements, Geometry, NoFriction, ValidityRange
 from ....recording import Recording
@@ -35,7 +36,6 @@ def identify_campaign(
     geometry: Geometry | None = None,
     progress: Callable[[str, float], None] | None = None,
     finished: Callable[[str, object], None] | None = None,
-    known: Mapping[str, Any] | None = None,
     workers: Workers = 1,
 ) -> Campaign:
     """Identify one muscle from all recordings of a rig.
@@ -48,16 +48,17 @@ def identify_campaign(
               fills at several lengths
     progress  called with the name of the stage and the completed fraction of the campaign
     finished  called with the name and the result of each stage as it ends
-    known     results of finished stages by name, from an interrupted call with the same recordings
-              and geometry
     workers   number of processes, as in `compare`: of the fits of loops and of the candidates of
               the static law
+
+    Within `result_store` a finished stage is stored, and not fitted again by a later call with the
+    same recordings and geometry.
 
     Raises IdentificationError where no record can be used, with the cause in the data if there is
     one (`support_of`).
     """
-    steps = _Steps(progress, finished, known or {})
     records = classify_records(named(recordings))
+    steps = _Steps(progress, finished, (records, geometry))
     support = support_of(recordings)
     is_unused = [record.kind is RecordKind.UNUSED for record in records]
     if all(record.kind.is_static or record.kind is RecordKind.UNUSED for record in records):
@@ -106,11 +107,11 @@ def identify_campaign(
 
 @dataclasses.dataclass(frozen=True)
 class _Steps:
-    """Progress over the stages, and the known results of some."""
+    """Progress over the stages; `data` is what determines their results."""
 
     progress: Callable[[str, float], None] | None
     finished: Callable[[str, object], None] | None
-    known: Mapping[str, Any]
+    data: Any
 
     def show(self, stage: str, fraction: float) -> None:
         """Report the completed fraction of a stage."""
@@ -121,12 +122,12 @@ class _Steps:
             )
 
     def fit(self, stage: str, task: Callable[[Callable[[float], None]], T]) -> T:
-        """The result of a stage: the known one, or that of the task, which is called with the
+        """The result of a stage: the stored one, or that of the task, which is called with the
         progress.
         """
-        return self.end(
-            stage, self.known[stage] if stage in self.known else task(partial(self.show, stage))
-        )
+        name = f"{__name__}:{stage}"
+        result = stored_result(name, self.data, lambda: task(partial(self.show, stage)))
+        return self.end(stage, result)
 
     def end(self, stage: str, result: T) -> T:
         """Report the end of a stage with its result."""

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ....core import AirmuscleWarning, atomic_file, user_folder
+from ....core.private_files import read_private
 from ..llvm.jit import engine_of, object_code
 from ..llvm.processor import processor
 
@@ -54,22 +55,6 @@ def cache_folder() -> pathlib.Path | None:
     return folder
 
 
-def read_private(path: pathlib.Path) -> bytes | None:
-    """The contents of a regular file that belongs to the user and that nobody else may write to."""
-    flags = [
-        getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_BINARY", "O_NONBLOCK")
-    ]  # a pipe is not waited for
-    try:
-        with open(os.open(path, os.O_RDONLY | sum(flags)), "rb") as file:
-            state = os.fstat(file.fileno())
-            private = not _POSIX or (
-                state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-            )
-            return file.read() if private and stat.S_ISREG(state.st_mode) else None
-    except OSError:
-        return None
-
-
 @functools.cache
 def warn_not_stored(reason: str) -> None:
     """Warn that compiled kernels are not stored."""
@@ -89,7 +74,7 @@ def load(name: str, kinds: Sequence[str]) -> bytes | None:
     if folder is None:
         return None
     path = folder / _file_name(name, kinds)
-    content = read_private(path)
+    content = read_private(path).content
     if content is None:
         return None
     with contextlib.suppress(OSError):  # the time of its last use, for `_remove_oldest`
