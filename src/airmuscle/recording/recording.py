@@ -228,6 +228,14 @@ class Recording(NotebookDisplay):
         return recording_card(self, {})
 
 
+def resting_length_of(recording: Recording) -> float | None:
+    """The resting length [m] that a recording states, to nine digits, so that equal ones are equal;
+    None without one.
+    """
+    stated = recording.constants.get("resting_length")
+    return None if stated is None else float(f"{float(stated):.9g}")
+
+
 def column_heading(name: str) -> str:
     """The heading of a column with its SI unit, for files and data frames: `pressure [Pa]`."""
     quantity = quantity_of(name)

@@ -10,7 +10,14 @@ import numpy.typing as npt
 
 from ...core import Array
 from ...recording.recording import Recording
-from ..segment import estimate_sensors, remembered
+from ..segment import (
+    EDGE,
+    ROUNDING,
+    distinct_readings,
+    estimate_sensors,
+    merged_readings,
+    remembered,
+)
 
 MIN_FORCE = 0.05
 """Minimum force of a row that surely pulls, as a fraction of the maximum force (chosen)."""
@@ -103,6 +110,10 @@ class BenchRows(NamedTuple):
         return self.at(without & (self.contraction > MAX_ELONGATION))
 
 
+SINGULAR = 1e-9
+"""Relative singular value below which a line is not determined (chosen)."""
+
+
 @remembered
 def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
     """The complete rows of the recordings that have all three quantities."""
@@ -129,7 +140,7 @@ def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
             run.pressure
         ):
             continue
-        step = ((np.max(run.contraction) - run.contraction) / STEP).astype(int)
+        step = ((np.max(run.contraction) - run.contraction) / STEP + EDGE).astype(int)
         counts = np.bincount(step)
         means = np.bincount(step, run.force) / np.maximum(counts, 1)
         change = FLAT * np.subtract(*limits(run.force)[::-1]) / max(counts.size - 1, 1)
@@ -207,10 +218,10 @@ def pressure_lines(rows: BenchRows) -> list[PressureLine]:
     pull = rows.shortened.pulling
     if pull.force.size < MIN_ROWS:
         return []
-    edges = np.unique(np.quantile(pull.contraction, np.linspace(0.0, 1.0, LEVELS + 1)))
-    level = np.clip(
-        np.searchsorted(edges, pull.contraction, side="right"), 1, max(edges.size - 1, 1)
-    )
+    contraction = merged_readings(pull.contraction)  # a level is not divided by rounding
+    edges = distinct_readings(np.quantile(contraction, np.linspace(0.0, 1.0, LEVELS + 1)))
+    above = np.searchsorted(edges * (1.0 - ROUNDING * np.sign(edges)), contraction, side="right")
+    level = np.clip(above, 1, max(edges.size - 1, 1))
     lines = []
     for i in range(1, max(edges.size, 2)):
         part = pull.at(level == i)
@@ -223,7 +234,7 @@ def pressure_lines(rows: BenchRows) -> list[PressureLine]:
             columns += [offset, part.pressure * offset]
         matrix = np.column_stack(columns)
         scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-        values, _, rank, _ = np.linalg.lstsq(matrix / scale, part.force, rcond=None)
+        values, _, rank, _ = np.linalg.lstsq(matrix / scale, part.force, rcond=SINGULAR)
         if rank < matrix.shape[1] or not values[1] > 0:
             continue
         residual = part.force - matrix @ (values / scale)

@@ -31,6 +31,7 @@ from .model_selection import (
     excess_error,
     is_contradicted,
 )
+from .ties import in_order
 from .weighting import LeastSquares, Loss
 
 SPLITS = (RunSplit(), SpecimenSplit())
@@ -93,7 +94,9 @@ def select_for_both(
             r[name].cross_validated_rmse / error for r, error in zip(rankings, lowest, strict=True)
         )
 
-    best = min(names, key=lambda name: (max(ratios(name)), rankings[0][name].parameter_count))
+    best = in_order(
+        list(names), lambda name: max(ratios(name)), lambda name: rankings[0][name].parameter_count
+    )[0]
     limit = max(1 + MAX_JOINT_EXCESS, *ratios(best))
     within = [name for name in names if max(ratios(name)) <= limit]
     for each in (

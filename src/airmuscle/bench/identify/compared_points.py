@@ -12,13 +12,17 @@ import numpy.typing as npt
 
 from ...core import AirmuscleError, Array, HintedText, IdentificationError, tree
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
-from ...recording import Recording
+from ...recording import Recording, resting_length_of
 from .candidates import Candidate, evaluate_force, slack_rows
 from .cross_validation import GroupSplit, label_folds, specimen_name
 from .fit_points import FitPoints
 from .group_refits import GroupRefits, RowIndices
 from .pooling import Pooling, make_pooling
-from .problem import POINT_COLUMNS, RESTING_LENGTH, LeastSquaresSolution, with_length
+from .problem import (
+    POINT_COLUMNS,
+    LeastSquaresSolution,
+    with_length,
+)
 from .result import Fit
 from .slack import MIN_PULL, PULL_RATIO, SlackPull, slack_pull, with_slack_bounds
 from .solver import design_matrix, is_linear
@@ -65,10 +69,7 @@ def evaluated_rows(runs: Sequence[Recording]) -> EvaluatedRows:
         np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS
     )
     index = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
-    lengths = [
-        float(run.constants[RESTING_LENGTH]) if RESTING_LENGTH in run.constants else None
-        for run in runs
-    ]
+    lengths = list(map(resting_length_of, runs))
     muscles = tuple(zip(lengths, map(specimen_name, runs), strict=True))
     return EvaluatedRows(pressure, contraction, force, index, muscles).at(
         np.isfinite(pressure + contraction + force)

@@ -7,6 +7,7 @@ law fitted to some of them also fits the others, which says nothing about its er
 
 import abc
 import dataclasses
+import re
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -36,6 +37,7 @@ MAX_LEVEL_WIDTH = 3.0
 """
 HELD_FRACTION = 0.9
 """Minimum fraction of the rows at levels for a quantity that is held (chosen)."""
+NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 ROUND_DIGITS = 2
 """Significant digits of the levels that are chosen on a ramp."""
 
@@ -213,16 +215,23 @@ class BlockSplit(GroupSplit):
         return labels
 
 
+def _by_number(name: str) -> list[tuple[int, float, str]]:
+    """The texts and numbers of a name, for sorting."""
+    parts = NUMBER.split(name)
+    return [(0, float(part), "") if i % 2 else (1, 0.0, part) for i, part in enumerate(parts)]
+
+
 def label_folds(
     recordings: Sequence[Recording], leave_out: GroupSplit
 ) -> tuple[list[Labels], list[str]]:
-    """The label of each row, and the names of the folds in order. Raises IdentificationError where
+    """The label of each row, and the names of the folds in the order of their numbers, which does
+    not depend on that of the files. Raises IdentificationError where
     there are fewer than two groups."""
     labels = leave_out.labels(recordings)
     names = list(
         dict.fromkeys(str(name) for array in labels for name in dict.fromkeys(array.tolist()))
     )
-    names = [name for name in names if name != ALWAYS_FITTED]
+    names = sorted((name for name in names if name != ALWAYS_FITTED), key=_by_number)
     if len(names) < 2:
         raise IdentificationError(
             HintedText(

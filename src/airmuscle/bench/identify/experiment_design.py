@@ -22,6 +22,7 @@ from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..reported import Reported
 from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
 from .problem import POINT_COLUMNS, make_problem
+from .ties import first_greatest
 from .weighting import UNCENSORED
 
 LEVEL_COUNT = 13
@@ -344,7 +345,7 @@ def _select_runs(information: Array, runs: int) -> list[int]:
         determinants = [
             _log_determinant(information, [*others, i]) for i in range(len(information))
         ]
-        return max(determinants), [*others, int(np.argmax(determinants))]
+        return max(determinants), [*others, first_greatest(np.asarray(determinants))]
 
     best = 0.0
     selected = list[int]()

@@ -10,13 +10,15 @@ import numpy.typing as npt
 
 from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
-from ...recording import Recording
+from ...recording import Recording, resting_length_of
 from ..segment import (
     ISOBARIC,
     ISOMETRIC,
     RELATIVE_BAND,
     find_runs,
+    find_static_points,
     level_intervals,
+    reading_numbers,
     rounding,
 )
 from ..segment.interval import spread
@@ -87,10 +89,12 @@ class FitPoints:
             if columns
             else np.zeros(0, dtype=bool)
         )
-        lengths = {run.constants[RESTING_LENGTH] for run in runs if RESTING_LENGTH in run.constants}
-        if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
-            by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
-            columns[RESTING_LENGTH] = np.concatenate(by_row)
+        stated = [resting_length_of(run) for run in runs]
+        lengths = {length for length in stated if length is not None}
+        if len(lengths) > 1 and None not in stated:
+            columns[RESTING_LENGTH] = np.repeat(
+                np.array(stated, dtype=float), [len(run) for run in runs]
+            )
         constants = {RESTING_LENGTH: lengths.pop()} if len(lengths) == 1 else {}
         joined = Recording(columns, origin, constants, references=tuple(cite(runs)))
         dropped = int(np.count_nonzero(missing))
@@ -114,7 +118,19 @@ class FitPoints:
         names = [specimen_name(run) for run in self.recordings]
         numbers = np.arange(len(lengths)), np.unique(names, return_inverse=True)[1]
         index, specimen = (np.repeat(each, lengths)[~self.missing] for each in numbers)
-        return Runs(index, specimen, all("time" in run for run in self.recordings))
+        in_time = all("time" in run for run in self.recordings)
+        static = all(find_static_points(run) is not None for run in self.recordings)
+        return Runs(index, specimen, in_time, self._places if static else None)
+
+    @property
+    def _places(self) -> npt.NDArray[np.intp]:
+        """The place of each complete row in the order of pressure, contraction and force, in place
+        of an order of the rows that has no meaning.
+        """
+        p, c, f = (reading_numbers(self.data[name]) for name in POINT_COLUMNS)
+        places = np.empty(p.size, dtype=np.intp)
+        places[np.lexsort((f, c, p))] = np.arange(p.size)
+        return places
 
     @functools.cached_property
     def checks(self) -> Remarks:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
+from .ties import first_greatest, in_order
 
 MAX_RELATIVE_ERROR = 0.5
 """Relative standard error above which a combination of parameters counts as undetermined;
@@ -185,8 +186,9 @@ def analyse_identifiability(
 def _describe_combination(
     vector: Array, relative_stderr: float, names: Sequence[str]
 ) -> UndeterminedCombination:
-    shares = vector / vector[np.argmax(np.abs(vector))]
-    order = [int(i) for i in np.argsort(-np.abs(shares)) if abs(shares[i]) >= MIN_SHARE]
+    shares = vector / vector[first_greatest(np.abs(vector))]
+    indices = [i for i in range(shares.size) if abs(shares[i]) >= MIN_SHARE]
+    order = in_order(indices, lambda i: -abs(float(shares[i])), lambda i: i)
     listed = tuple((names[i], float(shares[i])) for i in order)
     kinds = {
         name.partition(" of record")[0].rpartition(".")[2].partition("[")[0] for name, _ in listed

@@ -21,6 +21,7 @@ from .cross_validation import GroupSplit, default_split
 from .fit_points import FitPoints
 from .length_errors import find_length_errors, length_notes
 from .model_evidence import aicc
+from .ties import TIE, in_order, tied_groups
 from .weighting import LeastSquares, Loss
 
 MIN_FOLDS = 6
@@ -54,7 +55,7 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
     equivalent = [
         m for m in eligible if m.cross_validated_rmse <= limit and excess_error(m, best) <= 0
     ]
-    recommended = min([m for m in equivalent if not is_contradicted(m, best)], key=_simplicity)
+    recommended = simplest([m for m in equivalent if not is_contradicted(m, best)])
     text = (
         f"Recommended for {split.purpose}: {recommended.candidate.name} with"
         f" {recommended.parameter_count} parameters, rms error"
@@ -73,7 +74,7 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
             f" {best.cross_validated_rmse:.4g} N, is not lower by more than one standard error of"
             " the difference."
         )
-    simpler = min(equivalent, key=_simplicity)
+    simpler = simplest(equivalent)
     if simpler is not recommended:  # the rows of the fit contradict it
         text += (
             f" {simpler.candidate.name} with {simpler.parameter_count} parameters is within one"
@@ -84,8 +85,9 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
     return recommended, text + _pulling(ranking, recommended)
 
 
-def _simplicity(model: RankedModel) -> tuple[int, float]:
-    return model.parameter_count, model.cross_validated_rmse
+def simplest(ranking: Sequence[RankedModel]) -> RankedModel:
+    """The first of the models with the fewest parameters."""
+    return min(ranking, key=lambda model: model.parameter_count)
 
 
 def _pulling(ranking: Sequence[RankedModel], recommended: RankedModel) -> str:
@@ -135,7 +137,8 @@ def excess_error(model: RankedModel, best: RankedModel) -> float:
     spread = float(
         np.sqrt(np.average((difference - mean) ** 2, weights=rows) / max(difference.size - 1, 1))
     )
-    return mean - spread
+    excess = mean - spread
+    return excess if abs(excess) > TIE * best.cross_validated_rmse**2 else 0.0
 
 
 MAX_LIMITED = 0.01
@@ -335,16 +338,31 @@ def compare_splits(
             reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
             text = f"the data determine none of the {len(excluded)} candidates."
             raise IdentificationError(HintedText(text, *reasons))
-        ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
+        ranking = in_order(ranking, lambda m: m.cross_validated_rmse, lambda m: m.parameter_count)
         recommended, reason = recommend(ranking, split)
         of_lengths = length_notes(find_length_errors(recommended.fit.model, runs))
-        remarks = (*recommended.fit.notes, *of_lengths)
+        remarks = (*recommended.fit.notes, *of_lengths, *_tie_notes(ranking))
         if np.isfinite(recommended.limit):
             remarks += (_limit_note(recommended),)
         comparisons.append(
             Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
         )
     return tuple(comparisons)
+
+
+def _tie_notes(ranking: Sequence[RankedModel]) -> list[str]:
+    """The sentence on laws with equal errors; none without them."""
+    groups = tied_groups(ranking, lambda model: model.cross_validated_rmse)
+    ties = [
+        " and ".join(m.candidate.name for m in sorted(group, key=lambda m: m.parameter_count))
+        for group in groups
+        if len(group) > 1
+    ]
+    text = (
+        f"Equal errors in cross-validation: {'; '.join(ties)}. They stand in the order of their"
+        " numbers of parameters."
+    )
+    return [text] if ties else []
 
 
 def _limit_note(model: RankedModel) -> str:

@@ -62,10 +62,19 @@ class Runs:
     specimen: Indices
     in_time: bool
     """Whether the rows of a run follow each other in time."""
+    place: Indices | None = None
+    """The place of each row (N,) in its run, where the order of the rows has no meaning."""
 
-    def rows(self, selection: Mask) -> "Runs":
-        """The runs of a selection of the rows, a mask (N,)."""
-        return dataclasses.replace(self, run=self.run[selection], specimen=self.specimen[selection])
+    def rows(self, selection: Mask | Indices) -> "Runs":
+        """The runs of a selection of the rows, a mask (N,) or their indices."""
+        place = None if self.place is None else self.place[selection]
+        return Runs(self.run[selection], self.specimen[selection], self.in_time, place)
+
+    @property
+    def order(self) -> Indices:
+        """The rows by run and place, as they are if they have no place."""
+        places = np.arange(self.run.size) if self.place is None else self.place
+        return np.lexsort((places, self.run))
 
 
 class Groups(NamedTuple):
@@ -235,6 +244,9 @@ def estimate_covariance(
     Otherwise they are successive parts of the runs, as few as do so, if the rows follow in time or
     are correlated in their order; if not, the rows are independent.
     """
+    if runs.place is not None:
+        order = runs.order
+        weighted, residuals, runs = weighted[order], residuals[order], runs.rows(order)
     spare = len(residuals) - len(basis)
     parameters = len(basis)
     specimens, count = (

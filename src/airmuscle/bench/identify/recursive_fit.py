@@ -26,6 +26,7 @@ from ...core import (
 )
 from ...physics.muscle.characteristic import ContractileSurface, ValidityRange, exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
+from .ties import first_greatest
 
 PRIOR = 1e-4
 """Information on each coefficient before the first sample, relative to one sample (chosen): a prior
@@ -207,7 +208,7 @@ class RecursiveFit(ShortRepr):
                 "no point of the range has a predicted force between 0 and"
                 f" {self.limits.max_force:g} N. Widen the limits, or check the units."
             )
-        best = int(np.argmax(np.where(feasible, variance, -1.0)))
+        best = first_greatest(np.where(feasible, variance, -1.0))
         return NextPoint(
             float(pressure[best]), float(contraction[best]), float(force[best]), float(error[best])
         )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ...core import Array, Hint, HintedText, IdentificationError, ParameterError, one_line, tree
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
-from ...recording import Recording
+from ...recording import Recording, resting_length_of
 from ..checks import find_suspicious, support_of
 from ..checks.contractions import MAX_CONTRACTION
 from ..segment.runs import RIPPLE_BAND
@@ -259,7 +259,7 @@ def examine(
             )
         notes += (f"Partial pooling of {len(effects.specimens)} specimens: {text}",)
     if quantity == FORCE:
-        lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
+        lengths = {resting_length_of(run) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
         by_run = np.split(residuals, ends[:-1])
         misfit = tuple(

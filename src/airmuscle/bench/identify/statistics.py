@@ -17,6 +17,7 @@ from ..segment import RELATIVE_BAND, level_intervals, rounding
 from .identifiability import singular_vectors
 from .parameter_covariance import Runs, estimate_covariance
 from .problem import POINT_COLUMNS, FitProblem, LeastSquaresSolution
+from .ties import first_greatest
 from .variable_projection import RANK_TOLERANCE
 from .weighting import LeastSquares, Loss
 
@@ -272,7 +273,7 @@ def _rank_deficiency(
     quantities = problem.fitted_quantity.arguments
     levels = [count_levels(values) for values in problem.arguments]
     counts = [f"{count} of {name}" for count, name in zip(levels, quantities, strict=True)]
-    path = problem.free_leaves[int(np.flatnonzero(free)[int(np.argmax(shares))])].path
+    path = problem.free_leaves[int(np.flatnonzero(free)[first_greatest(shares)])].path
     law = type(problem.law).__name__
     ranks = f"(rank {rank} of {len(labels)} parameters)"
     listed = ", ".join(names[:_MAX_NAMES])

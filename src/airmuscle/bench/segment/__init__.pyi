@@ -47,9 +47,11 @@ from .outliers import find_bench_outliers as find_bench_outliers
 from .outliers import kept_rows as kept_rows
 from .resolution import CONTRACTION_BAND as CONTRACTION_BAND
 from .resolution import RELATIVE_BAND as RELATIVE_BAND
+from .resolution import ROUNDING as ROUNDING
 from .resolution import SAME_READING as SAME_READING
 from .resolution import constant_band as constant_band
 from .resolution import distinct_readings as distinct_readings
 from .resolution import magnitude as magnitude
 from .resolution import merged_readings as merged_readings
+from .resolution import reading_numbers as reading_numbers
 from .resolution import rounding as rounding

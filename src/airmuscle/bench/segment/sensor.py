@@ -11,7 +11,7 @@ import numpy as np
 from ...core import Array
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
-from .interval import Mask, find_static_points, level_intervals, remembered, true_intervals
+from .interval import EDGE, Mask, find_static_points, level_intervals, remembered, true_intervals
 from .resolution import (
     ROUNDING,
     SAME_READING,
@@ -106,7 +106,10 @@ def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
     if time is None or len(time) < 2:
         return min_rows
     sample_time = _sample_time(_time_steps(time))
-    return max(min_rows, round(min(seconds / sample_time, len(time)))) if sample_time else min_rows
+    if not sample_time:
+        return min_rows
+    count = min(seconds / sample_time, len(time))
+    return max(min_rows, round(count * (1.0 - EDGE)))  # half a row is none, whatever the rounding
 
 
 MIN_NOISE = 0.2

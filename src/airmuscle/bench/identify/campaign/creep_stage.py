@@ -10,6 +10,7 @@ import numpy as np
 from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ....physics import CreepElements, ForceLaw
 from ....recording import Recording
+from ...segment import EDGE
 from ...segment.resolution import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep
 from ..hysteresis.creep import MIN_RATIO, CreepFit
@@ -87,7 +88,7 @@ class HeldRows:
         """The rows after a dead time from the end of the motion [s] on. Raises IdentificationError
         without any.
         """
-        later = whole["time"] > end_of_motion + DEADTIME
+        later = whole["time"] > end_of_motion + DEADTIME * (1.0 + EDGE)
         if not later.any():
             raise IdentificationError(
                 f"{whole.origin}: the hold ends {whole['time'][-1] - end_of_motion:.2g} s after the"

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....core import Array, IdentificationError, ShortRepr
-from ....recording import Recording
+from ....recording import Recording, resting_length_of
 from ...segment import (
     Inspection,
     Mask,
@@ -90,8 +90,7 @@ class CampaignRecord(ShortRepr):
     @property
     def resting_length(self) -> float | None:
         """Resting length [m], None if it is not stated."""
-        length = self.recording.constants.get("resting_length")
-        return float(length) if isinstance(length, float | int) else None
+        return resting_length_of(self.recording)
 
     @property
     def level(self) -> tuple[str, float] | None:

@@ -25,7 +25,7 @@ from ....physics import (
 from ....recording import Recording
 from ....report import Chapter, Table, TableColumn
 from ...reported import Reported
-from ...segment import SAME_READING, distinct_readings, rounding
+from ...segment import EDGE, SAME_READING, distinct_readings, rounding
 from ..identifiability import MAX_RELATIVE_ERROR
 from .experiment import Experiment, PriorValue
 from .fit import fit_dynamic
@@ -52,6 +52,11 @@ MIN_RANGE = 5.0
 """Minimum range of command and pressure in standard deviations of the noise (chosen)."""
 GAIN = 10.0
 """Rate of the outlet pressure by the control error from which a search starts [1/s] (chosen)."""
+ZERO_STEPS = 20
+ZERO_TOLERANCE = 0.1
+"""Maximum number of corrections of the zeros, and mean residual [Pa] at which they end
+(chosen).
+"""
 OFTEN = 0.2
 """Share of the rows in which a command changes that is a recorded voltage, and greatest share of
 different readings (chosen).
@@ -227,16 +232,33 @@ def _refined(
         attempt = best
         failed = failed + 1
         with contextlib.suppress(IdentificationError):
-            means = [
-                float(np.nanmean(best.fit.residuals(i)["pressure"])) for i in range(len(best.zeros))
-            ]
-            zeros = tuple(zero - mean for zero, mean in zip(best.zeros, means, strict=True))
+            zeros = tuple(map(float, np.subtract(best.zeros, _mean_residuals(best))))
             attempt = fitted(_perturbed(best.plant, paths, deviations), zeros)
         if attempt.fit.costs[0] < best.fit.costs[0]:
             failed = 0 if attempt.fit.costs[0] < GAINED * best.fit.costs[0] else failed
             best = attempt
         deviations = rng.normal(0.0, SPREAD, len(paths))
-    return best
+    return _with_settled_zeros(best, fitted)
+
+
+def _mean_residuals(result: RegulatorFit) -> Array:
+    """The mean residual of each record [Pa]."""
+    records = range(len(result.zeros))
+    return np.array([np.nanmean(result.fit.residuals(i)["pressure"]) for i in records])
+
+
+def _with_settled_zeros(result: RegulatorFit, fitted: Fitted) -> RegulatorFit:
+    """The fit with the zeros at which the residuals of each record have no mean."""
+    change = _mean_residuals(result)
+    zeros = np.array(result.zeros)
+    for _ in range(ZERO_STEPS):
+        if np.abs(change).max() < ZERO_TOLERANCE:
+            break
+        zeros = zeros - change
+        with contextlib.suppress(IdentificationError):
+            result = fitted(result.plant, tuple(zeros.tolist()))
+        change = _mean_residuals(result)
+    return result
 
 
 def _perturbed(plant: Plant, paths: Sequence[str], deviations: Array) -> Plant:
@@ -307,7 +329,11 @@ def _settled_difference(recording: Recording) -> float:
     at, _ = _changes(recording)
     since = time - at[np.searchsorted(at, time, side="right") - 1]
     difference = recording["pressure"] - recording["setpoint"]
-    rows = (since >= SETTLED_AFTER) & (recording["setpoint"] > 0.0) & np.isfinite(difference)
+    rows = (
+        (since >= SETTLED_AFTER * (1.0 - EDGE))
+        & (recording["setpoint"] > 0.0)
+        & np.isfinite(difference)
+    )
     return float(np.median(difference[rows])) if rows.any() else 0.0
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from ....core import AirmuscleWarning, Array, Hint, HintedText, IdentificationError, check_whole
 from ....physics import Characteristic, Friction, LoopScales
 from ....physics.muscle import friction as laws
-from ....recording import Recording
+from ....recording import Recording, resting_length_of
 from ... import segment
 from ...checks import DataUse, support_of
 from ...segment.resolution import CONTRACTION_BAND, RELATIVE_BAND
+from ..ties import in_order
 from . import loop_data as data
 from .loop_result import HysteresisLoop, LoopFit
 from .result import HysteresisFit, assess_fit
@@ -62,9 +63,7 @@ def find_loops(
         except IdentificationError as error:
             failed.append(error)
             continue
-        muscle: Sequence[object] = [
-            recording.constants.get(name) for name in ("resting_length", "specimen")
-        ]
+        muscle = [resting_length_of(recording), recording.constants.get("specimen")]
         at_level = [i for i, other in enumerate(loops) if _is_same_level(other.run, run)]
         same = next((i for i in at_level if muscles[i] == muscle), None)
         if same is None:
@@ -280,4 +279,7 @@ def fit_loop(
             fits.append(fit_series(initial, run, second_run))
         except IdentificationError as error:
             failed[name] = error.message
-    return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)
+    ordered = in_order(
+        fits, lambda fit: -fit.aicc_reduction, lambda fit: free_parameters(fit.friction)
+    )
+    return LoopFit(loop, tuple(ordered), failed)

@@ -12,7 +12,7 @@ import numpy as np
 from ....core import Array, IdentificationError, Leaf, tree
 from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ....recording import Recording
-from ...segment import Mask, motion_direction
+from ...segment import EDGE, Mask, estimate_noise, motion_direction
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size
 from . import loop_data as data
@@ -61,8 +61,9 @@ def binned_difference(
 
 def _bin_means(path: Array, values: Array, edges: Array) -> tuple[Array, Array]:
     """Mean of the values in every bin, NaN in an empty bin; and the numbers of rows."""
-    bins = np.digitize(path, edges[1:-1])
-    inside = (path >= edges[0]) & (path <= edges[-1])
+    margin = EDGE * (edges[1] - edges[0])  # a row on an edge is above it, whatever the rounding
+    bins = np.digitize(path, edges[1:-1] - margin)
+    inside = (path >= edges[0] - margin) & (path <= edges[-1] + margin)
     counts = np.bincount(bins[inside], minlength=edges.size - 1)
     sums = np.bincount(bins[inside], values[inside], minlength=edges.size - 1)
     means = np.divide(sums, counts, out=np.full(counts.size, np.nan), where=counts > 0)
@@ -151,6 +152,13 @@ class LoopSeries:
         return np.asarray(np.linalg.pinv(self.design_matrix[self.fitted_rows]))
 
 
+PRIOR = 10.0
+"""Standard deviation of a parameter about its initial value in the search, as that of its
+logarithm, or relative to its size (chosen): what the runs do not determine stays near it instead of
+wherever a search stops, while a single row outweighs it.
+"""
+MAX_EVALUATIONS = 300
+"""Maximum evaluations of a search (chosen: it converges in 10 to 110)."""
 JACOBIAN_TOLERANCE = 1e-4
 """Relative singular value that counts as zero; the derivatives are differences of forward
 evaluations (chosen).
@@ -308,21 +316,46 @@ def _fit_iteratively(
             values[i] = coordinate * size if size else float(np.exp(coordinate))
         return tree.unflatten(friction, values)
 
+    weight = _prior_weight(runs) / PRIOR
+
+    def residuals(x: Array) -> Array:
+        return np.concatenate([_residuals(law(x.tolist()), runs), weight * (x - start)])
+
+    # Central differences, because the forces have kinks, where one-sided ones differ by rounding.
     result = least_squares(
-        lambda x: _residuals(law(x), runs), start, bounds=(low, high), x_scale=1.0, max_nfev=60
+        residuals,
+        start,
+        jac="3-point",
+        bounds=(low, high),
+        x_scale=1.0,
+        max_nfev=MAX_EVALUATIONS,
     )
     fitted = tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
     names = [all_leaves[i].path for i in free]
     if any("[" in name for name in names):
         return fitted, ()
+    remaining = result.fun[: len(result.fun) - len(names)]
     freedom = max(
-        effective_sample_size(result.fun) - len(names), 1.0
+        effective_sample_size(remaining) - len(names), 1.0
     )  # correlated residuals count as fewer rows
-    spread = float(np.sqrt(np.sum(result.fun**2) / freedom)) or 1e-12
+    spread = float(np.sqrt(np.sum(remaining**2) / freedom)) or 1e-12
+    jacobian = result.jac[: len(remaining)]
     analysis = analyse_identifiability(
-        result.jac, names, np.ones(len(names)), spread, JACOBIAN_TOLERANCE
+        jacobian, names, np.ones(len(names)), spread, JACOBIAN_TOLERANCE
     )
     return fitted, analysis.undetermined
+
+
+def _prior_weight(runs: Sequence[LoopSeries]) -> float:
+    """The noise of the forces [N], at least a thousandth of the hysteresis: a row with that error
+    states as much as the prior knowledge of a parameter."""
+    noises = [estimate_noise(run.target[run.fitted_rows]) for run in runs]
+    amplitude = float(np.sqrt(np.mean(_residuals_without(runs) ** 2)))
+    return max(*noises, 1e-3 * amplitude, 1e-12)
+
+
+def _residuals_without(runs: Sequence[LoopSeries]) -> Array:
+    return np.concatenate([run.fitted_residuals(None) for run in runs])
 
 
 def _search_coordinate(leaf: Leaf, limits: DataLimits) -> tuple[float, float, float, float]:

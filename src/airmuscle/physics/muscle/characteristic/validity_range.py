@@ -10,7 +10,7 @@ from typing import Any, NoReturn, Self
 import numpy as np
 
 from ....core import IdentificationError, Value, model, parameter
-from ....recording import Recording
+from ....recording import Recording, resting_length_of
 from ..geometry.braid import Braid
 
 Limits = tuple[float, float]
@@ -118,8 +118,8 @@ class DataScales:
         force, pressure, contraction = (
             max(float(np.nanmax(values)) for values in column) for column in columns
         )
-        lengths = [run.constants.get("resting_length") for run in runs]
-        known = {float(length) for length in lengths if length is not None}
+        lengths = list(map(resting_length_of, runs))
+        known = {length for length in lengths if length is not None}
         complete = len(lengths) > 0 and None not in lengths
         specimens = {
             run.constants.get("specimen", length) for run, length in zip(runs, lengths, strict=True)
