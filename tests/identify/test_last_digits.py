@@ -473,8 +473,8 @@ QUICK = (
 LONG = (joint_fit, campaign)
 RESULTS = widened([*QUICK, *LONG], lambda result: result in QUICK)
 REORDERED = widened([*QUICK, joint_fit], lambda result: result in QUICK)
-"""Without the campaign, in which a law of four parameters, excluded in any order, converges to its
-bounds in one order of the files and not in another."""
+"""Without the campaign, in which a law that is excluded in any order of the files is excluded for
+another cause in each: its search converges in one order and not in another."""
 
 
 @functools.cache
