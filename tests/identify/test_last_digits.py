@@ -69,6 +69,8 @@ RELATIVE = 1e-3
 """Difference of numbers without a standard error, relative to the greatest at their place."""
 PRINTED = 1e-2
 """The same of numbers in texts, which have two digits or more."""
+ZERO_ERROR = 1e3 / math.sqrt(351)
+"""Standard error [Pa] of the zero of the pressure of a regulator: the noise over 351 rows."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -445,8 +447,9 @@ def same_numbers(leaf: Leaf, again: Leaf, greatest: float) -> bool:
     """Whether the numbers of two leaves agree, to a hundredth of their standard error if it is
     known; `greatest` is the magnitude of the numbers at their place."""
     allowed = (PRINTED if isinstance(leaf.value, str) else RELATIVE) * greatest
-    if not isinstance(leaf.value, str) and math.isfinite(leaf.error):
-        allowed = max(0.01 * leaf.error, 1e-9 * greatest)
+    error = ZERO_ERROR if leaf.place.endswith(".zero") else leaf.error
+    if not isinstance(leaf.value, str) and math.isfinite(error):
+        allowed = max(0.01 * error, 1e-9 * greatest)
     return bool(np.allclose(numbers(leaf), numbers(again), rtol=0.0, atol=allowed, equal_nan=True))
 
 
