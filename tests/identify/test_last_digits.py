@@ -38,7 +38,7 @@ from airmuscle.bench import (
     identify_campaign,
 )
 from airmuscle.bench.identify import fit_volume, optimal_design, volume_points
-from airmuscle.bench.identify.campaign.campaign_chapters import campaign_chapters
+from airmuscle.bench.identify.campaign import campaign_chapters
 from airmuscle.bench.identify.hysteresis import find_holds, find_loops, fit_creep, fit_loop
 from airmuscle.bench.identify.prediction import predict_static
 from airmuscle.core import tree
@@ -339,7 +339,9 @@ def joint_fit(shaken: Shaken) -> list[Chapter]:
 
 def campaign(shaken: Shaken) -> list[Chapter]:
     recordings = [*isobars(), *ramps()[::2], held(), *fills()]
-    return campaign_chapters(identify_campaign(shaken.recordings(recordings)), None)
+    return campaign_chapters.campaign_chapters(
+        identify_campaign(shaken.recordings(recordings)), None
+    )
 
 
 def prediction(shaken: Shaken) -> list[Chapter]:
