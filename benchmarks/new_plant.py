@@ -26,7 +26,7 @@ from airmuscle.engine.compile.program import Program, compile_system
 HEADER = ("task", "median", "minimum")
 TEXT = (
     "In a process that has already compiled a plant; the caches of traced functions and of machine"
-    " code are empty each time. The first plant of a process also loads CasADi and LLVM, which is"
+    " code are empty each time. The first plant of a process also loads LLVM, which is"
     " part of `Process start` below. The plant with energy meters has four muscles with friction,"
     " creep and a lagging wall, heat, and tubes of two volumes."
 )
@@ -57,7 +57,7 @@ def without_stored_code() -> Iterator[None]:
 
 def compile_anew(system: System) -> Program:
     """The program of a system, without the caches of traced laws and of machine code."""
-    autodiff._traced_functions.clear()
+    autodiff._recorded_methods.clear()
     with without_stored_code():
         return Program(system)
 

@@ -18,6 +18,8 @@ import numpy as np
 from filling import SPACING, Array, Run
 from rodas4 import hand_written_rates
 
+from airmuscle.control.estimation.predictive_program import casadi_operations
+from airmuscle.core import nodes
 from airmuscle.engine.compile.kernels.calls import invoke, pointer
 from airmuscle.engine.compile.program import CompiledSystem
 
@@ -99,10 +101,12 @@ def casadi_cvodes(run: Run, ready: CompiledSystem, **options: Any) -> Solver:
     traced = ready.program.traced
     size = run.nominal
     z = casadi.SX.sym("z", size.size)
-    rates = casadi.substitute(
-        traced.f, casadi.vertcat(traced.x, traced.p), casadi.vertcat(size * z, ready.parameters)
-    )
-    equations = {"x": z, "u": traced.u, "ode": rates / size}
+    u = casadi.SX.sym("u", len(traced.u))
+    values = {id(symbol): size[i] * z[i] for i, symbol in enumerate(traced.x)}
+    values |= {id(symbol): u[i] for i, symbol in enumerate(traced.u)}
+    values |= zip(map(id, traced.p), ready.parameters.tolist(), strict=True)
+    rates = casadi.vertcat(*nodes.replayed(traced.f, values, casadi_operations()))
+    equations = {"x": z, "u": u, "ode": rates / size}
 
     def at(rtol: float) -> Callable[[], Array]:
         settings = {"reltol": rtol, "abstol": rtol, "max_num_steps": MAX_STEPS, **options}

@@ -9,7 +9,6 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import casadi
 import numpy as np
 from filling import Array, hanging
 from measure import Section, Target, format_time, print_section, time_variants
@@ -196,7 +195,7 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
         t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS
     ]
     rates = instructions([t.x, t.u, t.p], [t.f])
-    observed = instructions([t.x, t.u, t.p], [casadi.vertcat(*seen)])
+    observed = instructions([t.x, t.u, t.p], [seen])
     recording, count = case().experiment.recording, round(DURATION / STEP)
     openings = case().segments.inputs_at((np.arange(count) + 0.5) * STEP, 0.0)
     inputs_of_rows = jnp.asarray(openings.reshape(-1, round(SPACING / STEP), openings.shape[1]))

@@ -29,7 +29,7 @@ plant = am.Plant(am.load("dmsp-20-300").muscle, circuit, am.HangingMass(10.0))
 am.simulate(plant, am.Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), duration=25.0)
 """
 REASON = (
-    "import of NumPy (0.1 s), declaration of the models (0.1 s), import of CasADi and LLVM,"
+    "import of NumPy (0.1 s), declaration of the models (0.1 s), import of LLVM,"
     " compilation of the plant (0.15 s)"
 )
 EVALUATE = ["evaluate", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"]

@@ -13,7 +13,10 @@ import pytest
 
 import airmuscle as am
 
-HEAVY = {"numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "typer", "yaml", "jax"}
+HEAVY = {
+    *("numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "typer", "yaml", "jax"),
+    "casadi",
+}
 SIMULATION = """
 import airmuscle as am
 valve = am.Valve(conductance=1e-9, critical_ratio=0.4)
@@ -24,7 +27,7 @@ for method in (am.Rodas4(), am.RungeKutta4(1e-3)):
 STARTS = {
     "import airmuscle": (
         "import airmuscle",
-        {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.bench.identify"},
+        {*HEAVY, "llvmlite", "numpy.ma", "airmuscle.bench.identify"},
     ),
     "simulate": (
         SIMULATION,
@@ -39,7 +42,7 @@ STARTS = {
     ),
     "airmuscle convert": (
         "from airmuscle.outlets.cli import app\napp(['convert', '--help'], standalone_mode=False)",
-        (HEAVY | {"casadi", "airmuscle.bench.identify", "airmuscle.physics"}) - {"typer", "rich"},
+        (HEAVY | {"airmuscle.bench.identify", "airmuscle.physics"}) - {"typer", "rich"},
     ),
 }
 

@@ -14,13 +14,13 @@ import os
 import sys
 import warnings
 
-import casadi
 import numba
 import numpy as np
 import pytest
 from filling import lifting_run
 from numba.core import ir
 
+from airmuscle.core import nodes
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule, simulate
 from airmuscle.engine.compile import Function, compile_system
 from airmuscle.engine.compile.cache import kernel as kernels
@@ -355,8 +355,8 @@ def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, mon
 
 def squares() -> float:
     """3^2 + 1 by a module that is compiled for this call."""
-    x = casadi.SX.sym("x", 1)
-    function = Function({"x": x}, {"y": x * x + 1.0})
+    x = nodes.symbol("x")
+    function = Function({"x": [x]}, {"y": [x * x + 1.0]})
     given, result = np.array([3.0]), np.empty(1)
     ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(function.address)(
         given.ctypes.data, result.ctypes.data

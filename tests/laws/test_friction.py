@@ -11,14 +11,13 @@ from __future__ import annotations
 import itertools
 from dataclasses import replace
 
-import casadi
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from airmuscle.core import leaves
+from airmuscle.core import evaluation, leaves, nodes
 from airmuscle.errors import ParameterError
 from airmuscle.physics import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.physics.muscle.friction.path import stop_operators
@@ -313,16 +312,15 @@ def test_prandtl_ishlinskii_without_dead_zones_is_maxwell_slip_and_with_them_asy
 
 @pytest.mark.parametrize("law", ALL, ids=name)
 def test_a_traced_model_gives_the_numbers_of_the_numeric_one(law):
-    symbols = {s.name: casadi.SX.sym(s.name) for s in law.states}
-    v = casadi.SX.sym("v")
-    outputs = [*law.rates(symbols, v).values(), law.force(symbols, v)]
-    function = casadi.Function("law", [*symbols.values(), v], outputs)
+    symbols = {s.name: nodes.symbol(s.name) for s in law.states}
+    v = nodes.symbol("v")
+    outputs = nodes.as_nodes([*law.rates(symbols, v).values(), law.force(symbols, v)])
+    function = evaluation.Recorded([[*symbols.values(), v]], [outputs])
     for share, speed in itertools.product((-1.0, -0.97, 0.0, 0.4, 1.0), (-0.2, 0.0, 0.1)):
         bristles = {s.name: share * s.nominal for s in law.states}
         expected = [*law.rates(bristles, speed).values(), law.force(bristles, speed)]
-        assert [float(x) for x in function(*bristles.values(), speed)] == pytest.approx(
-            expected, rel=1e-12
-        )
+        (values,) = function.at_numbers([*bristles.values(), speed])
+        assert values == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)

@@ -39,7 +39,9 @@ from .units import STANDARD_GRAVITY as STANDARD_GRAVITY
 # isort: split
 # For the other rooms, not in __all__
 from . import autodiff as autodiff
+from . import nodes as nodes
 from . import reference as reference
+from . import slopes as slopes
 from . import units as units
 from .absolute_pressure import at_ambient as at_ambient
 from .absolute_pressure import check_above_vacuum as check_above_vacuum
@@ -52,12 +54,9 @@ from .annotation import within as within
 from .arrays import BLAS_THREADS as BLAS_THREADS
 from .arrays import FEW as FEW
 from .arrays import NUMBERS as NUMBERS
-from .arrays import ArrayProgram as ArrayProgram
 from .arrays import all_finite as all_finite
 from .arrays import as_slice as as_slice
 from .arrays import flat_view as flat_view
-from .arrays import instructions_of as instructions_of
-from .arrays import make_program as make_program
 from .arrays import one_thread as one_thread
 from .atomic_output import is_running as is_running
 from .declaration import INFINITY as INFINITY
@@ -98,6 +97,10 @@ from .errors import check_known as check_known
 from .errors import listed as listed
 from .errors import quotable as quotable
 from .errors import suggestion as suggestion
+from .evaluation import Recorded as Recorded
+from .nodes import Node as Node
+from .operations import CONDITIONS as CONDITIONS
+from .operations import Operation as Operation
 from .ops import Value as Value
 from .ops import Values as Values
 from .ops import pi as pi

@@ -1,9 +1,8 @@
-"""Automatic differentiation of models: symbolic tracing with CasADi, exact derivatives and
-Jacobians.
+"""Automatic differentiation of models: recorded expressions, exact derivatives and Jacobians.
 
 `derivative` differentiates a method with respect to one argument. It accepts numbers, arrays,
-CasADi symbols (inside a trace) and JAX arrays. `jacobian` returns the derivatives with respect to
-all parameters, as a fit requires.
+symbols (inside a trace) and JAX arrays. `jacobian` returns the derivatives with respect to all
+parameters, as a fit requires.
 """
 
 import functools
@@ -14,107 +13,118 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import ops, tree
-from .arrays import MIN_POINTS, make_program
+from . import nodes, ops, slopes, tree
+from .arrays import Array
 from .errors import TraceError
+from .evaluation import Recorded
+from .nodes import Node
 
-_traced_functions: dict[Any, Any] = {}
+
+class RecordedMethod:
+    """A method of models of one structure: its value and slopes as expressions, and as functions of
+    numbers and arrays, each made when it is asked for."""
+
+    def __init__(self, obj: Any, method: str, count: int) -> None:
+        with nodes.recording():
+            model, self.parameters = symbolic(obj)
+            self.arguments = nodes.symbols("x", count)
+            self.value = nodes.as_node(getattr(model, method)(*self.arguments))
+        check_finite([self.value], f"{type(obj).__name__}.{method}")
+        self._functions: dict[Any, Recorded] = {}
+
+    @functools.cached_property
+    def by_argument(self) -> list[Node]:
+        """The slope by each argument."""
+        return [slopes.jacobian([self.value], [x])[0][0] for x in self.arguments]
+
+    @functools.cached_property
+    def by_parameter(self) -> list[Node]:
+        """The slope by each parameter."""
+        return slopes.gradient(self.value, self.parameters)
+
+    def function(self, key: Any, outputs: Callable[[], Sequence[Sequence[Node]]]) -> Recorded:
+        """The function of arguments and parameters that has these outputs, kept under a key."""
+        if key not in self._functions:
+            inputs = [self.arguments, self.parameters]
+            self._functions[key] = Recorded(inputs, outputs())
+        return self._functions[key]
+
+    def value_and_slope(self, wrt: int) -> Recorded:
+        """The value, and its slope by one argument."""
+        return self.function(("value", wrt), lambda: [[self.value, self.by_argument[wrt]]])
+
+    def value_and_slopes(self) -> Recorded:
+        """The value and its slopes by the arguments, then its slopes by the parameters."""
+        return self.function("slopes", lambda: [[self.value, *self.by_argument], self.by_parameter])
+
+    def parameter_slopes(self, leaves: tuple[int, ...]) -> Recorded:
+        """The slopes by the parameters of these numbers."""
+        return self.function(leaves, lambda: [[self.by_parameter[i] for i in leaves]])
 
 
-def symbolic(obj: Any) -> tuple[Any, Any]:
-    """Return the model with a CasADi symbol in place of every leaf, and the vector of these
-    symbols.
+_recorded_methods: dict[Any, RecordedMethod] = {}
+
+
+def symbolic(obj: Any) -> tuple[Any, list[Node]]:
+    """Return the model with a symbol in place of every leaf, and the list of these symbols."""
+    vector = nodes.symbols("p", sum(1 for _ in tree.leaves(obj)))
+    return tree.unflatten(obj, vector), vector
+
+
+def check_finite(expressions: Sequence[Node], owner: str) -> None:
+    """Raise TraceError if recorded expressions contain NaN or infinity.
+
+    math.sqrt or float() applied to a symbol produce such constants without an error.
     """
-    import casadi
-
-    count = sum(1 for _ in tree.leaves(obj))
-    vector = casadi.SX.sym("p", count)
-    return tree.unflatten(obj, [vector[i] for i in range(count)]), vector
-
-
-def check_finite(expression: Any, owner: str) -> None:
-    """Raise TraceError if a traced expression contains NaN or infinity.
-
-    math.sqrt, NumPy functions or float() applied to a symbol produce such constants without an
-    error.
-    """
-    import casadi
-
-    function = casadi.Function("probe", casadi.symvar(expression), [expression])
-    for i in range(function.n_instructions()):
-        if function.instruction_id(i) == casadi.OP_CONST and not math.isfinite(
-            function.instruction_constant(i)
-        ):
-            raise TraceError(
-                f"{owner}: the traced expression contains a constant that is not finite. Use"
-                " airmuscle.core.ops instead of math and numpy, and do not call float() on an"
-                " argument."
-            )
-
-
-def _traced(obj: Any, method: str, count: int, wrt: int | None = None) -> Any:
-    """The cached CasADi function (arguments, parameters) -> value, d/d argument i for each, d/d
-    parameters; with `wrt` only the derivative by this argument."""
-    import casadi
-
-    key = (tree.structure(obj), method, count, wrt)
-    if key not in _traced_functions:
-        model, parameters = symbolic(obj)
-        arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
-        value = casadi.densify(casadi.SX(getattr(model, method)(*arguments)))
-        check_finite(value, f"{type(obj).__name__}.{method}")
-        varied = [*arguments, parameters] if wrt is None else [arguments[wrt]]
-        slopes = [casadi.densify(casadi.jacobian(value, x)) for x in varied]
-        _traced_functions[key] = casadi.Function(
-            "law", [*arguments, parameters], casadi.cse([value, *slopes])
+    if not all(map(math.isfinite, nodes.constants_of(expressions))):
+        raise TraceError(
+            f"{owner}: the traced expression contains a constant that is not finite. Use"
+            " airmuscle.core.ops instead of math and numpy, and do not call float() on an"
+            " argument."
         )
-    return _traced_functions[key]
 
 
-def _evaluate_traced(
-    obj: Any, method: str, arguments: tuple[Any, ...]
-) -> tuple[list[Any], tuple[int, ...]]:
-    """The outputs of the traced function at the arguments, and their shape."""
-    function = _traced(obj, method, len(arguments))
-    return _call_traced(function, [leaf.value for leaf in tree.leaves(obj)], arguments)
+def _recorded(obj: Any, method: str, count: int) -> RecordedMethod:
+    """The recorded method of models of this structure, with so many arguments."""
+    key = (tree.structure(obj), method, count)
+    if key not in _recorded_methods:
+        _recorded_methods[key] = RecordedMethod(obj, method, count)
+    return _recorded_methods[key]
 
 
-def _call_traced(
-    function: Any, parameters: Sequence[Any], arguments: Sequence[Any]
-) -> tuple[list[Any], tuple[int, ...]]:
-    """The outputs of a traced function at numbers or arrays, without structural zeros, point by
-    point, and the shape of the points. Parameters may be arrays, too. With buffers a call takes
-    half the time that it takes with matrices.
+def _at_points(
+    function: Recorded, obj: Any, arguments: Sequence[Any]
+) -> tuple[list[list[Array]], tuple[int, ...]]:
+    """The results of a recorded method at numbers or arrays that broadcast, each an array of all
+    points (N,), and the shape of the points. Parameters of the model may be arrays, too.
     """
-    many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
-    broadcast = np.broadcast_arrays(
-        *(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ())))
-    )
+    leaves = [leaf.value for leaf in tree.leaves(obj)]
+    varied = [i for i, value in enumerate(leaves) if isinstance(value, np.ndarray) and value.ndim]
+    arrays = [leaves[i] for i in varied]
+    broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *arrays)))
     shape = broadcast[0].shape
-    size = broadcast[0].size
-    count = len(arguments)
-    if not size:  # a map of no points is none
-        return [np.zeros((function.numel_out(i), 0)) for i in range(function.n_out())], shape
-    numbers = [
-        value.item() if isinstance(value, np.ndarray) else value for value in parameters if not many
+    points = [np.ascontiguousarray(x).reshape(-1) for x in broadcast]
+    size = points[0].size
+    parameters: list[Any] = [
+        None if i in varied else float(value) for i, value in enumerate(leaves)
     ]
-    vectors = [x.ravel() for x in broadcast]
-    vectors[count:] = [
-        (
-            np.stack(vectors[count:], axis=-1).ravel()
-            if many
-            else np.tile(np.array(numbers, float), size)
-        )
-    ]
-    mapped = function.map(size)
-    results = [np.empty(mapped.nnz_out(i)) for i in range(mapped.n_out())]
-    buffer, call = mapped.buffer()
-    for place, vector in enumerate(vectors):
-        buffer.set_arg(place, vector.data)
-    for place, result in enumerate(results):
-        buffer.set_res(place, result.data)
-    call()
-    return results, shape
+    for i, column in zip(varied, points[len(arguments) :], strict=True):
+        parameters[i] = column
+    at = points[: len(arguments)]
+    if size == 1:  # numbers take a tenth of the time of arrays
+        numbers = [x.item() for x in at]
+        single = [value.item() if i in varied else value for i, value in enumerate(parameters)]
+        results: list[list[Any]] = function.at_numbers(numbers, single)
+    else:
+        results = function.at_points(at, parameters)
+    return [[_column(value, size) for value in vector] for vector in results], shape
+
+
+def _column(value: Any, size: int) -> Array:
+    """The values at all points, also of a result that depends on no array."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        return value
+    return np.full(size, value, dtype=float)
 
 
 def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
@@ -128,19 +138,17 @@ def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
         return getattr(obj, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
 
     if ops.is_symbol(*arguments):
-        import casadi
-
-        symbol = casadi.SX.sym("x")
-        return casadi.substitute(
-            casadi.jacobian(casadi.SX(partial(symbol)), symbol), symbol, arguments[wrt]
-        )
+        x = nodes.symbol("x")
+        slope = slopes.jacobian([nodes.as_node(partial(x))], [x])[0]
+        return nodes.replaced(slope, [x], [arguments[wrt]])[0]
     if _is_jax(*arguments):
         import jax  # type: ignore[import-not-found, unused-ignore]
 
         point = jax.numpy.asarray(arguments[wrt], dtype=float)
         return jax.jvp(partial, (point,), (jax.numpy.ones_like(point),))[1]
-    results, shape = _evaluate_traced(obj, method, arguments)
-    value = results[1 + wrt].reshape(shape)
+    recorded = _recorded(obj, method, len(arguments))
+    results, shape = _at_points(recorded.value_and_slopes(), obj, arguments)
+    value = results[0][1 + wrt].reshape(shape)
     missing = functools.reduce(
         np.logical_or, (np.isnan(np.asarray(x, dtype=float)) for x in arguments)
     )
@@ -154,7 +162,7 @@ def jvp(
 ) -> tuple[Any, ...]:
     """Jacobian-vector product J(point) direction of a vector function written over `ops`.
 
-    `point` and `direction` hold numbers, CasADi symbols or JAX arrays; `function` takes the point
+    `point` and `direction` hold numbers, symbols or JAX arrays; `function` takes the point
     as one sequence.
     """
     if _is_jax(*point, *direction):
@@ -192,30 +200,18 @@ def value_and_derivative(
     that broadcast and returns (value, derivative) of their shape. The parameters of `obj` may be
     arrays as well. Raises TraceError if the method cannot be traced.
     """
-    import casadi
-
-    function, parameters = (
-        _traced(obj, method, count, wrt),
-        [leaf.value for leaf in tree.leaves(obj)],
-    )
-    if any(isinstance(value, np.ndarray) for value in parameters):
-        return lambda *arguments: _evaluate_pair(function, parameters, arguments)
-    vector = casadi.DM(np.array(parameters, dtype=float))
+    function = _recorded(obj, method, count).value_and_slope(wrt)
+    parameters = [leaf.value for leaf in tree.leaves(obj)]
+    several = any(isinstance(value, np.ndarray) for value in parameters)
 
     def evaluate(*arguments: Any) -> tuple[Any, Any]:
-        if any(isinstance(x, np.ndarray) for x in arguments):
-            return _evaluate_pair(function, parameters, arguments)
-        value, derivative = function(*arguments, vector)
-        return float(value), float(derivative)
+        if several or any(isinstance(x, np.ndarray) for x in arguments):
+            (pair,), shape = _at_points(function, obj, arguments)
+            return pair[0].reshape(shape), pair[1].reshape(shape)
+        value, slope = function.at_numbers(arguments, parameters)[0]
+        return value, slope
 
     return evaluate
-
-
-def _evaluate_pair(
-    function: Any, parameters: Sequence[Any], arguments: Sequence[Any]
-) -> tuple[Any, Any]:
-    (value, derivative), shape = _call_traced(function, parameters, arguments)
-    return value.reshape(shape), derivative.reshape(shape)
 
 
 def _is_jax(*operands: Any) -> bool:
@@ -231,14 +227,14 @@ def _symbolic_product(
     """The Jacobian at a point, or its transpose, times a vector: floats unless one of the values is
     a symbol.
     """
-    import casadi
-
-    x = casadi.SX.sym("x", len(point))
-    values = casadi.vertcat(*(casadi.SX(v) for v in function([x[i] for i in range(len(point))])))
-    product = casadi.jtimes(values, x, casadi.vertcat(*vector), transposed)
-    result = casadi.substitute(product, x, casadi.vertcat(*point))
-    components = tuple(result[i] for i in range(result.numel()))
-    return components if ops.is_symbol(*point, *vector) else tuple(map(float, components))
+    x = nodes.symbols("x", len(point))
+    values = nodes.as_nodes(function(x))
+    weights = nodes.as_nodes(vector)
+    differentiated = slopes.weighted_gradient if transposed else slopes.tangents
+    products = nodes.replaced(differentiated(values, x, weights), x, point)
+    if ops.is_symbol(*point, *vector):
+        return tuple(products)
+    return tuple(map(float, products))
 
 
 def jacobian(
@@ -247,10 +243,12 @@ def jacobian(
     """Values of `obj.method` at N points, shape (N,), and derivatives with respect to its P leaves,
     shape (N, P).
     """
-    results, shape = _evaluate_traced(obj, method, arguments)
-    return results[0].reshape(-1), results[-1].reshape(
-        math.prod(shape), sum(1 for _ in tree.leaves(obj))
-    )
+    recorded = _recorded(obj, method, len(arguments))
+    (values, by_parameter), shape = _at_points(recorded.value_and_slopes(), obj, arguments)
+    table = np.empty((math.prod(shape), len(by_parameter)))
+    for k, column in enumerate(by_parameter):
+        table[:, k] = column
+    return values[0], table
 
 
 def parameter_derivatives(
@@ -259,16 +257,13 @@ def parameter_derivatives(
     """Derivatives of `obj.method` with respect to the leaves of these numbers at N points, shape
     (N, leaves).
     """
-    points = np.broadcast_arrays(*(np.asarray(x, dtype=float).reshape(-1) for x in arguments))
-    if points[0].size >= MIN_POINTS:
-        key = (tree.structure(obj), method, len(points), tuple(leaves), "program")
-        if key not in _traced_functions:
-            function = _traced(obj, method, len(points))
-            _traced_functions[key] = make_program(function, function.n_out() - 1, list(leaves))
-        program = _traced_functions[key]
-        if program is not None:
-            return program.columns(points, tree.flatten(obj).tolist(), len(leaves))
-    return jacobian(obj, method, *points)[1][:, list(leaves)]
+    points = [np.asarray(x, dtype=float).reshape(-1) for x in arguments]
+    function = _recorded(obj, method, len(points)).parameter_slopes(tuple(leaves))
+    (columns,), shape = _at_points(function, obj, points)
+    table = np.empty((math.prod(shape), len(columns)), order="F")
+    for k, column in enumerate(columns):
+        table[:, k] = column
+    return table
 
 
 def is_traceable(cls: type[Any]) -> bool:

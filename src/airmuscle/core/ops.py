@@ -1,8 +1,8 @@
-"""Mathematical functions over floats, NumPy arrays, CasADi symbols and JAX arrays.
+"""Mathematical functions over floats, NumPy arrays, symbols, JAX arrays and CasADi expressions.
 
 Each function selects the library by the type of its operands: floats and NumPy arrays are evaluated
-at once, CasADi symbols are traced, JAX arrays are passed to jax.numpy. Models are written with
-these functions and + - * / **.
+at once, symbols are recorded (`nodes`), JAX arrays are passed to jax.numpy and expressions of
+CasADi to casadi. Models are written with these functions and + - * / **.
 """
 
 import math
@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from . import nodes
 from .errors import ParameterError
 
 Value = Any
-"""A float, a NumPy array, a CasADi symbol or a JAX array."""
+"""A float, a NumPy array, a symbol, a JAX array or an expression of CasADi."""
 Values = Mapping[str, Value]
 """Values by name, such as states, inputs, coordinates or forces."""
 
@@ -48,6 +49,8 @@ def _library(*operands: Value) -> ModuleType | None:
     for operand in operands:
         if type(operand) in _PLAIN or isinstance(operand, float | int):
             continue
+        if type(operand) is nodes.Node:
+            return nodes
         root = type(operand).__module__.partition(".")[0]
         if root == "casadi":
             return sys.modules["casadi"]
@@ -71,8 +74,18 @@ def _check_double(array: Any) -> None:
 
 
 def is_symbol(*operands: Value) -> bool:
-    """Return whether any operand is a CasADi symbol, that is, whether the model is being traced."""
-    return any(type(x).__module__.startswith("casadi") for x in operands)
+    """Return whether any operand is a symbol, that is, whether the model is being traced."""
+    return any(type(x) is nodes.Node for x in operands)
+
+
+def is_traced(*operands: Value) -> bool:
+    """Return whether any operand has no numbers to look at: symbols, expressions of CasADi, JAX
+    arrays.
+    """
+    return any(
+        type(x) is nodes.Node or type(x).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib")
+        for x in operands
+    )
 
 
 def where(condition: Value, when_true: Value, when_false: Value) -> Value:

@@ -233,7 +233,7 @@ def _revalidate(obj: Any) -> Any:
 PACKAGE_ROOT = Path(__file__).parents[1]
 EXCLUDED_ROOMS = ("outlets", "papers", "report")
 """Rooms of the program that do not affect a simulation."""
-NUMERICAL_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
+NUMERICAL_PACKAGES = ("numpy", "scipy", "numba", "llvmlite")
 
 
 def fingerprint(*objects: Any) -> str:

@@ -32,7 +32,7 @@ MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
 MAX_LINE = 26
 """Characters of a text in a table cell that is not wrapped."""
-_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi", "matplotlib")
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "matplotlib")
 _BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
 REPORT_FILE = "report.html"
 

@@ -3,12 +3,14 @@ solved by Ipopt.
 """
 
 import functools
-from collections.abc import Mapping, Sequence
+import importlib
+import operator
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import Array, ParameterError
+from ...core import AirmuscleError, Array, Node, Operation, ParameterError, nodes
 from ...physics.analysis import held, linearise
 from .lqg_and_adrc import regulator
 
@@ -40,6 +42,75 @@ def check_limits(
             )
     if not slack_weight > 0.0:
         raise ParameterError(f"{owner}: slack_weight is {slack_weight!r}; it must be positive.")
+
+
+_SAME_NAMES = (
+    *("sqrt", "sin", "cos", "tan", "sinh", "cosh", "tanh"),
+    *("exp", "log", "expm1", "log1p", "sign", "floor"),
+)
+"""Functions of CasADi that have the names of our operations."""
+
+
+def _casadi() -> Any:
+    """The module casadi. Raises AirmuscleError where it is not installed."""
+    try:
+        return importlib.import_module("casadi")
+    except ImportError:
+        raise AirmuscleError(
+            "NonlinearModelPredictive needs Ipopt in the package casadi; pip install"
+            " airmuscle[predictive]. LinearModelPredictive needs no further package."
+        ) from None
+
+
+@functools.cache
+def casadi_operations() -> dict[Operation, Callable[..., Any]]:
+    """The functions of CasADi for recorded operations."""
+    casadi = _casadi()
+    return {
+        Operation.NEGATE: operator.neg,
+        Operation.INVERSE: lambda x: 1.0 / x,
+        Operation.TWICE: lambda x: 2.0 * x,
+        Operation.SQUARE: lambda x: x**2,
+        Operation.DIVIDE: operator.truediv,
+        Operation.MULTIPLY: operator.mul,
+        Operation.ADD: operator.add,
+        Operation.SUBTRACT: operator.sub,
+        Operation.ABS: casadi.fabs,
+        Operation.ASIN: casadi.asin,
+        Operation.ACOS: casadi.acos,
+        Operation.ATAN: casadi.atan,
+        Operation.ASINH: casadi.asinh,
+        Operation.POWER: operator.pow,
+        Operation.FMIN: casadi.fmin,
+        Operation.FMAX: casadi.fmax,
+        Operation.LESS: operator.lt,
+        Operation.LESS_EQUAL: operator.le,
+        Operation.EQUAL: operator.eq,
+        Operation.NOT_EQUAL: operator.ne,
+        Operation.NOT: casadi.logic_not,
+        Operation.AND: casadi.logic_and,
+        Operation.OR: casadi.logic_or,
+        Operation.MASK: lambda condition, x: casadi.if_else(condition, x, 0.0),
+        Operation.SELECT: casadi.if_else,
+        **{
+            Operation[name.upper()]: getattr(casadi, name)
+            for name in [
+                "sqrt",
+                "sin",
+                "cos",
+                "tan",
+                "sinh",
+                "cosh",
+                "tanh",
+                "exp",
+                "log",
+                "expm1",
+                "log1p",
+                "sign",
+                "floor",
+            ]
+        },
+    }
 
 
 class PredictiveProgram:
@@ -83,8 +154,7 @@ class PredictiveProgram:
         """The solvers of target and plan, which hold the numbers of a search: one thread at a time
         uses them.
         """
-        import casadi
-
+        casadi = _casadi()
         options: Any = {
             "expand": True,
             "print_time": False,
@@ -98,50 +168,58 @@ class PredictiveProgram:
 
     def _symbols(self) -> Any:
         """Scaled states and inputs, and disturbances [SI] of the states that are disturbed."""
-        import casadi
+        casadi = _casadi()
+        return [casadi.SX.sym(name, size) for name, size in self._sizes().items()]
 
-        sizes = {
+    def _sizes(self) -> dict[str, int]:
+        """How many states, inputs and disturbances there are."""
+        return {
             "x": len(self.scale),
             "u": len(self.sizes),
             "d": len(self.controller.estimator.disturbances),
         }
-        return [casadi.SX.sym(name, size) for name, size in sizes.items()]
 
     @functools.cached_property
     def _plant(self) -> tuple[Any, Any, Any]:
         """Functions of the plant: scaled rates (x, u, d), controlled columns (x, u), and limited
         columns (x, u) as parts of their ranges, 0 at the minimum and 1 at the maximum."""
-        import casadi
-
+        casadi = _casadi()
         law = self.controller
-        x, u, d = self._symbols()
         plant = law.estimator.plant
-        sizes = zip(law.commanded, self.sizes.tolist(), strict=True)
+        x, u, d = (nodes.symbols(name, size) for name, size in self._sizes().items())
+        of_inputs = zip(law.commanded, self.sizes.tolist(), strict=True)
         state = {s.name: x[i] * float(self.scale[i]) for i, s in enumerate(plant.states)}
-        inputs = {**self.inputs, **{name: u[i] * size for i, (name, size) in enumerate(sizes)}}
+        inputs = {**self.inputs, **{name: u[i] * size for i, (name, size) in enumerate(of_inputs)}}
         rates = plant.rates(state, inputs)
         columns = {**plant.outputs(state, inputs), **state}
         rows = [rates[name] for name in state]
         for i, place in enumerate(law.estimator.places[1]):
             rows[place] = rows[place] + d[i]
-        scaled = casadi.vertcat(
-            *[row / float(size) for row, size in zip(rows, self.scale, strict=True)]
-        )
+        scaled = [row / float(size) for row, size in zip(rows, self.scale, strict=True)]
         limited = [(columns[name] - low) / (high - low) for name, (low, high) in law.limits.items()]
+        controlled = [columns[name] for name in law.controlled]
+
+        def function(name: str, arguments: Sequence[Sequence[Node]], results: Sequence[Any]) -> Any:
+            vectors = [casadi.SX.sym("v", len(symbols)) for symbols in arguments]
+            values = {
+                id(symbol): vector[i]
+                for symbols, vector in zip(arguments, vectors, strict=True)
+                for i, symbol in enumerate(symbols)
+            }
+            replayed = nodes.replayed(nodes.as_nodes(results), values, casadi_operations())
+            return casadi.Function(name, vectors, [casadi.vertcat(*replayed)])
+
         return (
-            casadi.Function("rates", [x, u, d], [scaled]),
-            casadi.Function(
-                "columns", [x, u], [casadi.vertcat(*[columns[name] for name in law.controlled])]
-            ),
-            casadi.Function("limited", [x, u], [casadi.vertcat(*limited)]),
+            function("rates", [x, u, d], scaled),
+            function("columns", [x, u], controlled),
+            function("limited", [x, u], limited),
         )
 
     def _target(self) -> dict[str, Any]:
         """Variables (x_s, u_s), parameters (d, r); set points relative to the sizes of the
         controlled columns.
         """
-        import casadi
-
+        casadi = _casadi()
         law = self.controller
         rates, columns, _ = self._plant
         x, u, d = self._symbols()
@@ -165,8 +243,7 @@ class PredictiveProgram:
         """Variables (x_1, u_0, x_2, u_1, ..., s), parameters (x_0, d, x_s, u_s); constraints:
         steps, then limits.
         """
-        import casadi
-
+        casadi = _casadi()
         law = self.controller
         n = len(self.scale)
         m = len(self.sizes)
@@ -196,8 +273,7 @@ class PredictiveProgram:
         """The scaled states after a sample, by classical Runge-Kutta steps with held inputs: a
         function (x, u, d).
         """
-        import casadi
-
+        casadi = _casadi()
         x, u, d = self._symbols()
         rates = self._plant[0]
         state = x

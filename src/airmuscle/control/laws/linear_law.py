@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, ShortRepr, flatten
+from ...core import Array, ParameterError, Recorded, ShortRepr, flatten, nodes, slopes
 from ...engine.loop import ColumnSensor, ControlLaw, rebuilt
 from ...engine.run.compiled_law import trace_sample
 from ...physics.analysis.linear_model import one_sided
@@ -56,12 +56,15 @@ class _Sample:
     """A law as a function of a Point, with its slopes."""
 
     def __init__(self, law: ControlLaw, sample_time: float) -> None:
-        import casadi
-
-        self.law, t = law, trace_sample(law)
-        by = casadi.vertcat(t.memory, t.measured, t.setpoints)
-        values = casadi.vertcat(t.later, casadi.fmin(casadi.fmax(t.commands, t.minimum), t.maximum))
-        given = [
+        self.law = law
+        t = trace_sample(law)
+        commands = [
+            nodes.limited(command, low, high)
+            for command, low, high in zip(t.commands, t.minimum, t.maximum, strict=True)
+        ]
+        values = [*t.later, *commands]
+        by = [*t.memory, *t.measured, *t.setpoints]
+        arguments = [
             t.measured,
             t.setpoints,
             t.memory,
@@ -70,18 +73,19 @@ class _Sample:
             t.sample_time,
             t.parameters,
         ]
-        self._function: Any = casadi.Function(
-            "sample", given, [values, casadi.jacobian(values, by)]
-        )
-        self._last = [sample_time, flatten(law)]
+        table = slopes.by_row(slopes.jacobian(values, by))
+        self._function = Recorded(arguments, [values, table])
+        self._shape = len(values), len(by)
+        self._last = [[sample_time], flatten(law).tolist()]
         self.count = len(law.initial_memory)
 
     def __call__(self, point: Point) -> tuple[Array, Array]:
         """Memory after the sample and commands (n + m,), and their slopes by memory, measurements
         and set points.
         """
-        values, slopes = self._function(*point, *self._last)
-        return np.asarray(values, dtype=float)[:, 0], np.asarray(slopes, dtype=float)
+        vectors = [np.asarray(vector, dtype=float).tolist() for vector in point]
+        values, table = self._function.at_numbers(*vectors, *self._last)
+        return np.array(values, dtype=float), np.array(table, dtype=float).reshape(self._shape)
 
 
 def linearise_law(

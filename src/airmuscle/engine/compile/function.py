@@ -5,18 +5,23 @@ event indicators.
 import dataclasses
 import functools
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array
+from ...core import Array, Node, Operation, Recorded, nodes, slopes
 from .cache.kernel import evaluate
 from .functions import PARAMETERS, POINT, Printer, TracedSystem
 from .ir import emission, jacobian
-from .ir.instructions import ZERO, Code, Instruction, Operand, Operation, finished, recorded
+from .ir.instructions import (
+    ZERO,
+    Code,
+    Instruction,
+    Operand,
+    finished,
+    instructions,
+)
 from .ir.interpreter import InterpretedBody
-from .ir.jacobian import Tape
 from .llvm import vector_math
 from .llvm.emit import LlvmType
 from .llvm.groups import LaneGroups
@@ -28,28 +33,28 @@ LANES = 8
 
 
 class Function:
-    """CasADi expressions of vectors, compiled: `address` is that of a function of the inputs' and
+    """Recorded expressions of vectors, compiled: `address` is that of a function of the inputs' and
     outputs' arrays.
 
-    A matrix is written row by row. With `lanes` above 1 the function computes so many points at
+    With `lanes` above 1 the function computes so many points at
     once: each element of an input or output is a row of so many numbers, in arrays that are aligned
     as vectors must be (`aligned_array`). The machine code lives as long as this object.
     """
 
-    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any], lanes: int = 1) -> None:
-        import casadi
-
-        rows = {
-            name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()
-        }
+    def __init__(
+        self,
+        inputs: Mapping[str, Sequence[Node]],
+        outputs: Mapping[str, Sequence[Node]],
+        lanes: int = 1,
+    ) -> None:
         if lanes == 1:
             printer = Printer()
-            printer.add("function", inputs, rows)
+            printer.add("function", inputs, outputs)
             text = printer.module()
         else:
             groups = LaneGroups(LlvmType(lanes=lanes), processor().register)
             printer = Printer(groups)
-            printer.add("function", inputs, rows)
+            printer.add("function", inputs, outputs)
             text = vector_math.definitions(printer.needed, groups.number) + printer.module()
         self._module = Module(text)
         self.address = self._module.address("function")
@@ -84,35 +89,27 @@ def augmented_rates(
 ) -> AugmentedRates:
     """The functions of a system; `measured` are columns among states and outputs, `parameters`
     indices of leaves and `disturbed` indices of states."""
-    import casadi
-
     t = ready.program.traced
-    n = t.x.numel()
-    z = casadi.SX.sym("z", n + len(parameters) + len(disturbed))
-    values = [t.p[i] for i in range(t.p.numel())]
+    n = len(t.x)
+    z = nodes.symbols("z", n + len(parameters) + len(disturbed))
+    values = list(t.p)
     for k, index in enumerate(parameters, n):
         values[index] = z[k]
-    f, o = casadi.Function("system", [t.x, t.u, t.p], [t.f, t.o])(
-        z[:n], t.u, casadi.vertcat(*values)
-    )
+    replaced = nodes.replaced([*t.f, *t.o], [*t.x, *t.p], [*z[:n], *values])
+    f = replaced[:n]
+    o = replaced[n:]
     for k, index in enumerate(disturbed, n + len(parameters)):
-        f[index] += z[k]
-    columns = casadi.vertcat(z[:n], o)
-    y = casadi.vertcat(*(columns[i] for i in measured))
+        f[index] = f[index] + z[k]
+    columns = [*z[:n], *o]
+    y = [columns[i] for i in measured]
     printer = Printer()
     point = {"z": z, "u": t.u, PARAMETERS: t.p}
-    printer.add("rates", point, {"f": casadi.densify(f), "A": _by_row(casadi.jacobian(f, z))})
-    printer.add("measured", point, {"y": casadi.densify(y), "C": _by_row(casadi.jacobian(y, z))})
-    printer.add("outputs", point, {"o": casadi.densify(o)})
+    printer.add("rates", point, {"f": f, "A": slopes.by_row(slopes.jacobian(f, z))})
+    printer.add("measured", point, {"y": y, "C": slopes.by_row(slopes.jacobian(y, z))})
+    printer.add("outputs", point, {"o": o})
     module = Module(printer.module(), printer.held)
     addresses = map(module.address, ("rates", "measured", "outputs"))
     return AugmentedRates(module, module.prepare(ready.parameters), *addresses)
-
-
-def _by_row(matrix: Any) -> Any:
-    import casadi
-
-    return casadi.densify(casadi.vec(matrix.T))
 
 
 def states_and_outputs(
@@ -150,21 +147,28 @@ def derivatives(
     """The derivatives at a state vector (n,) under inputs (m,). At a kink they are those of one of
     its sides.
     """
-    results = _function(ready.program)(
-        np.asarray(state, float), np.asarray(inputs, float), ready.parameters
+    t = ready.program.traced
+    rates, outputs, *tables = _function(ready.program).at_numbers(
+        np.asarray(state, dtype=float).tolist(),
+        np.asarray(inputs, dtype=float).tolist(),
+        ready.parameters.tolist(),
     )
-    f, o, *slopes = (np.asarray(part, dtype=float) for part in results)
-    return Derivatives(f[:, 0], o.reshape(-1), *slopes)
+    shapes = [(len(values), len(by)) for values in (t.f, t.o) for by in (t.x, t.u)]
+    slopes_of = [
+        np.array(table, dtype=float).reshape(shape)
+        for table, shape in zip(tables, shapes, strict=True)
+    ]
+    return Derivatives(np.array(rates, dtype=float), np.array(outputs, dtype=float), *slopes_of)
 
 
 @functools.cache
-def _function(program: Program) -> Any:
+def _function(program: Program) -> Recorded:
     """(x, u, p) -> (f, o, df/dx, df/du, do/dx, do/du), differentiated once for a structure."""
-    import casadi
-
     t = program.traced
-    slopes = [casadi.jacobian(value, by) for value in (t.f, t.o) for by in (t.x, t.u)]
-    return casadi.Function("derivatives", [t.x, t.u, t.p], [t.f, t.o, *slopes])
+    tables = [
+        slopes.by_row(slopes.jacobian(values, by)) for values in (t.f, t.o) for by in (t.x, t.u)
+    ]
+    return Recorded([t.x, t.u, t.p], [t.f, t.o, *tables])
 
 
 Place = tuple[int, int]
@@ -189,16 +193,9 @@ class Partials:
 
 def partials(t: TracedSystem) -> Partials:
     """The partial derivatives of a traced system."""
-    code = recorded([t.x, t.u, t.p], [t.f, t.o])
-    n = t.x.numel()
-    m = t.u.numel()
-    tape = Tape(code.body)
-    results = code.results(0, n) + code.results(1, t.o.numel())
-    values = jacobian.nonzeros(
-        tape, results, [*(("in", 0, j) for j in range(n)), *(("in", 1, j) for j in range(m))]
-    )
-    outputs = tuple((0, k, operand) for k, operand in enumerate(values.values()))
-    return Partials(finished(Code(tuple(tape.body), outputs)), tuple(values))
+    values = jacobian.nonzeros([*t.f, *t.o], [*t.x, *t.u])
+    code = instructions(list(t.point.values()), [list(values.values())])
+    return Partials(code, tuple(values))
 
 
 _COMPARISONS = frozenset(
@@ -258,7 +255,7 @@ def event_indicators(t: TracedSystem) -> EventIndicators:
 
     A pair that depends on parameters only never changes its order, and has none.
     """
-    code = finished(recorded([t.x, t.u, t.p], [t.f]))
+    code = instructions(list(t.point.values()), [t.f])
     varying: set[Operand] = set()
     body = list(code.body)
     pairs: dict[frozenset[Operand], tuple[Operand, Operand]] = {}

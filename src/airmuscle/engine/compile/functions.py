@@ -6,13 +6,13 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...core import System, TraceError, autodiff
+from ...core import Node, System, TraceError, autodiff, nodes, slopes
 from .ir import emission
 from .ir.emission import FunctionBlock, TargetLanguage
-from .ir.instructions import Code, Operand, finished, hoisted, instructions, recorded
-from .ir.jacobian import Tape, nonzeros
+from .ir.instructions import Code, Operand, hoisted, instructions
+from .ir.jacobian import nonzeros
 from .ir.scheduling import Item
-from .ir.sparse_lu import Factors
+from .ir.sparse_lu import Factors, distinct
 from .llvm.emit import LlvmLanguage
 from .text.body import NO_LABEL
 
@@ -27,20 +27,20 @@ POINT = ("x", "u", PARAMETERS)
 
 @dataclasses.dataclass(frozen=True)
 class TracedSystem:
-    """A system as CasADi expressions: states x, inputs u, their slopes w, parameters p, rates f,
+    """A system as recorded expressions: states x, inputs u, their slopes w, parameters p, rates f,
     outputs o.
     """
 
-    x: Any
-    u: Any
-    w: Any
-    p: Any
-    f: Any
-    o: Any
+    x: list[Node]
+    u: list[Node]
+    w: list[Node]
+    p: list[Node]
+    f: list[Node]
+    o: list[Node]
     output_names: tuple[str, ...]
 
     @property
-    def point(self) -> dict[str, Any]:
+    def point(self) -> dict[str, list[Node]]:
         """What rates and outputs depend on, by the names of the arguments."""
         return dict(zip(POINT, (self.x, self.u, self.p), strict=True))
 
@@ -49,27 +49,23 @@ def trace_system(system: System) -> TracedSystem:
     """Call a system once with symbols; raises TraceError where that does not give finite
     expressions.
     """
-    import casadi
-
-    model, p = autodiff.symbolic(system)
     names = [s.name for s in system.states]
-    x = casadi.SX.sym("x", len(names))
-    u = casadi.SX.sym("u", len(system.inputs))
-    w = casadi.SX.sym("w", len(system.inputs))
-    state = {name: x[i] for i, name in enumerate(names)}
-    inputs = {name: u[i] for i, name in enumerate(system.inputs)}
-    rates, outputs = model.rates_and_outputs(state, inputs)
-    if set(rates) != set(names):
-        raise TraceError(
-            f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}."
-        )
-    # Dense, because a printed function writes non-zeros one after the other.
-    f = casadi.densify(casadi.vertcat(*(rates[name] for name in names)))
-    o = casadi.densify(casadi.vertcat(*outputs.values())) if outputs else casadi.SX(0, 1)
-    autodiff.check_finite(casadi.vertcat(f, o), type(system).__name__)
-    f, o = casadi.cse(
-        [f, o]
-    )  # once, so that the same need not be found again for every printed function
+    x = nodes.symbols("x", len(names))
+    u = nodes.symbols("u", len(system.inputs))
+    w = nodes.symbols("w", len(system.inputs))
+    with nodes.recording():
+        model, p = autodiff.symbolic(system)
+        state = dict(zip(names, x, strict=True))
+        inputs = dict(zip(system.inputs, u, strict=True))
+        rates, outputs = model.rates_and_outputs(state, inputs)
+        if set(rates) != set(names):
+            raise TraceError(
+                f"{type(system).__name__}: states are {names}, but rates are given for"
+                f" {list(rates)}."
+            )
+        f = [nodes.as_node(rates[name]) for name in names]
+        o = nodes.as_nodes(list(outputs.values()))
+    autodiff.check_finite([*f, *o], type(system).__name__)
     return TracedSystem(x, u, w, p, f, o, tuple(outputs))
 
 
@@ -99,7 +95,7 @@ class Printer:
         self._language = language
         self._prepare = language.body()
         self._places: dict[str, int] = {}
-        self.quantities: tuple[Mapping[str, Any], Any] | None = None
+        self.quantities: tuple[Mapping[str, list[Node]], list[Node]] | None = None
         """Arguments and values of the quantities of the array "o", which have names in functions of
         these arguments.
         """
@@ -112,8 +108,8 @@ class Printer:
     def add(
         self,
         name: str,
-        inputs: dict[str, Any],
-        outputs: dict[str, Any],
+        inputs: Mapping[str, Sequence[Node]],
+        outputs: Mapping[str, Sequence[Node]],
         scalars: Sequence[str] = (),
     ) -> None:
         """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
@@ -239,43 +235,67 @@ def system_module(
     outputs(x, u, c, o)
     """
     printer = Printer(language)
-    code = recorded([t.x, t.u, t.p], [t.f])
     printer.quantities = t.point, t.o
-    printer.add_code("rhs", POINT, finished(code), ["f"])
-    jacobian, factors = _add_implicit(printer, t, code) if implicit else (0, 0)
+    printer.add("rhs", t.point, {"f": t.f})
+    jacobian, factors = _add_implicit(printer, t) if implicit else (0, 0)
     printer.add("outputs", t.point, {"o": t.o})
     if extend is not None:
         extend(printer)
-    sizes = t.x.numel(), t.u.numel(), t.p.numel(), printer.held, jacobian, factors, t.o.numel()
+    sizes = len(t.x), len(t.u), len(t.p), printer.held, jacobian, factors, len(t.o)
     return printer.module(), ArraySizes(*sizes)
 
 
-def _add_implicit(printer: Printer, t: TracedSystem, code: Code) -> tuple[int, int]:
-    """Print jac to df_dt for recorded rates; how many numbers J and A have."""
-    import casadi
+def _add_implicit(printer: Printer, t: TracedSystem) -> tuple[int, int]:
+    """Print jac to df_dt; how many numbers J and A have."""
+    size = len(t.x)
+    by_state = nonzeros(t.f, t.x)
+    values, slots = distinct(list(by_state.values()))
+    lu = Factors(tuple(by_state), slots, size)
+    a = nodes.symbols("A", len(lu.values))
+    g = nodes.symbols("g", size)
+    b = nodes.symbols("b", size)
+    stage = lu.solved(a, [rate + more for rate, more in zip(t.f, g, strict=True)])
+    printer.add("jac", t.point, {"f": t.f, "J": values})
+    printer.add("factor", {"J": lu.j, "d": [lu.d]}, {"A": lu.values}, ["d"])
+    printer.add("solve", {"A": a, "b": b}, {"y": lu.solved(a, b)})
+    printer.add("stage", {**t.point, "A": a, "g": g}, {"k": stage})
+    printer.add("df_dt", {**t.point, "w": t.w}, {"f": slopes.tangents(t.f, t.u, t.w)})
+    return len(lu.j), len(lu.values)
 
-    size = t.x.numel()
-    tape = Tape(code.body)
-    point = t.point
-    rates = code.results(0, size)
-    slopes = nonzeros(tape, rates, [("in", 0, j) for j in range(size)])
-    distinct = list(dict.fromkeys(slopes.values()))
-    outputs = [
-        (k, i, operand)
-        for k, operands in enumerate((rates, distinct))
-        for i, operand in enumerate(operands)
-    ]
-    lu = Factors(tuple(slopes), tuple(distinct.index(operand) for operand in slopes.values()), size)
-    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
-    stage = lu.solved(a, [t.f[i] + g[i] for i in range(size)])
-    solve = lu.solved(a, [b[i] for i in range(size)])
-    printer.add_code("jac", POINT, finished(Code(tuple(tape.body), tuple(outputs))), ["f", "J"])
-    printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
-    printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
-    printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
-    df_dt = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
-    printer.add("df_dt", {**point, "w": t.w}, {"f": df_dt})
-    return lu.j.numel(), lu.values.numel()
+
+Inputs = Callable[[float], Sequence[Node]]
+"""The inputs at a part of a step, 0 at its beginning."""
+
+
+def explicit_step(
+    t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float], h: Node, inputs: Inputs
+) -> list[Node]:
+    """The states after a step h of an explicit Runge-Kutta method.
+
+    `a` are the rows of the tableau below its first, `b` its weights; `inputs` gives the inputs at a
+    part of the step.
+    """
+    ordered = nodes.in_order(t.f)
+    stages: list[list[Node]] = []
+    for row in ([], *a):
+        state = _moved(t.x, row, stages, h)
+        at = [*state, *inputs(sum(row))]
+        stages.append(nodes.replaced(t.f, [*t.x, *t.u], at, ordered))
+    return _moved(t.x, b, stages, h)
+
+
+def _moved(
+    x: Sequence[Node], weights: Sequence[float], stages: Sequence[Sequence[Node]], h: Node
+) -> list[Node]:
+    """x + h (a1 k1 + a2 k2 + ...)."""
+    moved = []
+    for i, start in enumerate(x):
+        total = nodes.ZERO
+        for weight, stage in zip(weights, stages, strict=True):
+            if weight:
+                total = total + weight * stage[i]
+        moved.append(start + h * total)
+    return moved
 
 
 def explicit_module(
@@ -287,19 +307,13 @@ def explicit_module(
     `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs
     move at w.
     """
-    import casadi
+    h = nodes.symbol("h")
 
-    rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
-    h = casadi.SX.sym("h")
-    slopes: list[Any] = []
-    for row in ([], *a):
-        increment = sum(
-            (weight * k for weight, k in zip(row, slopes, strict=True) if weight), casadi.SX(0)
-        )
-        slopes.append(rates(t.x + h * increment if row else t.x, t.u + sum(row) * h * t.w, t.p))
-    step = t.x + h * sum(
-        (weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0)
-    )
-    printer = Printer()
-    printer.add("step", {**t.point, "w": t.w, "h": h}, {"y": step}, ["h"])
+    def inputs(node: float) -> list[Node]:
+        return [u + node * h * w for u, w in zip(t.u, t.w, strict=True)]
+
+    with nodes.recording():
+        step = explicit_step(t, a, b, h, inputs)
+        printer = Printer()
+        printer.add("step", {**t.point, "w": t.w, "h": [h]}, {"y": step}, ["h"])
     return printer.module(), printer.held

@@ -5,6 +5,7 @@ plant.
 import dataclasses
 from collections.abc import Mapping, Sequence
 
+from ...core import nodes
 from .functions import POINT, Extension, Printer, TracedSystem
 from .ir import emission
 from .ir.instructions import Code, Operand, instructions
@@ -26,9 +27,7 @@ def rows_at_once(t: TracedSystem) -> int:
     """The number of rows whose outputs one call computes; 1 where that is `outputs`, otherwise it
     is `row_outputs`.
     """
-    import casadi
-
-    count = casadi.Function("outputs", [t.x, t.u, t.p], [t.o]).n_instructions()
+    count = len(nodes.in_order(t.o)) + len(t.o)
     return ROWS.lanes if count <= MAX_OPERATIONS else 1
 
 
@@ -39,9 +38,9 @@ def row_outputs(t: TracedSystem) -> Extension:
     """
 
     def add(printer: Printer) -> None:
-        block = _RowsBody({"x": t.x.numel(), "u": t.u.numel(), "o": t.o.numel()})
+        block = _RowsBody({"x": len(t.x), "u": len(t.u), "o": len(t.o)})
         for (_, index), value in printer.compute(
-            block, instructions([t.x, t.u, t.p], [t.o]), POINT
+            block, instructions(list(t.point.values()), [t.o]), POINT
         ).items():
             block.store("o", index, value)
         text = emit.function("row_outputs", ["x", "u", "c", "o"], block)
@@ -144,8 +143,8 @@ class _Step:
         self, t: TracedSystem, code: Code, held: dict[Operand, int], groups: LaneGroups
     ) -> None:
         self.groups = groups
-        self.states = t.x.shape[0]
-        self.inputs = t.u.shape[0]
+        self.states = len(t.x)
+        self.inputs = len(t.u)
         self.items = emission.with_gates(code, POINT, held)
         self.outputs = code.outputs
         self.held = held

@@ -14,11 +14,11 @@ import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ...core import SensitivitySystem
-from .functions import PARAMETERS, POINT, ArraySizes, Printer, TracedSystem, trace_system
-from .ir.instructions import ZERO, Code, Operand, finished, recorded
-from .ir.jacobian import Tape, derivatives
-from .ir.sparse_lu import Factors
+from ...core import Node, SensitivitySystem, nodes, slopes
+from .functions import POINT, ArraySizes, Printer, TracedSystem, trace_system
+from .ir.instructions import Code, instructions
+from .ir.jacobian import nonzeros
+from .ir.sparse_lu import Factors, distinct
 from .llvm.emit import FunctionBody
 from .llvm.exact import LlvmValue, loaded, packed
 
@@ -37,7 +37,7 @@ class TangentSystem:
     @property
     def size(self) -> int:
         """How many states the system has without their derivatives."""
-        return int(self.inner.x.numel())
+        return len(self.inner.x)
 
     @property
     def lanes(self) -> int:
@@ -52,7 +52,7 @@ class TangentSystem:
 
     def input_rows(self, block: FunctionBody, array: str = "u") -> list[LlvmValue]:
         """The rows of V, which follow the inputs in an array, or those of its slope in time."""
-        first = int(self.inner.u.numel())
+        first = len(self.inner.u)
         return [
             loaded(block, array, first + j * self.lanes, self.lanes)
             for j in range(len(self.inputs))
@@ -63,90 +63,107 @@ def tangent_system(system: SensitivitySystem) -> TangentSystem:
     """The traced inner system of a differentiated one, with the observed quantities as its
     outputs.
     """
-    import casadi
-
     inner = trace_system(system.inner)
     names = [s.name for s in system.inner.states]
-    outputs = {
-        **{n: inner.x[i] for i, n in enumerate(names)},
-        **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
-    }
-    observed = casadi.densify(
-        casadi.vertcat(casadi.SX(0, 1), *(outputs[n] for n in system.observed_names))
-    )
-    traced = dataclasses.replace(inner, o=observed)
+    quantities = dict(zip(names, inner.x, strict=True))
+    quantities |= zip(inner.output_names, inner.o, strict=True)
+    traced = dataclasses.replace(inner, o=[quantities[name] for name in system.observed_names])
     return TangentSystem(
         traced, system.parameter_indices, system.output_names, system.input_indices
     )
 
 
 class Values:
-    """Expressions of a point as instructions, and how they change along every column:
+    """Expressions of a point, and how they change along every column:
     dv = (dv/dx) S + (dv/du) V + dv/dtheta."""
 
-    def __init__(self, t: TangentSystem, expressions: Any, further: Sequence[Any] = ()) -> None:
-        code = recorded([*t.inner.point.values(), *further], [expressions])
-        self.t, self.tape, self.results = t, Tape(code.body), code.results(0, expressions.numel())
+    def __init__(
+        self, t: TangentSystem, results: Sequence[Node], further: Sequence[Sequence[Node]] = ()
+    ) -> None:
+        self.t = t
+        self.results = list(results)
+        self._arguments = [*t.inner.point.values(), *further]
 
-    def along(self, results: Sequence[Operand]) -> "DirectionalDerivative":
-        """The derivatives of some operands of the tape."""
-        states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
-        inputs = [("in", POINT.index("u"), i) for i in self.t.inputs]
-        leaves = {
-            place: ("in", POINT.index(PARAMETERS), place)
-            for group in self.t.groups
-            for place in group
-        }
+    def along(self, results: Sequence[Node]) -> "DirectionalDerivative":
+        """The derivatives of some expressions."""
+        inner = self.t.inner
+        inputs = [inner.u[i] for i in self.t.inputs]
+        places = list(dict.fromkeys(place for group in self.t.groups for place in group))
+        leaves = [inner.p[place] for place in places]
+        rows: list[dict[int, Node]] = [{} for _ in results]
+        for (row, column), slope in nonzeros(results, [*inner.x, *inputs, *leaves]).items():
+            rows[row][column] = slope
+        first_input = self.t.size
+        first_leaf = first_input + len(inputs)
         changes = []
-        for row in derivatives(self.tape, results, [*states, *inputs, *leaves.values()]):
-            sums = [ZERO] * self.t.lanes
+        for row_of in rows:
+            by_leaf = {
+                place: row_of.get(first_leaf + k, nodes.ZERO) for k, place in enumerate(places)
+            }
+            columns = {}
             for k, group in enumerate(self.t.groups):
+                total = nodes.ZERO
                 for place in group:
-                    sums[k] = self.tape.add(sums[k], row.get(leaves[place], ZERO))
-            all_parts = [row.get(x, ZERO) for x in states], [row.get(u, ZERO) for u in inputs], sums
-            changes.append(
-                Change(*({j: p for j, p in enumerate(parts) if p != ZERO} for parts in all_parts))
-            )
+                    total = slopes.plus(total, by_leaf[place])
+                if not slopes.is_zero(total):
+                    columns[k] = total
+            by_state = {j: s for j, s in sorted(row_of.items()) if j < first_input}
+            by_input = {
+                j - first_input: s
+                for j, s in sorted(row_of.items())
+                if first_input <= j < first_leaf
+            }
+            changes.append(Change(by_state, by_input, columns))
         return DirectionalDerivative(tuple(changes))
+
+    def code(self, wanted: Sequence[Node]) -> Code:
+        """The instructions of some expressions."""
+        return instructions(self._arguments, [wanted])
 
     def compute(
         self,
         printer: Printer,
         block: FunctionBody,
-        wanted: Sequence[Operand],
+        wanted: Sequence[Node],
         names: Sequence[str] = POINT,
-    ) -> dict[Operand, LlvmValue]:
-        """Append the instructions that some operands need to a function; the values of the
-        operands.
-        """
-        distinct = tuple(dict.fromkeys(wanted))
-        code = finished(
-            Code(
-                tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))
-            )
+    ) -> "ValuesOf":
+        """Append the instructions that some expressions need to a function; their values."""
+        merged, slots = distinct(wanted)
+        results = printer.compute(block, self.code(merged), names)
+        values = [LlvmValue(block, results[0, i]) for i in range(len(merged))]
+        return ValuesOf(
+            {nodes.identity(node): values[slot] for node, slot in zip(wanted, slots, strict=True)}
         )
-        results = printer.compute(block, code, names)
-        return {operand: LlvmValue(block, results[0, i]) for i, operand in enumerate(distinct)}
+
+
+class ValuesOf:
+    """The values of expressions in a function under construction."""
+
+    def __init__(self, values: Mapping[Any, LlvmValue]) -> None:
+        self._values = values
+
+    def __getitem__(self, expression: Node) -> LlvmValue:
+        return self._values[nodes.identity(expression)]
 
 
 class Change(NamedTuple):
-    """The non-zero derivatives of an operand, by state, by input with derivatives, and by
+    """The non-zero derivatives of an expression, by state, by input with derivatives, and by
     column.
     """
 
-    states: dict[int, Operand]
-    inputs: dict[int, Operand]
-    columns: dict[int, Operand]
+    states: dict[int, Node]
+    inputs: dict[int, Node]
+    columns: dict[int, Node]
 
 
 @dataclasses.dataclass(frozen=True)
 class DirectionalDerivative:
-    """The changes of some operands."""
+    """The changes of some expressions."""
 
     changes: tuple[Change, ...]
 
     @property
-    def parts(self) -> list[Operand]:
+    def parts(self) -> list[Node]:
         """All derivatives: those by states, then those by inputs, then those by columns."""
         return [
             part
@@ -156,10 +173,10 @@ class DirectionalDerivative:
         ]
 
     def rows(
-        self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue], v: Sequence[LlvmValue]
+        self, values: ValuesOf, s: Sequence[LlvmValue], v: Sequence[LlvmValue]
     ) -> list[LlvmValue]:
-        """The change of each operand, a column, from the values of the parts and the rows of S and
-        V.
+        """The change of each expression, a column, from the values of the parts and the rows of S
+        and V.
         """
         rows_along = []
         for states, inputs, columns in self.changes:
@@ -188,8 +205,6 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
     A the factors of the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I
     - J) dk = db + dJ k.
     """
-    import casadi
-
     inner = t.inner
     printer = Printer()
     step = _Step(t)
@@ -197,27 +212,27 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
     step.print_factor(printer)
     step.print_solve(printer)
     step.print_stage(printer)
-    df_dt = casadi.jtimes(inner.f, inner.u, inner.w) if inner.u.numel() else casadi.SX(t.size, 1)
+    df_dt = slopes.tangents(inner.f, inner.u, inner.w)
     _print_along(
         printer,
         "df_dt",
-        Values(t, casadi.densify(df_dt), [inner.w]),
+        Values(t, df_dt, [inner.w]),
         [*POINT, "w"],
         "f",
         moving=step.rates,
     )
     outputs = Values(t, inner.o)
-    slope = Values(t, casadi.densify(casadi.jtimes(inner.o, inner.x, inner.f)))
+    slope = Values(t, slopes.tangents(inner.o, inner.x, inner.f))
     _print_along(printer, "outputs", outputs, POINT, "o", slope)
     further = len(step.moving) * t.lanes
-    count = inner.o.numel()
+    count = len(inner.o)
     return printer.module(), ArraySizes(
         states=t.size * (1 + t.lanes),
-        inputs=inner.u.numel() + len(t.inputs) * t.lanes,
-        parameters=inner.p.numel() + t.lanes,  # a scale for each column comes last
+        inputs=len(inner.u) + len(t.inputs) * t.lanes,
+        parameters=len(inner.p) + t.lanes,  # a scale for each column comes last
         held=printer.held,
         jacobian=len(step.jacobian) + further,
-        factors=step.lu.values.numel() + further,
+        factors=len(step.lu.values) + further,
         outputs=count * (2 + t.lanes),
     )
 
@@ -271,8 +286,7 @@ class _Step:
             for j, part in row.states.items()
         ]
         self.places = tuple(place for place, _ in places)
-        self.jacobian = list(dict.fromkeys(part for _, part in places))
-        self.slots = tuple(self.jacobian.index(part) for _, part in places)
+        self.jacobian, self.slots = distinct([part for _, part in places])
         self.bends = self.rates.along(self.jacobian)
         self.moving = [q for q, change in enumerate(self.bends.changes) if any(change)]
         """Which of the distinct non-zeros of J change along a column."""
@@ -306,12 +320,12 @@ class _Step:
 
     def print_factor(self, printer: Printer) -> None:
         """factor(J, d, A)."""
-        code = finished(recorded([self.lu.j, self.lu.d], [self.lu.values]))
+        code = instructions([self.lu.j, [self.lu.d]], [self.lu.values])
         block = FunctionBody(["d"])
         computed = printer.compute(block, code, ["J", "d"])
         bends = self._bends(block, "J", len(self.jacobian))
         stored(
-            [LlvmValue(block, computed[0, i]) for i in range(self.lu.values.numel())]
+            [LlvmValue(block, computed[0, i]) for i in range(len(self.lu.values))]
             + list(bends.values()),
             "A",
         )
@@ -341,7 +355,7 @@ class _Step:
         """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that
         stand in A.
         """
-        count = self.lu.values.numel()
+        count = len(self.lu.values)
         factors = [loaded(block, "A", q) for q in range(count)]
         k = self.lu.solved(factors, right)
         bends = self._bends(block, "A", count)

@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 
+from ...core import Node, nodes
 from .functions import POINT, Printer
 from .ir import emission
-from .ir.instructions import Code, Instruction, Operand, finished
+from .ir.instructions import Instruction, Operand
 from .ir.scheduling import Item
+from .ir.sparse_lu import distinct
 from .llvm.emit import FunctionBody
 from .llvm.exact import LlvmValue, loaded
-from .sensitivities import DirectionalDerivative, TangentSystem, Values, stored
+from .sensitivities import DirectionalDerivative, TangentSystem, Values, ValuesOf, stored
 
 
 class _Stage:
@@ -32,10 +34,15 @@ class _Stage:
         self.along = along
         self.block = block
         self.v = v
-        wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
-        code, held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
+        wanted, slots = distinct([*rates.results, *along.parts])
+        code, held = printer.set_apart(rates.code(wanted), POINT)
         self.at = emission.Emission(block, POINT, held, given)
-        needed = set(rates.results)
+        operands = code.results(0, len(wanted))
+        self._operand_of = {
+            nodes.identity(node): operands[slot]
+            for node, slot in zip([*rates.results, *along.parts], slots, strict=True)
+        }
+        needed = {self._operand_of[nodes.identity(rate)] for rate in rates.results}
         for line in reversed(code.body):
             if line.result in needed:
                 needed.update(line.arguments)
@@ -58,18 +65,18 @@ class _Stage:
         if before is not None:
             before.at.run(before.second[done:])
 
-    def _value(self, operand: Operand) -> LlvmValue:
+    def _value(self, expression: Node) -> LlvmValue:
+        operand = self._operand_of[nodes.identity(expression)]
         return LlvmValue(self.block, self.at.value_of(operand))
 
     def slopes(self) -> list[LlvmValue]:
         """The rates."""
-        return [self._value(operand) for operand in self.rates.results]
+        return [self._value(expression) for expression in self.rates.results]
 
     def columns(self, s: Sequence[LlvmValue]) -> list[LlvmValue]:
         """The derivatives of the rates along the columns, from the rows of S."""
-        return self.along.rows(
-            {operand: self._value(operand) for operand in self.along.parts}, s, self.v
-        )
+        values = {nodes.identity(part): self._value(part) for part in self.along.parts}
+        return self.along.rows(ValuesOf(values), s, self.v)
 
 
 def _after(
@@ -114,7 +121,7 @@ def explicit_module(
             ("in", POINT.index("x"), i): x.name
             for i, x in enumerate(_after(row, states, slopes, h))
         }
-        for i in range(t.inner.u.numel()):
+        for i in range(len(t.inner.u)):
             u = loaded(block, "u", i) + loaded(block, "w", i) * _times(h, sum(row))
             given["in", POINT.index("u"), i] = u.name
         moving = zip(t.input_rows(block), t.input_rows(block, "w"), strict=True)

@@ -6,11 +6,11 @@ import array
 import ctypes
 import itertools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Array, TraceError, autodiff, tree
+from ...core import Array, Node, TraceError, autodiff, nodes, tree
 from ..compile.function import Function
 from ..loop import ControlLaw, Measurement
 
@@ -100,21 +100,19 @@ class TracedSample(NamedTuple):
     of the law.
     """
 
-    measured: Any
-    setpoints: Any
-    memory: Any
-    minimum: Any
-    maximum: Any
-    sample_time: Any
-    parameters: Any
-    commands: Any
-    later: Any
+    measured: list[Node]
+    setpoints: list[Node]
+    memory: list[Node]
+    minimum: list[Node]
+    maximum: list[Node]
+    sample_time: list[Node]
+    parameters: list[Node]
+    commands: list[Node]
+    later: list[Node]
 
 
 def trace_sample(law: ControlLaw) -> TracedSample:
     """A sample of a law with symbols. Raises TraceError if the law cannot be traced."""
-    import casadi
-
     symbolic, parameters = autodiff.symbolic(law)
     names = {
         "measured": law.measured_columns,
@@ -124,26 +122,26 @@ def trace_sample(law: ControlLaw) -> TracedSample:
         "maximum": law.inputs,
         "sample_time": ("sample_time",),
     }
-    vectors = {key: casadi.SX.sym(key, len(each)) for key, each in names.items()}
-    by_name = {key: {n: vectors[key][i] for i, n in enumerate(each)} for key, each in names.items()}
+    vectors = {key: nodes.symbols(key, len(of_key)) for key, of_key in names.items()}
+    by_name = {key: dict(zip(of_key, vectors[key], strict=True)) for key, of_key in names.items()}
     ranges = {name: (by_name["minimum"][name], by_name["maximum"][name]) for name in law.inputs}
     measurement = Measurement(by_name["measured"], by_name["setpoints"], ranges)
     owner = type(law).__name__
     try:
         commands, memory = symbolic.step(by_name["memory"], measurement, vectors["sample_time"][0])
-        commanded = casadi.densify(casadi.vertcat(*(commands[name] for name in law.inputs)))
-        later = casadi.densify(casadi.vertcat(*(memory[name] for name in names["memory"])))
+        commanded = nodes.as_nodes([commands[name] for name in law.inputs])
+        later = nodes.as_nodes([memory[name] for name in names["memory"]])
     except KeyError as missing:
         raise TraceError(
             f"{owner}.step does not return {missing}; it must return a value for each of"
             f" {', '.join(law.inputs)}, and for each of its memory:"
             f" {', '.join(names['memory']) or 'none'}."
         ) from None
-    except (TypeError, ValueError, RuntimeError) as reason:
+    except (TypeError, ValueError, RuntimeError, TraceError) as reason:
         raise TraceError(
             f"{owner}.step cannot be compiled ({' '.join(str(reason).split())[:160]}). Use"
             " airmuscle.core.ops instead of math, numpy and `if`, or derive the controller from"
             " Controller."
         ) from None
-    autodiff.check_finite(casadi.vertcat(commanded, later), f"{owner}.step")
+    autodiff.check_finite([*commanded, *later], f"{owner}.step")
     return TracedSample(**vectors, parameters=parameters, commands=commanded, later=later)

@@ -7,7 +7,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from ...core import (
     autodiff,
     check_known,
     model,
+    nodes,
+    slopes,
     suggestion,
     tree,
 )
@@ -193,17 +195,13 @@ class LawWithSensitivities(ControlLaw):
 
     @functools.cached_property
     def _initial_memory(self) -> dict[str, float]:
-        import casadi
-
         symbolic, parameters = autodiff.symbolic(self.law)
-        traced = casadi.vertcat(
-            casadi.SX(0, 1), *(casadi.SX(v) for v in symbolic.initial_memory.values())
-        )
-        slopes = [
-            casadi.jtimes(traced, parameters, self._direction(k)) for k in range(len(self.columns))
+        traced = nodes.as_nodes(list(symbolic.initial_memory.values()))
+        along = [
+            slopes.tangents(traced, parameters, nodes.as_nodes(self._direction(k)))
+            for k in range(len(self.columns))
         ]
-        numbers = casadi.Function("start", [parameters], slopes)(tree.flatten(self.law))
-        columns = numbers if isinstance(numbers, tuple | list) else [numbers]
+        columns = evaluated(along, parameters, tree.flatten(self.law).tolist())
         values = dict(self.law.initial_memory)
         further = {
             sensitivity(name, k): float(column[i])
@@ -212,32 +210,33 @@ class LawWithSensitivities(ControlLaw):
         }
         return {**values, **further}
 
-    def _direction(self, column: int) -> Any:
+    def _direction(self, column: int) -> list[float]:
         """The change (P,) of the parameters of the law along a column."""
-        import casadi
-
         moved = self.columns[column]
-        return casadi.DM([float(leaf.path in moved) for leaf in tree.leaves(self.law)])
+        return [float(leaf.path in moved) for leaf in tree.leaves(self.law)]
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        import casadi
-
         sample = trace_sample(self.law)
         law = self.law
         names = law.measured_columns
         remembered = tuple(law.initial_memory)
-        limited = casadi.fmin(casadi.fmax(sample.commands, sample.minimum), sample.maximum)
-        results = casadi.vertcat(limited, sample.later)
-        parts = [casadi.vertcat(sample.commands, sample.later)]
+        limited = [
+            nodes.limited(command, low, high)
+            for command, low, high in zip(
+                sample.commands, sample.minimum, sample.maximum, strict=True
+            )
+        ]
+        variables = [*sample.measured, *sample.memory, *sample.parameters]
+        parts = [[*sample.commands, *sample.later]]
         for k in range(len(self.columns)):
-            seed = casadi.vertcat(
-                casadi.SX(0, 1),
+            seed = [
                 *(measurement.columns[sensitivity(name, k)] for name in names),
                 *(memory[sensitivity(name, k)] for name in remembered),
-                self._direction(k),
+                *self._direction(k),
+            ]
+            parts.append(
+                slopes.tangents([*limited, *sample.later], variables, nodes.as_nodes(seed))
             )
-            variables = casadi.vertcat(sample.measured, sample.memory, sample.parameters)
-            parts.append(casadi.jtimes(results, variables, seed))
         ranges = [measurement.ranges[name] for name in law.inputs]
         point = [
             *(measurement.columns[name] for name in names),
@@ -248,7 +247,8 @@ class LawWithSensitivities(ControlLaw):
             dt,
             *(leaf.value for leaf in tree.leaves(law)),
         ]
-        columns = evaluated(casadi.horzcat(*parts), sample[:-2], point)
+        symbols = [symbol for vector in sample[:-2] for symbol in vector]
+        columns = evaluated(parts, symbols, point)
         count = len(law.inputs)
         commands = dict(zip(law.inputs, columns[0], strict=False))
         later = dict(zip(remembered, columns[0][count:], strict=True))

@@ -3,10 +3,21 @@ parameters.
 """
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
-from ...core import ParameterError, Value, check_known, model, ops, parameter, tree
+from ...core import (
+    Node,
+    ParameterError,
+    Value,
+    check_known,
+    model,
+    nodes,
+    ops,
+    parameter,
+    slopes,
+    tree,
+)
 from ...core.system import Input, SensitivitySystem, StateVariable, System
 from ..compile.functions import TracedSystem, trace_system
 
@@ -145,52 +156,44 @@ class WithSensitivities(SensitivitySystem):
         """The observed quantities, their derivatives by every column, and their slopes in time
         (`pressure.rate`).
         """
-        import casadi
-
         t = trace_system(self.inner)
         names = self.observed_names
         every = [*(s.name for s in self.inner.states), *t.output_names]
-        values, *along, slopes = self._differentiated(
-            t, every, casadi.vertcat(t.x, t.o), state, inputs
-        )
+        values, *along, slopes_in_time = self._differentiated(t, every, [*t.x, *t.o], state, inputs)
         further = {sensitivity(n, k): column[n] for n in names for k, column in enumerate(along)}
-        return {n: values[n] for n in names} | further | {f"{n}.rate": slopes[n] for n in names}
+        return (
+            {n: values[n] for n in names}
+            | further
+            | {f"{n}.rate": slopes_in_time[n] for n in names}
+        )
 
     def _differentiated(
         self,
         t: TracedSystem,
         names: Sequence[str],
-        values: Any,
+        values: Sequence[Node],
         state: Mapping[str, Value],
         inputs: Mapping[str, Value],
     ) -> list[dict[str, Value]]:
         """Values of the traced inner system by names, their total derivatives along every column,
         and their slopes.
         """
-        import casadi
-
-        by_state = casadi.jacobian(values, t.x)
-        by_leaf = casadi.jacobian(values, t.p)
-        by_input = casadi.jacobian(values, t.u)[:, list(self.input_indices)]
-        directions = [
-            casadi.mtimes(
-                by_state,
-                casadi.vertcat(*(state[sensitivity(s.name, k)] for s in self.inner.states)),
-            )
-            + casadi.mtimes(
-                by_input,
-                casadi.vertcat(
-                    casadi.SX(0, 1), *(inputs[sensitivity(n, k)] for n in self.dependent_inputs)
-                ),
-            )
-            + sum((by_leaf[:, i] for i in indices), casadi.SX(values.numel(), 1))
-            for k, indices in enumerate(self.parameter_indices)
-        ]
-        slope = casadi.jtimes(values, t.x, t.f)
+        moving = [*t.x, *(t.u[i] for i in self.input_indices), *t.p]
+        columns = [values]
+        for k, indices in enumerate(self.parameter_indices):
+            direction = [
+                *(state[sensitivity(s.name, k)] for s in self.inner.states),
+                *(inputs[sensitivity(n, k)] for n in self.dependent_inputs),
+                *(float(i in indices) for i in range(len(t.p))),
+            ]
+            columns.append(slopes.tangents(values, moving, nodes.as_nodes(direction)))
+        columns.append(slopes.tangents(values, t.x, t.f))
         point = [state[s.name] for s in self.inner.states] + [inputs[n] for n in self.inner.inputs]
         point += [leaf.value for leaf in tree.leaves(self.inner)]
-        columns = evaluated(casadi.horzcat(values, *directions, slope), t.point.values(), point)
-        return [dict(zip(names, column, strict=True)) for column in columns]
+        variables = [*t.x, *t.u, *t.p]
+        return [
+            dict(zip(names, column, strict=True)) for column in evaluated(columns, variables, point)
+        ]
 
 
 def sensitivity(name: str, column: int) -> str:
@@ -198,12 +201,12 @@ def sensitivity(name: str, column: int) -> str:
     return f"d {name}/d {column}"
 
 
-def evaluated(matrix: Any, variables: Iterable[Any], values: Sequence[Value]) -> list[list[Any]]:
-    """The columns of a matrix of expressions at these values of their variables, which may be
-    symbols themselves.
+def evaluated(
+    columns: Sequence[Sequence[Node]], variables: Sequence[Node], values: Sequence[Value]
+) -> list[list[Value]]:
+    """Columns of expressions at these values of their variables, which may be symbols
+    themselves.
     """
-    import casadi
-
-    at = casadi.substitute(casadi.cse(matrix), casadi.vertcat(*variables), casadi.vertcat(*values))
-    columns = [[at[i, k] for i in range(at.shape[0])] for k in range(at.shape[1])]
-    return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]
+    flat = nodes.replaced([node for column in columns for node in column], variables, values)
+    rest = iter(flat if ops.is_symbol(*values) else map(float, flat))
+    return [[next(rest) for _ in column] for column in columns]

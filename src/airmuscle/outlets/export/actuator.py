@@ -17,19 +17,20 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from ...core import Input, Leaf, ParameterError, autodiff, leaves
+from ...core import Input, Leaf, Node, ParameterError, TraceError, autodiff, leaves, nodes
 from ...engine.compile import compile_system, derivatives
-from ...engine.compile.functions import Printer, TracedSystem
+from ...engine.compile.functions import Printer, TracedSystem, explicit_step
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.run.integrators import RungeKutta4
 from ...physics.mechanism import SHORTENING, SHORTENING_SPEED, ExternalLoad
 from ...physics.plant import Plant, open_plant
 from .printed_system import make_labels
 
+Expressions = tuple[dict[str, list[Node]], list[Node]]
+"""Arguments by name, and the results."""
 SAFETY = 1.0
 MAX_STEP = 1e-3
 """Largest product of the default step and the fastest rate of the plant, of which 2.8 is the limit
@@ -62,109 +63,93 @@ class ActuatorModel:
     def _traced(self) -> TracedSystem:
         return compile_system(self.part).program.traced
 
-    def _rest(self, p: Any) -> Any:
+    def _rest(self, p: Sequence[Node]) -> Node:
         """The resting length of the muscle."""
-        import casadi
-
         model, vector = autodiff.symbolic(self.part)
-        return casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
+        return nodes.replaced([nodes.as_node(model.resting_lengths[0])], vector, p)[0]
 
-    def _replaced(self, z: Any, usable: Any, p: Any) -> list[Any]:
+    def _replaced(self, z: Sequence[Node], usable: Node, p: Sequence[Node]) -> list[Node]:
         """Command, length and speed, or usual numbers where these are not usable, so that no
         derivative of the choice in `step` and `observe` is NaN.
         """
-        import casadi
-
         low, _ = control_range(self.controls)
         usual = (low, self._rest(p), 0.0)
-        pairs = zip(casadi.vertsplit(z), usual, strict=True)
-        return [casadi.if_else(usable, value, number) for value, number in pairs]
+        return [nodes.where(usable, value, number) for value, number in zip(z, usual, strict=True)]
 
-    def _inputs(self, z: Any, p: Any) -> Any:
+    def _inputs(self, z: Sequence[Node], p: Sequence[Node]) -> list[Node]:
         """The inputs of the plant at a finite command, length and speed."""
-        import casadi
-
+        command, length, speed = z
         low, high = control_range(self.controls)
-        command = casadi.fmin(casadi.fmax(z[0], low), high)
-        values = {SHORTENING: self._rest(p) - z[1], SHORTENING_SPEED: -z[2]}
-        pair = [casadi.fmax(command, 0.0), casadi.fmax(-command, 0.0)]
+        command = nodes.limited(command, low, high)
+        values = {SHORTENING: self._rest(p) - length, SHORTENING_SPEED: -speed}
+        pair = [nodes.larger(command, 0.0), nodes.larger(-command, 0.0)]
         openings = pair if len(self.controls) == 2 else [command]
         values |= {
             control.name: opening for control, opening in zip(self.controls, openings, strict=False)
         }
-        return casadi.vertcat(casadi.SX(0, 1), *(values[name] for name in self.part.inputs))
+        return [values[name] for name in self.part.inputs]
 
     @functools.cached_property
-    def step_of_time(self) -> tuple[dict[str, Any], Any]:
+    def step_of_time(self) -> Expressions:
         """Arguments and result of `step`."""
-        import casadi
-
         t = self._traced
-        z = casadi.SX.sym("z", 3)
-        h = casadi.SX.sym("h")
-        rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
+        z = nodes.symbols("z", 3)
+        h = nodes.symbol("h")
         rows, weights = RungeKutta4(self.step).tableau()
-        slopes: list[Any] = []
         usable = _all_finite([z[0], z[1] + h * z[2], z[2]])
         command, length, speed = self._replaced(z, usable, t.p)
-        for row in ((), *rows):
-            increment = sum((a * k for a, k in zip(row, slopes, strict=True) if a), casadi.SX(0))
-            at = casadi.vertcat(command, length + sum(row) * h * speed, speed)
-            slopes.append(rates(t.x + h * increment if row else t.x, self._inputs(at, t.p), t.p))
-        later = t.x + h * sum(
-            (b * k for b, k in zip(weights, slopes, strict=True) if b), casadi.SX(0)
-        )
+
+        def inputs(node: float) -> list[Node]:
+            return self._inputs([command, length + node * h * speed, speed], t.p)
+
+        later = explicit_step(t, rows, weights, h, inputs)
         states = [
-            casadi.if_else(usable, after, before)
-            for after, before in zip(casadi.vertsplit(later), casadi.vertsplit(t.x), strict=True)
+            nodes.where(usable, after, before) for after, before in zip(later, t.x, strict=True)
         ]
-        return {"x": t.x, "z": z, "p": t.p, "h": h}, casadi.vertcat(*states)
+        return {"x": t.x, "z": z, "p": t.p, "h": [h]}, states
 
     @functools.cached_property
-    def observe(self) -> tuple[dict[str, Any], Any]:
+    def observe(self) -> Expressions:
         """Arguments and result of `observe`."""
-        import casadi
-
         t = self._traced
-        z = casadi.SX.sym("z", 3)
-        usable = _all_finite(casadi.vertsplit(z))
-        o = casadi.substitute(t.o, t.u, self._inputs(self._replaced(z, usable, t.p), t.p))
+        z = nodes.symbols("z", 3)
+        usable = _all_finite(z)
+        outputs = nodes.replaced(t.o, t.u, self._inputs(self._replaced(z, usable, t.p), t.p))
         names = (*(s.name for s in self.part.states), *t.output_names)
-        known = dict(zip(names, casadi.vertsplit(casadi.vertcat(t.x, o)), strict=True))
+        known = dict(zip(names, [*t.x, *outputs], strict=True))
         results = [known["force"], known["pressure"]]
-        valid = casadi.logic_and(usable, _all_finite(results))
-        for limit in (each for each in self.part.column_limits if each.column in known):
+        valid = nodes.logical_and(usable, _all_finite(results))
+        for limit in self.part.column_limits:
+            if limit.column not in known:
+                continue
             value = known[limit.column]
             low, high = limit.bounds
-            valid = casadi.logic_and(valid, value >= low) if np.isfinite(low) else valid
-            valid = casadi.logic_and(valid, value <= high) if np.isfinite(high) else valid
-        shown = (casadi.if_else(usable, result, np.nan) for result in results)
-        return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(*shown, valid)
+            valid = nodes.logical_and(valid, value >= low) if np.isfinite(low) else valid
+            valid = nodes.logical_and(valid, value <= high) if np.isfinite(high) else valid
+        shown = [nodes.where(usable, result, np.nan) for result in results]
+        return {"x": t.x, "z": z, "p": t.p}, [*shown, valid]
 
     @functools.cached_property
-    def start(self) -> tuple[dict[str, Any], Any]:
+    def start(self) -> Expressions:
         """Arguments and result of `start`."""
-        import casadi
-
         model, p = autodiff.symbolic(self.part)
-        q = casadi.SX.sym("q", 2)
-        shortening = model.resting_lengths[0] - q[1]
+        q = nodes.symbols("q", 2)
+        pressure, length = q
+        shortening = model.resting_lengths[0] - length
         try:
-            settled, volumes = model.settle_muscles((q[0],), {SHORTENING: shortening})
-        except TypeError:
+            settled, volumes = model.settle_muscles((pressure,), {SHORTENING: shortening})
+        except (TypeError, TraceError):
             raise ParameterError(
                 f"actuator: {self.part.muscles[0].name} has a series spring, whose initial state is"
                 " found by iteration and has no printed form; leave the series spring out."
             ) from None
-        state = model.fill_muscles((q[0],), volumes, settled)
-        values = casadi.vertcat(*(casadi.SX(state[s.name]) for s in self.part.states))
+        state = model.fill_muscles((pressure,), volumes, settled)
+        values = [nodes.as_node(state[s.name]) for s in self.part.states]
         autodiff.check_finite(values, type(self.part).__name__)
         return {"q": q, "p": p}, values
 
     def print_functions(self, language: TargetLanguage) -> tuple[str, int]:
         """`prepare` and the functions in a language, and the length of c."""
-        import casadi
-
         states = [(s.name, s.unit, s.meaning) for s in self.part.states]
         unit = self.controls[0].unit if self.controls else ""
         labels = make_labels(
@@ -198,12 +183,7 @@ class ActuatorModel:
             ("observe", self.observe, "o"),
         )
         for name, (inputs, result), output in functions:
-            printer.add(
-                name,
-                inputs,
-                {output: casadi.cse(casadi.densify(result))},
-                ["h"] if "h" in inputs else (),
-            )
+            printer.add(name, inputs, {output: result}, ["h"] if "h" in inputs else ())
         return printer.module(), printer.held
 
 
@@ -260,11 +240,10 @@ def control_range(controls: Sequence[Input]) -> tuple[float, float]:
     return (controls[0].minimum, controls[0].maximum) if controls else (0.0, 0.0)
 
 
-def _all_finite(values: Sequence[Any]) -> Any:
-    """Whether all symbols are finite numbers, and with them their sum, as a condition."""
-    import casadi
-
-    return casadi.fabs(sum(values)) <= LARGEST
+def _all_finite(values: Sequence[Node]) -> Node:
+    """Whether all values are finite numbers, and with them their sum, as a condition."""
+    total = functools.reduce(nodes.add, values)
+    return nodes.less_equal(abs(total), nodes.constant(LARGEST))
 
 
 def _stable_step(part: Plant) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Leaf, ParameterError, leaves
+from ...core import Array, Leaf, ParameterError, leaves, nodes
 from ...engine import ControlLaw, ControlLoop, Problem
 from ...engine.compile.functions import Printer
 from ...engine.compile.ir import emission
@@ -277,8 +277,6 @@ def print_controller(
     constants; the tunable ones (None: all) remain variables, and `notes` are further lines of the
     comment at the beginning.
     """
-    import casadi
-
     loop = prepared.loop
     law = prepared.loop.controller
     assert isinstance(law, ControlLaw)
@@ -286,31 +284,29 @@ def print_controller(
     known = list(leaves(law))
     paths = [leaf.path for leaf in known] if tunable is None else dict.fromkeys(tunable)
     chosen = [find_leaf(law, known, path) for path in paths]
-    p = casadi.SX.sym("parameters", len(chosen))
+    p = nodes.symbols("parameters", len(chosen))
     parameters = [
-        p[chosen.index(i)] if i in chosen else casadi.SX(leaf.value) for i, leaf in enumerate(known)
+        p[chosen.index(i)] if i in chosen else nodes.constant(leaf.value)
+        for i, leaf in enumerate(known)
     ]
     ranges = [prepared.ranges[n] for n in law.inputs]
     low, high = ([each[k] for each in ranges] for k in (0, 1))
-    old = [sample.sample_time, sample.minimum, sample.maximum, sample.parameters]
-    values: list[list[Any]] = [[loop.sample_time], low, high, parameters]
-    new = [casadi.vertcat(casadi.SX(0, 1), *each) for each in values]
-    commands, later = casadi.substitute([sample.commands, sample.later], old, new)
+    old = [*sample.sample_time, *sample.minimum, *sample.maximum, *sample.parameters]
+    new = [loop.sample_time, *low, *high, *parameters]
+    results = nodes.replaced([*sample.commands, *sample.later], old, new)
+    commands = results[: len(ranges)]
+    later = results[len(ranges) :]
     limited = []
-    for i, (least, most) in enumerate(ranges):
-        raised = (
-            casadi.if_else(commands[i] < least, least, commands[i])
-            if np.isfinite(least)
-            else commands[i]
-        )
-        limited.append(casadi.if_else(raised > most, most, raised) if np.isfinite(most) else raised)
+    for command, (least, most) in zip(commands, ranges, strict=True):
+        raised = nodes.where(command < least, least, command) if np.isfinite(least) else command
+        limited.append(nodes.where(raised > most, most, raised) if np.isfinite(most) else raised)
     inputs = {
         "measurement": sample.measured,
         "setpoint": sample.setpoints,
         "memory": sample.memory,
         "parameters": p,
     }
-    outputs = {"command": casadi.densify(casadi.vertcat(*limited)), "later": casadi.densify(later)}
+    outputs = {"command": limited, "later": later}
     about = [
         f"Sample time {c_number(loop.sample_time)} s; set points"
         f" {', '.join(law.setpoints) or 'none'}; measured {', '.join(law.measured_columns)};"

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Leaf, ParameterError, alternatives, leaves, printable
+from ...core import Array, Leaf, ParameterError, alternatives, leaves, nodes, printable
 from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, system_module
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem, Description
@@ -118,17 +118,14 @@ def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None
     if tunable is None:
         return ExportedSystem(compiled, traced, tuple(known))
     chosen = [find_leaf(compiled.system, known, path) for path in dict.fromkeys(tunable)]
-    import casadi
-
-    symbols = casadi.SX.sym("p", len(chosen))
+    symbols = nodes.symbols("p", len(chosen))
     values = [
-        symbols[chosen.index(i)] if i in chosen else casadi.SX(known[i].value)
-        for i in range(len(known))
+        symbols[chosen.index(i)] if i in chosen else nodes.constant(leaf.value)
+        for i, leaf in enumerate(known)
     ]
-    f, o = casadi.substitute(
-        [traced.f, traced.o], [traced.p], [casadi.vertcat(casadi.SX(0, 1), *values)]
-    )
-    f, o = casadi.cse([casadi.densify(f), casadi.densify(o)])
+    results = nodes.replaced([*traced.f, *traced.o], traced.p, values)
+    f = results[: len(traced.f)]
+    o = results[len(traced.f) :]
     return ExportedSystem(
         compiled, dataclasses.replace(traced, p=symbols, f=f, o=o), tuple(known[i] for i in chosen)
     )
@@ -136,16 +133,9 @@ def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None
 
 def acting_parameters(compiled: CompiledSystem) -> list[str]:
     """The paths of the parameters on which a rate or an output depends."""
-    import casadi
-
     traced = compiled.program.traced
     paths = [leaf.path for leaf in leaves(compiled.system)]
-    acts = (
-        casadi.which_depends(casadi.vertcat(traced.f, traced.o), traced.p, 1, False)
-        if paths
-        else []
-    )
-    return list(itertools.compress(paths, acts))
+    return list(itertools.compress(paths, nodes.occurring([*traced.f, *traced.o], traced.p)))
 
 
 def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:

@@ -12,7 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Leaf, ParameterError, autodiff, leaves, one_line, parts_of, printable
+from ...core import (
+    Leaf,
+    Node,
+    ParameterError,
+    autodiff,
+    leaves,
+    nodes,
+    one_line,
+    parts_of,
+    printable,
+    slopes,
+)
 from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
@@ -71,9 +82,9 @@ class PrintedLaw:
     name: str
     arguments: tuple[str, str]
     results: tuple[str, str, str]
-    symbols: tuple[Any, Any]
-    parameters: Any
-    values: Any
+    symbols: list[Node]
+    parameters: list[Node]
+    values: list[Node]
     known: tuple[Leaf, ...]
     provenance: Sequence[str]
 
@@ -88,7 +99,7 @@ class PrintedLaw:
         """
         printer = Printer(language)
         first, second = self.arguments
-        inputs = dict(zip(self.arguments, self.symbols, strict=True))
+        inputs = {name: [symbol] for name, symbol in zip(self.arguments, self.symbols, strict=True)}
         printer.add(
             "evaluate",
             {**inputs, PARAMETERS: self.parameters},
@@ -113,8 +124,6 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     """A law ready for printing. Raises ParameterError for a law without closed form, which it
     names.
     """
-    import casadi
-
     if not isinstance(law, Characteristic):
         raise ParameterError(
             f"{one_line(law)} is not a characteristic; pass load('dmsp-20-300').characteristic,"
@@ -129,20 +138,18 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
             )
     _, method, arguments, results = next(form for form in FORMS if isinstance(law, form[0]))
     model, parameters = autodiff.symbolic(law)
-    x = casadi.SX.sym("x"), casadi.SX.sym("y")
-    value = casadi.SX(getattr(model, method)(*x))
-    autodiff.check_finite(value, f"{type(law).__name__}.{method}")
-    slopes = [casadi.jacobian(value, each) for each in x]
+    x = nodes.symbols("x", 2)
+    value = nodes.as_node(getattr(model, method)(*x))
+    autodiff.check_finite([value], f"{type(law).__name__}.{method}")
+    first, second = slopes.gradient(value, x)
     if method == "force":
-        slopes[1] = -slopes[1]
+        second = -second
     # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower
     # limit of the force.
-    known = casadi.logic_and(*(casadi.logic_or(each >= 0, each < 0) for each in x))
-    values = casadi.if_else(known, casadi.densify(casadi.vertcat(value, *slopes)), x[0] + x[1])
+    known = nodes.logical_and(*(nodes.logical_or(each >= 0, each < 0) for each in x))
+    values = [nodes.where(known, result, x[0] + x[1]) for result in (value, first, second)]
     lines = provenance(title, law)
-    return PrintedLaw(
-        name, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines
-    )
+    return PrintedLaw(name, arguments, results, x, parameters, values, tuple(leaves(law)), lines)
 
 
 class Target(abc.ABC):

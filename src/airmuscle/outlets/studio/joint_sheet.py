@@ -25,7 +25,8 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import ParameterError, leaves, tree
+from ...core import Node, ParameterError, leaves, nodes
+from ...core.slopes import by_row, jacobian
 from ...design.control_benchmark import STANDARD_TASKS
 from ...engine.compile import Printer, compile_system
 from ...engine.compile.kernel_text import JavaScriptKernels
@@ -201,12 +202,7 @@ def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> st
     """The functions of a control law; its parameters are the vector p, in the order of its
     leaves.
     """
-    import casadi
-
     traced = trace_sample(law)
-    p = casadi.SX.sym("p", sum(1 for _ in tree.leaves(law)))
-    commands, later = casadi.substitute([traced.commands, traced.later], [traced.parameters], [p])
-    commands, later = casadi.cse([casadi.densify(commands), casadi.densify(later)])
     arguments = {
         "y": traced.measured,
         "r": traced.setpoints,
@@ -214,16 +210,15 @@ def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> st
         "T": traced.sample_time,
         "l": traced.minimum,
         "h": traced.maximum,
-        "p": p,
+        "p": traced.parameters,
     }
     printer = Printer(JavaScriptLanguage(exported=False))
     if sample:
-        printer.add("sample", arguments, {"u": commands, "n": later})
+        printer.add("sample", arguments, {"u": traced.commands, "n": traced.later})
     if slopes:
-        both = casadi.vertcat(commands, later)
-        by = casadi.vertcat(traced.measured, traced.memory)
-        table = casadi.densify(casadi.vec(casadi.jacobian(both, by).T))
-        printer.add("slopes", arguments, {"f": both, "D": casadi.cse(table)})
+        results = [*traced.commands, *traced.later]
+        table = jacobian(results, [*traced.measured, *traced.memory])
+        printer.add("slopes", arguments, {"f": results, "D": by_row(table)})
     return _module(
         printer, [name for name, wanted in (("sample", sample), ("slopes", slopes)) if wanted]
     )
@@ -232,35 +227,24 @@ def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> st
 def _linear_program(plant: am.Plant, columns: tuple[str, ...]) -> str:
     """The linearisation of a plant for the columns that control laws measure. Raises ParameterError
     for a column that depends on an input at once."""
-    import casadi
-
     compiled = compile_system(plant)
     traced = compiled.program.traced
     states = compiled.description.state_names
-    rows = casadi.vertsplit(casadi.vertcat(traced.o, traced.x))
-    known = dict(zip((*traced.output_names, *states), rows, strict=True))
-    measured = casadi.vertcat(*(known[name] for name in columns))
-    if any(casadi.which_depends(measured, traced.u, 1, False)):
+    known = dict(zip((*traced.output_names, *states), [*traced.o, *traced.x], strict=True))
+    measured = [known[name] for name in columns]
+    if any(nodes.occurring(measured, traced.u)):
         raise ParameterError(
             f"a column among {', '.join(columns)} depends on an input at once; it cannot be"
             " measured."
         )
-    tables = {
-        "A": casadi.jacobian(traced.f, traced.x),
-        "B": casadi.jacobian(traced.f, traced.u),
-        "C": casadi.jacobian(measured, traced.x),
-    }
-    printer = Printer(JavaScriptLanguage(exported=False))
     outputs = {
         "f": traced.f,
-        **{name: casadi.densify(casadi.vec(table.T)) for name, table in tables.items()},
+        "A": by_row(jacobian(traced.f, traced.x)),
+        "B": by_row(jacobian(traced.f, traced.u)),
+        "C": by_row(jacobian(measured, traced.x)),
     }
-    values = casadi.cse(list(outputs.values()))
-    printer.add(
-        "linear",
-        {"x": traced.x, "u": traced.u, "p": traced.p},
-        dict(zip(outputs, values, strict=True)),
-    )
+    printer = Printer(JavaScriptLanguage(exported=False))
+    printer.add("linear", traced.point, outputs)
     return _module(printer, ["linear"])
 
 
@@ -268,42 +252,47 @@ def _pair_program(plant: am.Plant) -> str:
     """The statics of a joint as a function of the angle and of both pressures, and the torque [N m]
     of the muscles without their dampers for an angle, its speed and acceleration, and both
     pressures."""
-    import casadi
-
-    x = casadi.SX.sym("x", 3)
+    x = nodes.symbols("x", 3)
+    angle, *pressures = x
     both = [
-        dict(zip(function.names, casadi.horzsplit(function.function(x[0], x[i])), strict=True))
-        for i, function in enumerate(torque_functions(plant), 1)
+        function.at(angle, pressure)
+        for function, pressure in zip(torque_functions(plant), pressures, strict=True)
     ]
     torque, stiffness, shut = (
         both[0][name] + both[1][name] for name in ("torque", "stiffness", "shut_valves")
     )
-    each = (
+    by_muscle = [
         muscle[name]
         for name in ("torque_by_pressure", "stiffness_by_pressure", "tension")
         for muscle in both
-    )
-    load = load_function(plant).function(x[0])
-    values = [torque, stiffness, *each, shut, load[0], load[1]]
+    ]
+    load = load_function(plant).at(angle)
+    values = [torque, stiffness, *by_muscle, shut, load["torque"], load["slope"]]
     printer = Printer(JavaScriptLanguage(exported=False))
-    printer.add("pair", {"x": x}, {"f": casadi.cse(casadi.densify(casadi.vertcat(*values)))})
-    x = casadi.SX.sym("x", 5)
+    printer.add("pair", {"x": x}, {"f": values})
+    printer.add("needed", *_needed_torque(plant))
+    return _module(printer, ["pair", "needed"])
+
+
+def _needed_torque(plant: am.Plant) -> tuple[dict[str, list[Node]], dict[str, list[Node]]]:
+    """Arguments (angle, speed, acceleration, pressures) and result of the function `needed`."""
+    x = nodes.symbols("x", 5)
+    angle, angular_speed, acceleration, *pressures = x
     mechanism = plant.mechanism
     lengths = plant.resting_lengths
     coordinate = mechanism.coordinates[0]
-    q = {coordinate.name: x[0]}
-    v = {coordinate.speed: x[1]}
-    contractions = mechanism.contractions(q, lengths)
+    q = {coordinate.name: angle}
+    v = {coordinate.speed: angular_speed}
+    contractions = nodes.as_nodes(mechanism.contractions(q, lengths))
     damping = []
     for muscle, length, contraction, pressure in zip(
-        plant.muscles, lengths, contractions, (x[3], x[4]), strict=True
+        plant.muscles, lengths, contractions, pressures, strict=True
     ):
-        speed = length * casadi.jacobian(casadi.SX(contraction), x[0]) * x[1]
+        speed = length * jacobian([contraction], [angle])[0][0] * angular_speed
         damping.append(-muscle.damper.force(pressure, contraction, speed))
     held = mechanism.generalised_forces(q, damping, lengths)[coordinate.name]
-    needed = casadi.SX(mechanism.driving_force(q, v, x[2]) - held)
-    printer.add("needed", {"x": x}, {"f": casadi.cse(casadi.densify(needed))})
-    return _module(printer, ["pair", "needed"])
+    needed = nodes.as_node(mechanism.driving_force(q, v, acceleration) - held)
+    return {"x": x}, {"f": [needed]}
 
 
 def _module(printer: Printer, names: list[str]) -> str:

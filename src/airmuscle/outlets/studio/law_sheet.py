@@ -35,12 +35,15 @@ from ...core import (
     AirmuscleError,
     Array,
     Leaf,
+    Node,
     ParameterError,
     TraceError,
     autodiff,
     cite,
     conversion,
     leaves,
+    nodes,
+    slopes,
     tree,
 )
 from ...engine.compile.functions import Printer
@@ -297,41 +300,38 @@ def law_and_geometry(model: Any, geometry: am.geometry.Geometry | None) -> tuple
     )
 
 
-def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, Any], Any]]:
+def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, list[Node]], list[Node]]]:
     """Name, arguments and results of every function that can be traced."""
-    import casadi
-
-    functions = []
-    a, b = casadi.SX.sym("a"), casadi.SX.sym("b")
+    functions: list[tuple[str, dict[str, list[Node]], list[Node]]] = []
+    x = nodes.symbols("x", 2)
     for name in DIRECTIONS:
-        value = _traced(getattr(model, name), a, b)
-        if value is not None:
-            x = casadi.vertcat(a, b)
-            functions.append((name, {"x": x}, casadi.vertcat(value, casadi.jacobian(value, x).T)))
-    limits = _traced(lambda: casadi.vertcat(*_limits(model)))
+        values = _traced(lambda *at, direction=name: [getattr(model, direction)(*at)], *x)
+        if values is not None:
+            functions.append((name, {"x": x}, [*values, *slopes.gradient(values[0], x)]))
+    limits = _traced(lambda: _limits(model))
     if limits is not None:
         functions.append(("limits", {}, limits))
-    volume = _traced(shape.volume, a) if shape is not None and shape.traceable else None
+    if shape is None:
+        return functions
+    contraction = x[:1]
+    volume = _traced(lambda c: [shape.volume(c)], *contraction) if shape.traceable else None
     if volume is not None:
-        functions.append(("volume", {"x": a}, casadi.vertcat(volume, casadi.jacobian(volume, a))))
-    outline = _traced(lambda: casadi.vertcat(*_outline(shape, a, b))) if shape is not None else None
+        by_contraction = slopes.gradient(volume[0], contraction)
+        functions.append(("volume", {"x": contraction}, [*volume, *by_contraction]))
+    outline = _traced(lambda *at: _outline(shape, *at), *x)
     if outline is not None:
-        functions.append(("outline", {"x": casadi.vertcat(a, b)}, outline))
-    return [
-        (name, inputs, casadi.densify(casadi.cse(outputs))) for name, inputs, outputs in functions
-    ]
+        functions.append(("outline", {"x": x}, outline))
+    return functions
 
 
-def _traced(function: Callable[..., Any], *arguments: Any) -> Any:
-    """The expression of a function, None where it needs numbers."""
-    import casadi
-
+def _traced(function: Callable[..., Sequence[Any]], *arguments: Node) -> list[Node] | None:
+    """The expressions of a function, None where it needs numbers."""
     try:
-        value = casadi.SX(function(*arguments))
-        autodiff.check_finite(value, "law")
+        values = nodes.as_nodes(function(*arguments))
+        autodiff.check_finite(values, "law")
     except _UNTRACEABLE:
         return None
-    return value
+    return values
 
 
 def _limits(model: Any) -> Sequence[Any]:

@@ -5,12 +5,11 @@ that satisfy them.
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ArrayProgram, Values, make_program
+from ...core import Array, Node, Recorded, Values, nodes, slopes
 from ...engine.compile.cache.kernel import Kernel, aligned_array
 from ...engine.compile.function import LANES, Function
 from ..plant.plant import Plant
@@ -61,39 +60,40 @@ class TracedRow:
     `affine` is whether the first output of a muscle, its torque, is affine in the pressure.
     """
 
-    function: Any
+    arguments: tuple[Node, ...]
+    values: tuple[Node, ...]
     names: tuple[str, ...]
     affine: bool = False
-    programs: dict[tuple[str, ...], ArrayProgram | None] = dataclasses.field(default_factory=dict)
+    functions: dict[tuple[str, ...], Recorded] = dataclasses.field(default_factory=dict)
 
     def __call__(self, *arguments: Array | str) -> list[Array]:
         """The outputs whose names follow the arguments, by default all, at arguments that
         broadcast.
         """
-        names = tuple(each for each in arguments if isinstance(each, str)) or self.names
-        columns = [self.names.index(name) for name in names]
-        if names not in self.programs:
-            self.programs[names] = make_program(self.function, 0, columns)
-        broadcast = np.broadcast_arrays(*(each for each in arguments if not isinstance(each, str)))
+        names = tuple(x for x in arguments if isinstance(x, str)) or self.names
+        if names not in self.functions:
+            by_name = dict(zip(self.names, self.values, strict=True))
+            wanted = [by_name[name] for name in names]
+            self.functions[names] = Recorded([self.arguments], [wanted])
+        broadcast = np.broadcast_arrays(*(x for x in arguments if not isinstance(x, str)))
+        shape = broadcast[0].shape
         points = [np.ascontiguousarray(x, dtype=float).reshape(-1) for x in broadcast]
-        program = self.programs[names]
-        if program is not None:
-            table = program.columns(points, (), len(columns)).T
-        else:
-            table = np.asarray(self.function(*(x[None, :] for x in points)).full())
-            table = table.reshape(len(self.names), -1, order="F")[columns]
-        return [row.reshape(broadcast[0].shape) for row in table]
+        (rows,) = self.functions[names].at_points(points)
+        return [np.broadcast_to(row, points[0].shape).reshape(shape) for row in rows]
+
+    def at(self, *arguments: Node) -> dict[str, Node]:
+        """The outputs by name as expressions of other arguments."""
+        values = nodes.replaced(self.values, self.arguments, arguments)
+        return dict(zip(self.names, values, strict=True))
 
     @functools.cached_property
     def compiled(self) -> Function:
         """The first five QUANTITIES of a muscle, up to the tension, compiled for several points at
         once.
         """
-        import casadi
-
-        angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
-        values = self.function(angle, pressure)[: QUANTITIES.index("tension") + 1]
-        return Function({"angle": angle, "pressure": pressure}, {"values": values}, LANES)
+        angle, pressure = self.arguments
+        values = self.values[: QUANTITIES.index("tension") + 1]
+        return Function({"angle": [angle], "pressure": [pressure]}, {"values": values}, LANES)
 
 
 Functions = Sequence[TracedRow]
@@ -103,15 +103,15 @@ def load_function(plant: Plant) -> TracedRow:
     """The torque [N m] of weights, springs and stops against the angle [rad], and its
     derivative.
     """
-    import casadi
+    angle = nodes.symbol("angle")
+    coordinate = plant.mechanism.coordinates[0].name
+    energy = nodes.as_node(plant.mechanism.potential_energy({coordinate: angle}))
+    torque = _slope(energy, angle)
+    return TracedRow((angle,), (torque, _slope(torque, angle)), ("torque", "slope"))
 
-    angle = casadi.SX.sym("angle")
-    energy = casadi.SX(
-        plant.mechanism.potential_energy({plant.mechanism.coordinates[0].name: angle})
-    )
-    torque = casadi.jacobian(energy, angle)
-    row = casadi.horzcat(torque, casadi.jacobian(torque, angle))
-    return TracedRow(casadi.Function("load", [angle], [casadi.densify(row)]), ("torque", "slope"))
+
+def _slope(value: Node, by: Node) -> Node:
+    return slopes.jacobian([value], [by])[0][0]
 
 
 def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, ...]:
@@ -120,17 +120,16 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
     Unless `limited`, they are those of the static tension before the limits of law and slackness
     are applied.
     """
-    import casadi
-
-    angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
+    angle = nodes.symbol("angle")
+    pressure = nodes.symbol("pressure")
     contractions = plant.mechanism.contractions(
         {plant.mechanism.coordinates[0].name: angle}, plant.resting_lengths
     )
     functions = []
     for muscle, contraction in zip(plant.muscles, contractions, strict=True):
         length = muscle.geometry.resting_length
-        arm = casadi.jacobian(casadi.SX(length * contraction), angle)
-        tension = casadi.SX(
+        arm = _slope(nodes.as_node(length * contraction), angle)
+        tension = nodes.as_node(
             muscle.tension(pressure, contraction)
             if limited
             else muscle.contractile.unclamped_force(pressure, contraction)
@@ -138,8 +137,8 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
             - muscle.stop.force(contraction, 0.0, length)
         )
         torque = arm * tension
-        stiffness = -casadi.jacobian(torque, angle)
-        by_pressure = casadi.jacobian(torque, pressure)
+        stiffness = -_slope(torque, angle)
+        by_pressure = _slope(torque, pressure)
         own: Values = muscle.steady_state(pressure, contraction)
         volume = muscle.volume(contraction, own)
         content = plant.gas.state_at(
@@ -148,18 +147,17 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
         air = plant.gas.air(content, volume, plant.ambient)
         by_contraction = enclosed_pressure_slope(plant, muscle, contraction, volume, air, content)
         squeezed = by_pressure * by_contraction * arm / length
-        row = casadi.horzcat(
+        values = (
             torque,
             stiffness,
             by_pressure,
-            casadi.jacobian(stiffness, pressure),
+            _slope(stiffness, pressure),
             tension,
             stiffness - squeezed,
             arm,
         )
-        function = casadi.Function("torque", [angle, pressure], [casadi.densify(casadi.cse(row))])
-        affine = not any(casadi.which_depends(by_pressure, pressure, 1, False))
-        functions.append(TracedRow(function, QUANTITIES, affine))
+        affine = not any(nodes.occurring([by_pressure], [pressure]))
+        functions.append(TracedRow((angle, pressure), values, QUANTITIES, affine))
     return tuple(functions)
 
 

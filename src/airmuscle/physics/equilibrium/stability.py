@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, EquilibriumError, GeometryLimitError, PhysicsError
+from ...core import (
+    Array,
+    EquilibriumError,
+    GeometryLimitError,
+    PhysicsError,
+    Recorded,
+    slopes,
+)
 from ...engine.compile.program import CompiledSystem, Program
 from ..plant.static_plant import StaticPlant, air_states
 from .single_dof import grid
@@ -18,7 +25,7 @@ MARGIN = 1e-9
 """Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero
 (chosen).
 """
-_functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
+_functions: weakref.WeakKeyDictionary[Program, Recorded] = weakref.WeakKeyDictionary()
 
 
 def are_stable(
@@ -67,15 +74,22 @@ def _slopes(
     Jacobian (R, k, n).
     """
     count, size = states.shape
-    results = _function(compiled, free)(
-        states.T, np.repeat(inputs[:, None], count, axis=1), parameters.T
+    results = _function(compiled, free).at_points(
+        list(states.T), inputs.tolist(), list(parameters.T)
     )
-    by_state, volumes, growths = (r.full() for r in results)
-    stacked = [part.reshape(-1, count, size).transpose(1, 0, 2) for part in (by_state, growths)]
-    return stacked[0], volumes.T, stacked[1]
+    by_state, volumes, growths = (_table(columns, count) for columns in results)
+    return by_state.reshape(count, -1, size), volumes, growths.reshape(count, -1, size)
 
 
-def _function(compiled: CompiledSystem, free: list[int]) -> Any:
+def _table(columns: list[Any], count: int) -> Array:
+    """The values of some quantities (count, N) at all points, also of those that are equal."""
+    table = np.empty((count, len(columns)))
+    for k, column in enumerate(columns):
+        table[:, k] = column
+    return table
+
+
+def _function(compiled: CompiledSystem, free: list[int]) -> Recorded:
     """(x, u, p) -> (df/dx of the states of the motion, V, dV/dx), differentiated once for each
     structure.
     """
@@ -83,14 +97,13 @@ def _function(compiled: CompiledSystem, free: list[int]) -> Any:
     plant = compiled.system
     assert isinstance(plant, StaticPlant)
     if program not in _functions:
-        import casadi
-
         t = program.traced
-        volumes = casadi.vertcat(
-            *(t.o[compiled.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes)
+        volumes = [t.o[compiled.output_names.index(f"{prefix}volume")] for prefix in plant.prefixes]
+        by_state = slopes.jacobian([t.f[i] for i in free], t.x)
+        growths = slopes.jacobian(volumes, t.x)
+        _functions[program] = Recorded(
+            [t.x, t.u, t.p], [slopes.by_row(by_state), volumes, slopes.by_row(growths)]
         )
-        wanted = [casadi.jacobian(t.f[free], t.x), volumes, casadi.jacobian(volumes, t.x)]
-        _functions[program] = casadi.Function("motion", [t.x, t.u, t.p], casadi.cse(wanted))
     return _functions[program]
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...core import Leaf, ShortRepr, leaves
 from . import expression
-from .expression import Expressions, Node, assemble, depends_on, expand, fold, in_order, summands
+from .expression import Expressions, Term, assemble, depends_on, expand, fold, in_order, summands
 from .intervals import Bounds, traced_expression, within
 
 MAX_OPERATIONS = 600
@@ -67,12 +67,12 @@ class LawEquation(ShortRepr):
     arguments: tuple[Symbol, ...]
     parameters: tuple[Symbol, ...]
     """With their values, in the order of their first occurrence in the law."""
-    value: Node
-    part_nodes: Mapping[Node, str]
+    value: Term
+    part_nodes: Mapping[Term, str]
     """Names of the parts that occur repeatedly, each defined by the ones before it."""
 
     @property
-    def parts(self) -> tuple[tuple[Symbol, Node], ...]:
+    def parts(self) -> tuple[tuple[Symbol, Term], ...]:
         """The symbols of the parts with their definitions."""
         return tuple((Symbol(name, "", ""), node) for node, name in self.part_nodes.items())
 
@@ -84,9 +84,9 @@ class _Traced:
     """
 
     new: Expressions
-    arguments: tuple[Node, ...]
-    parameters: Mapping[Node, Leaf]
-    value: Node
+    arguments: tuple[Term, ...]
+    parameters: Mapping[Term, Leaf]
+    value: Term
 
 
 def law_equation(
@@ -129,7 +129,7 @@ def _trace(
     known = {node: ranges[name] for node, name in zip(points, arguments, strict=True)}
     values = {node: (float(leaf.value), float(leaf.value)) for node, leaf in own.items()}
 
-    def complete(old: Node, arguments: list[Node]) -> Node:
+    def complete(old: Term, arguments: list[Term]) -> Term:
         if old.kind == "if":  # a branch that has one side only is a choice between it and zero
             return new.apply(expression.WHERE, *arguments, new.number(0.0))
         return new.apply(old.kind, *arguments) if arguments else old
@@ -137,11 +137,11 @@ def _trace(
     return _Traced(new, points, own, fold(within(value, new, known | values), complete))
 
 
-def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]:
+def _with_monomials(traced: _Traced) -> tuple[Term, dict[Term, tuple[int, ...]]]:
     """The expression with every polynomial written as a sum of monomials, and the powers by
     coefficient.
     """
-    powers: dict[Node, tuple[int, ...]] = {}
+    powers: dict[Term, tuple[int, ...]] = {}
     shared = _shared(traced.value)
     parts = [
         n
@@ -153,7 +153,7 @@ def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]
     )
     atoms = [*parts, *reversed(traced.arguments)]
 
-    def rewritten(node: Node) -> Node:
+    def rewritten(node: Term) -> Term:
         if node in atoms or not node.arguments:
             return node
         if node.kind in (
@@ -181,15 +181,15 @@ def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]
     ), powers
 
 
-def _operations(root: Node) -> int:
+def _operations(root: Term) -> int:
     return sum(1 for node in in_order(root) if node.arguments)
 
 
-def _shared(root: Node) -> set[Node]:
+def _shared(root: Term) -> set[Term]:
     """The parts of an expression that occur repeatedly and are not short."""
     uses = Counter(each for node in in_order(root) for each in node.arguments)
-    shared: set[Node] = set()
-    cost: dict[Node, int] = {}
+    shared: set[Term] = set()
+    cost: dict[Term, int] = {}
     for node in in_order(root):
         own = bool(node.arguments) and node.kind != expression.NEGATIVE
         cost[node] = own + sum(0 if each in shared else cost[each] for each in set(node.arguments))
@@ -199,7 +199,7 @@ def _shared(root: Node) -> set[Node]:
     return shared
 
 
-def _long_sums(root: Node) -> set[Node]:
+def _long_sums(root: Term) -> set[Term]:
     """The sums inside an expression that have too many terms to stand inside a function or
     product.
     """
@@ -213,14 +213,14 @@ def _long_sums(root: Node) -> set[Node]:
     }
 
 
-def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
+def _labels(traced: _Traced, powers: Mapping[Term, tuple[int, ...]]) -> dict[Term, str]:
     """A name for each parameter: its symbol with the powers or the number of a coefficient, unique
     in the law.
     """
-    lists: dict[str, list[Node]] = {}
+    lists: dict[str, list[Term]] = {}
     for node, leaf in traced.parameters.items():
         lists.setdefault(_INDEX.sub("", leaf.path), []).append(node)
-    names: dict[Node, str] = {}
+    names: dict[Term, str] = {}
     for nodes in lists.values():
         leaf = traced.parameters[nodes[0]]
         base = re.sub(r"\W+", "_", leaf.declared.symbol).strip("_") or "c"
@@ -242,16 +242,16 @@ def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Nod
 
 
 def _named(
-    value: Node,
+    value: Term,
     traced: _Traced,
-    labels: Mapping[Node, str],
+    labels: Mapping[Term, str],
     result: Symbol,
     arguments: Sequence[Symbol],
 ) -> LawEquation:
     """The equation with its parameters and shared parts under their names."""
     new = traced.new
 
-    def renamed(node: Node, inner: list[Node]) -> Node:
+    def renamed(node: Term, inner: list[Term]) -> Term:
         return (
             new.apply(node.kind, *inner)
             if inner
@@ -279,9 +279,9 @@ def _named(
 
 
 def _part_names(
-    parts: Sequence[Node], arguments: Sequence[Node], taken: Collection[str]
-) -> dict[Node, str]:
-    names: dict[Node, str] = {}
+    parts: Sequence[Term], arguments: Sequence[Term], taken: Collection[str]
+) -> dict[Term, str]:
+    names: dict[Term, str] = {}
     used = {name.partition("_")[0] for name in taken}
     for node in parts:
         own = tuple(symbol.name for symbol in depends_on(node, arguments))
@@ -305,7 +305,7 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
     new = traced.new
     bar = new.symbol(PRESSURE_IN_BAR.name)
 
-    def in_numbers(node: Node, inner: list[Node]) -> Node:
+    def in_numbers(node: Term, inner: list[Term]) -> Term:
         if node in traced.parameters:
             return new.number(float(traced.parameters[node].value))
         if node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
@@ -317,7 +317,7 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
     points = [bar if node.name == "p" else node for node in traced.arguments][::-1]
     count = 0
 
-    def rewritten(node: Node) -> Node:
+    def rewritten(node: Term) -> Term:
         nonlocal count
         polynomial = expand(node, points) if node.arguments else None
         if polynomial is not None:

@@ -41,14 +41,14 @@ FUNCTIONS = (
 )
 
 
-class Node:
+class Term:
     """An operation, a number (its value) or a symbol (its name). Nodes of one `Expressions` are
     equal if identical.
     """
 
     __slots__ = ("arguments", "kind", "value")
 
-    def __init__(self, kind: str, arguments: "tuple[Node, ...]", value: Any) -> None:
+    def __init__(self, kind: str, arguments: "tuple[Term, ...]", value: Any) -> None:
         self.kind = kind
         self.arguments = arguments
         self.value = value
@@ -59,14 +59,14 @@ class Node:
         return str(self.value)
 
 
-def is_number(node: Node, value: float | None = None) -> bool:
+def is_number(node: Term, value: float | None = None) -> bool:
     """Whether a node is a number, and the given one if a value is given."""
     return node.kind == NUMBER and (value is None or node.value == value)
 
 
-def in_order(root: Node) -> Iterator[Node]:
+def in_order(root: Term) -> Iterator[Term]:
     """Each node of an expression once, arguments first."""
-    seen: set[Node] = set()
+    seen: set[Term] = set()
     stack = [(root, False)]
     while stack:
         node, expanded = stack.pop()
@@ -78,11 +78,11 @@ def in_order(root: Node) -> Iterator[Node]:
             stack += [(each, False) for each in reversed(node.arguments) if each not in seen]
 
 
-def fold(root: Node, combine: Callable[[Node, list[Result]], Result]) -> Result:
+def fold(root: Term, combine: Callable[[Term, list[Result]], Result]) -> Result:
     """The result of an expression: `combine` gives that of each node from those of its arguments,
     and once only.
     """
-    results: dict[Node, Result] = {}
+    results: dict[Term, Result] = {}
     for node in in_order(root):
         results[node] = combine(node, [results[each] for each in node.arguments])
     return results[root]
@@ -92,8 +92,8 @@ class Expressions:
     """Builder of nodes; equal operations on equal arguments give one node."""
 
     def __init__(self) -> None:
-        self._nodes: dict[tuple[object, ...], Node] = {}
-        self._simplified: dict[str, Callable[..., Node]] = {
+        self._nodes: dict[tuple[object, ...], Term] = {}
+        self._simplified: dict[str, Callable[..., Term]] = {
             "add": self.add,
             "neg": self.negative,
             "mul": self.product,
@@ -101,29 +101,28 @@ class Expressions:
             "pow": self.power,
             "not": self.negation,
             "where": self.where,
-            "assign": lambda a: a,
             "sq": lambda a: self.product(a, a),
             "sub": lambda a, b: self.add(a, self.negative(b)),
             "twice": lambda a: self.product(self.number(2.0), a),
             "inv": lambda a: self.quotient(self.number(1.0), a),
         }
 
-    def node(self, kind: str, *arguments: Node, value: float | str | None = None) -> Node:
+    def node(self, kind: str, *arguments: Term, value: float | str | None = None) -> Term:
         """An operation as it is; with numbers that are not evaluated, a polynomial is expanded
         exactly.
         """
         key = (kind, value, *arguments)
-        return self._nodes.setdefault(key, Node(kind, arguments, value))
+        return self._nodes.setdefault(key, Term(kind, arguments, value))
 
-    def number(self, value: float) -> Node:
+    def number(self, value: float) -> Term:
         """A number; minus zero is zero."""
         return self.node(NUMBER, value=float(value) + 0.0)
 
-    def symbol(self, name: str) -> Node:
+    def symbol(self, name: str) -> Term:
         """A symbol."""
         return self.node(SYMBOL, value=name)
 
-    def add(self, a: Node, b: Node) -> Node:
+    def add(self, a: Term, b: Term) -> Term:
         """The sum a + b; the selection of one of two summands is one node."""
         if is_number(a) and is_number(b):
             return self.number(a.value + b.value)
@@ -135,13 +134,13 @@ class Expressions:
             return self.where(a.arguments[0], a.arguments[1], b.arguments[1])
         return self.node(ADD, a, b)
 
-    def negative(self, a: Node) -> Node:
+    def negative(self, a: Term) -> Term:
         """The negative -a."""
         if is_number(a):
             return self.number(-a.value)
         return a.arguments[0] if a.kind == NEGATIVE else self.node(NEGATIVE, a)
 
-    def product(self, a: Node, b: Node) -> Node:
+    def product(self, a: Term, b: Term) -> Term:
         """The product a b; powers of one base are collected, and a sign is moved outside."""
         if is_number(a) and is_number(b):
             return self.number(a.value * b.value)
@@ -156,7 +155,7 @@ class Expressions:
             return self.power(base, self.number(m + n))
         return self.node(PRODUCT, a, b)
 
-    def quotient(self, a: Node, b: Node) -> Node:
+    def quotient(self, a: Term, b: Term) -> Term:
         """The quotient a/b."""
         if is_number(a) and is_number(b) and b.value != 0.0:
             return self.number(a.value / b.value)
@@ -166,7 +165,7 @@ class Expressions:
             return self.negative(self.quotient(a.arguments[0], b))
         return self.node(QUOTIENT, a, b)
 
-    def power(self, a: Node, exponent: Node) -> Node:
+    def power(self, a: Term, exponent: Term) -> Term:
         """The power a^exponent."""
         if is_number(exponent, 0.0):
             return self.number(1.0)
@@ -180,13 +179,13 @@ class Expressions:
             return self.number(a.value**exponent.value)
         return self.node(POWER, a, exponent)
 
-    def negation(self, condition: Node) -> Node:
+    def negation(self, condition: Term) -> Term:
         """The logical negation of a condition."""
         if is_number(condition):
             return self.number(float(condition.value == 0.0))
         return condition.arguments[0] if condition.kind == "not" else self.node("not", condition)
 
-    def where(self, condition: Node, a: Node, b: Node) -> Node:
+    def where(self, condition: Term, a: Term, b: Term) -> Term:
         """a where the condition holds, else b; a maximum, minimum or absolute value if it is
         one.
         """
@@ -206,7 +205,7 @@ class Expressions:
                 return self.node("abs", a)
         return self.node(WHERE, condition, a, b)
 
-    def apply(self, kind: str, *arguments: Node) -> Node:
+    def apply(self, kind: str, *arguments: Term) -> Term:
         """Any operation by its kind, simplified."""
         if kind in self._simplified:
             return self._simplified[kind](*arguments)
@@ -217,7 +216,7 @@ class Expressions:
         return self.node(kind, *arguments)
 
 
-def _as_power(node: Node) -> tuple[Node, float]:
+def _as_power(node: Term) -> tuple[Term, float]:
     if (
         node.kind == POWER
         and is_number(node.arguments[1])
@@ -232,16 +231,16 @@ MIN_TERMS = 4
 """Maximum number of monomials of an expanded polynomial, minimum one with its coefficients as
 symbols (chosen).
 """
-Monomial = tuple[tuple[Node, int], ...]
+Monomial = tuple[tuple[Term, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
 
-def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
+def expand(root: Term, atoms: Collection[Term]) -> Polynomial | None:
     """An expression as a polynomial in these atoms with exact coefficients; None if it is none, or
     is too long.
     """
 
-    def expanded(node: Node, inner: list[Polynomial | None]) -> Polynomial | None:
+    def expanded(node: Term, inner: list[Polynomial | None]) -> Polynomial | None:
         if node in atoms:
             return {((node, 1),): Fraction(1)}
         if is_number(node):
@@ -294,12 +293,12 @@ def _combined(kind: str, first: Polynomial, last: Polynomial) -> Polynomial | No
 
 
 def coefficients_by_monomial(
-    polynomial: Polynomial, parameters: Collection[Node]
-) -> dict[Monomial, Node] | None:
+    polynomial: Polynomial, parameters: Collection[Term]
+) -> dict[Monomial, Term] | None:
     """The one parameter before each monomial in the other atoms; None unless there is exactly one,
     with factor 1.
     """
-    result: dict[Monomial, Node] = {}
+    result: dict[Monomial, Term] = {}
     for monomial, factor in polynomial.items():
         own = [(node, power) for node, power in monomial if node in parameters]
         rest = tuple((node, power) for node, power in monomial if node not in parameters)
@@ -311,7 +310,7 @@ def coefficients_by_monomial(
     return result
 
 
-def assemble(terms: Mapping[Monomial, Node], atoms: list[Node], new: Expressions) -> Node:
+def assemble(terms: Mapping[Monomial, Term], atoms: list[Term], new: Expressions) -> Term:
     """The sum of coefficients times monomials, by increasing power of the last atom, then of the
     ones before it.
     """
@@ -326,16 +325,16 @@ def assemble(terms: Mapping[Monomial, Node], atoms: list[Node], new: Expressions
     return total
 
 
-def summands(node: Node) -> list[Node]:
+def summands(node: Term) -> list[Term]:
     """The terms of a sum, in their order; any other node is one term."""
-    terms: list[Node] = []
+    terms: list[Term] = []
     while node.kind == ADD:
         node, last = node.arguments
         terms.append(last)
     return [node, *reversed(terms)]
 
 
-def depends_on(root: Node, symbols: Collection[Node]) -> list[Node]:
+def depends_on(root: Term, symbols: Collection[Term]) -> list[Term]:
     """The given symbols that occur in an expression, in their order."""
     present = set(in_order(root))
     return [symbol for symbol in symbols if symbol in present]

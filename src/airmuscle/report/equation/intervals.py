@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...core import autodiff, instructions_of
+from ...core import Operation, autodiff, nodes
 from . import expression
 from .expression import (
     COMPARISONS,
@@ -16,7 +16,7 @@ from .expression import (
     MINIMUM,
     POWER,
     Expressions,
-    Node,
+    Term,
     fold,
     in_order,
     is_number,
@@ -27,31 +27,30 @@ UNKNOWN: Bounds = (-math.inf, math.inf)
 ROUNDING = 1e-9
 """Difference of two bounds, relative to them, that is a rounding error (chosen)."""
 _KINDS = {
-    "ASSIGN": "assign",
-    "ADD": "add",
-    "SUB": "sub",
-    "MUL": "mul",
-    "DIV": "div",
-    "NEG": "neg",
-    "SQ": "sq",
-    "TWICE": "twice",
-    "INV": "inv",
-    "FABS": "abs",
-    "POW": "pow",
-    "CONSTPOW": "pow",
-    "FMIN": "min",
-    "FMAX": "max",
-    "LT": "lt",
-    "LE": "le",
-    "EQ": "eq",
-    "NE": "ne",
-    "NOT": "not",
-    "AND": "and",
-    "OR": "or",
-    "IF_ELSE_ZERO": "if",
-    **{name.upper(): name for name in expression.FUNCTIONS if name != "abs"},
+    Operation.ADD: "add",
+    Operation.SUBTRACT: "sub",
+    Operation.MULTIPLY: "mul",
+    Operation.DIVIDE: "div",
+    Operation.NEGATE: "neg",
+    Operation.SQUARE: "sq",
+    Operation.TWICE: "twice",
+    Operation.INVERSE: "inv",
+    Operation.ABS: "abs",
+    Operation.POWER: "pow",
+    Operation.FMIN: "min",
+    Operation.FMAX: "max",
+    Operation.LESS: "lt",
+    Operation.LESS_EQUAL: "le",
+    Operation.EQUAL: "eq",
+    Operation.NOT_EQUAL: "ne",
+    Operation.NOT: "not",
+    Operation.AND: "and",
+    Operation.OR: "or",
+    Operation.MASK: "if",
+    Operation.SELECT: "where",
+    **{Operation[name.upper()]: name for name in expression.FUNCTIONS if name != "abs"},
 }
-"""Kinds of nodes by CasADi's name of the operation."""
+"""Kinds of nodes by the recorded operation."""
 _MONOTONE: Mapping[str, Callable[..., float]] = {
     "add": operator.add,
     "neg": operator.neg,
@@ -72,46 +71,41 @@ from zero.
 
 
 def traced_expression(
-    law: Any, method: str, new: Expressions, arguments: Sequence[Node], parameters: Sequence[Node]
-) -> Node | None:
+    law: Any, method: str, new: Expressions, arguments: Sequence[Term], parameters: Sequence[Term]
+) -> Term | None:
     """A method of a law at these arguments, with these nodes in place of its parameters, in the
     order of the leaves.
 
     None if the law cannot be traced, or contains an operation without a notation.
     """
-    import casadi
-
     if not law.traceable:
         return None
-    model, vector = autodiff.symbolic(law)
-    symbols = [casadi.SX.sym(f"x{i}") for i in range(len(arguments))]
-    value = casadi.SX(getattr(model, method)(*symbols))
-    autodiff.check_finite(value, f"{type(law).__name__}.{method}")
-    function = casadi.Function("law", [*symbols, vector], casadi.cse([value]))
-    kinds = {getattr(casadi, f"OP_{name}"): kind for name, kind in _KINDS.items()}
-    current = dict[int, Node]()
-    result = new.number(0.0)
-    for k, (code, target, source) in enumerate(instructions_of(function)):
-        if code == casadi.OP_OUTPUT:
-            result = current[source[0]]
-        elif code == casadi.OP_CONST:
-            current[target[0]] = new.number(function.instruction_constant(k))
-        elif code == casadi.OP_INPUT:
-            current[target[0]] = (
-                arguments[source[0]] if source[0] < len(arguments) else parameters[source[1]]
-            )
-        elif code in kinds:
-            current[target[0]] = new.apply(kinds[code], *(current[i] for i in source))
-        else:
+    model, leaves = autodiff.symbolic(law)
+    symbols = nodes.symbols("x", len(arguments))
+    value = nodes.as_node(getattr(model, method)(*symbols))
+    autodiff.check_finite([value], f"{type(law).__name__}.{method}")
+    known = dict(zip(map(id, symbols), arguments, strict=True))
+    known |= zip(map(id, leaves), parameters, strict=True)
+
+    def notation(recorded: nodes.Node) -> Term:
+        if recorded.operation == Operation.CONSTANT:
+            return new.number(recorded.value)
+        return known[id(recorded)]
+
+    for recorded in nodes.in_order([value], known):
+        terms = [notation(argument) for argument in recorded.arguments]
+        kind = _KINDS.get(recorded.operation)
+        if kind is None:
             return None
-    return result
+        known[id(recorded)] = new.apply(kind, *terms)
+    return notation(value)
 
 
-def within(root: Node, new: Expressions, ranges: Mapping[Node, Bounds]) -> Node:
+def within(root: Term, new: Expressions, ranges: Mapping[Term, Bounds]) -> Term:
     """The expression for symbols within these ranges; a parameter has the range of its value."""
-    bounds: dict[Node, Bounds] = {}
+    bounds: dict[Term, Bounds] = {}
 
-    def rebuild(old: Node, arguments: list[Node]) -> Node:
+    def rebuild(old: Term, arguments: list[Term]) -> Term:
         node = new.apply(old.kind, *arguments) if arguments else old
         for each in in_order(node):
             if each not in bounds:
@@ -121,7 +115,7 @@ def within(root: Node, new: Expressions, ranges: Mapping[Node, Bounds]) -> Node:
     return fold(root, rebuild)
 
 
-def _reduced(node: Node, new: Expressions, bounds: Mapping[Node, Bounds]) -> Node:
+def _reduced(node: Term, new: Expressions, bounds: Mapping[Term, Bounds]) -> Term:
     """A maximum, minimum or comparison with only one possible value as that value."""
     if node.kind in (MAXIMUM, MINIMUM):
         for low, high in itertools.permutations(node.arguments):
@@ -147,7 +141,7 @@ def _at_most(low: Bounds, high: Bounds) -> bool:
     return low[1] <= high[0] + ROUNDING * max(abs(low[1]), abs(high[0]))
 
 
-def _bounds_of(node: Node, bounds: Mapping[Node, Bounds], ranges: Mapping[Node, Bounds]) -> Bounds:
+def _bounds_of(node: Term, bounds: Mapping[Term, Bounds], ranges: Mapping[Term, Bounds]) -> Bounds:
     """The range of a node from those of its arguments, which are taken as independent."""
     if is_number(node):
         return node.value, node.value

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from ..formatting import symbol_formula
 from .derivation import LawEquation, Symbol
-from .expression import POWER, Node, fold, in_order, is_number, summands
+from .expression import POWER, Term, fold, in_order, is_number, summands
 
 SUM = 1
 TERM = 2
@@ -33,19 +33,19 @@ class Notation:
     choice: ClassVar[str]
     """Form of a choice, from the condition, the value where it holds, and the other value."""
 
-    def __init__(self, names: Mapping[Node, str], arguments: Collection[Node] = ()) -> None:
+    def __init__(self, names: Mapping[Term, str], arguments: Collection[Term] = ()) -> None:
         self._names, self._arguments = names, set(arguments)
 
-    def text(self, root: Node, *, definition: bool = False) -> str:
+    def text(self, root: Term, *, definition: bool = False) -> str:
         """The expression; with `definition`, that of a part itself and not its name."""
 
-        def write(node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+        def write(node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
             is_named = node in self._names and not (definition and node is root)
             return (self._names[node], ATOM) if is_named else self._write(node, inner)
 
         return fold(root, write)[0]
 
-    def _write(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+    def _write(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         texts = [text for text, _ in inner]
         match node.kind:
             case "number":
@@ -85,10 +85,10 @@ class Notation:
     def _bound(self, inner: tuple[str, int], strength: int) -> str:
         return inner[0] if inner[1] >= strength else self.parentheses.format(inner[0])
 
-    def _product(self, node: Node, left: str, right: str) -> str:
+    def _product(self, node: Term, left: str, right: str) -> str:
         return f"{left}{self._dot(*node.arguments)}*{right}"
 
-    def _quotient(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+    def _quotient(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         return (
             (
                 f"{self._bound(inner[0], TERM)}{self._dot(node.arguments[1])}/{self._bound(inner[1], BASE)}"  # noqa: E501
@@ -96,10 +96,10 @@ class Notation:
             TERM,
         )
 
-    def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+    def _power(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         return f"{self._bound(inner[0], ATOM)}{self._dot(node)}^{self._bound(inner[1], ATOM)}", BASE
 
-    def _dot(self, *operands: Node) -> str:
+    def _dot(self, *operands: Term) -> str:
         """The sign of an operation on each element of arrays; empty where one of the operands is a
         scalar.
         """
@@ -135,7 +135,7 @@ class Matlab(Notation):
     def number(self, value: float) -> str:
         return "pi" if value == math.pi else repr(value).removesuffix(".0")
 
-    def _dot(self, *operands: Node) -> str:
+    def _dot(self, *operands: Term) -> str:
         return "." if all(self._arguments.intersection(in_order(each)) for each in operands) else ""
 
 
@@ -178,7 +178,7 @@ class Latex(Notation):
     parentheses = r"\left({}\right)"
     choice = r"\begin{{cases}} {1} & {0} \\ {2} & \text{{otherwise}} \end{{cases}}"
 
-    def __init__(self, names: Mapping[Node, str], digits: int | None = None) -> None:
+    def __init__(self, names: Mapping[Term, str], digits: int | None = None) -> None:
         super().__init__({node: latex_symbol(name) for node, name in names.items()})
         self._digits = digits
 
@@ -193,7 +193,7 @@ class Latex(Notation):
         mantissa = mantissa.removesuffix(".0")
         return power if mantissa == "1" else rf"{mantissa} \cdot {power}"
 
-    def _write(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+    def _write(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         if node.kind == "symbol" and node not in self._names:
             return latex_symbol(node.name), ATOM
         if node.kind == "number" and (
@@ -206,17 +206,17 @@ class Latex(Notation):
             return rf"\left|{inner[0][0]}\right|", ATOM
         return super()._write(node, inner)
 
-    def _product(self, node: Node, left: str, right: str) -> str:
+    def _product(self, node: Term, left: str, right: str) -> str:
         return (
             rf"{left} \cdot {right}"
             if right[:1].isdigit() or "cdot" in right
             else rf"{left}\,{right}"
         )
 
-    def _quotient(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+    def _quotient(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         return rf"\frac{{{inner[0][0]}}}{{{inner[1][0]}}}", BASE
 
-    def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+    def _power(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         if is_number(node.arguments[1], 0.5):
             return rf"\sqrt{{{inner[0][0]}}}", ATOM
         return f"{self._bound(inner[0], ATOM)}^{{{inner[1][0]}}}", BASE
@@ -322,7 +322,7 @@ def excel_source(equation: LawEquation) -> str:
         cells[part.name] = f"{chr(ord('A') + len(cells))}2"
     texts = Excel({}).number
     values = {each.name: texts(each.value) for each in equation.parameters}
-    names: dict[Node, str] = {node: cells[part.name] for part, node in equation.parts}
+    names: dict[Term, str] = {node: cells[part.name] for part, node in equation.parts}
     for node in _symbols(equation):
         text = cells.get(node.name) or values[node.name]
         names[node] = f"({text})" if text.startswith("-") else text
@@ -361,7 +361,7 @@ def _latex_rows(equation: LawEquation, notation: Latex) -> list[str]:
     return rows
 
 
-def _symbols(equation: LawEquation) -> set[Node]:
+def _symbols(equation: LawEquation) -> set[Term]:
     roots = [equation.value, *(node for _, node in equation.parts)]
     return {node for root in roots for node in in_order(root) if node.kind == "symbol"}
 

@@ -18,6 +18,8 @@ from ....core import (
     System,
     autodiff,
     check_known,
+    nodes,
+    slopes,
     tree,
 )
 from ....engine import InputSignal, PiecewiseLinear
@@ -157,8 +159,6 @@ def compile_conditions(system: System, initial: InitialConditions) -> Function:
     """The compiled function (state, leaves) -> (known values and rates, their derivatives by state
     and by leaf).
     """
-    import casadi
-
     key = (
         tree.structure(system),
         tuple(initial.known),
@@ -168,20 +168,26 @@ def compile_conditions(system: System, initial: InitialConditions) -> Function:
     )
     if key not in _compiled_conditions:
         model, p = autodiff.symbolic(system)
-        x = casadi.SX.sym("x", len(system.states))
-        state = {s.name: x[i] for i, s in enumerate(system.states)}
+        x = nodes.symbols("x", len(system.states))
+        state = {s.name: symbol for s, symbol in zip(system.states, x, strict=True)}
         inputs = dict.fromkeys(system.inputs, 0.0)
         values = {**model.outputs(state, inputs), **state}
         initial.check_plant(system, values)
         rates = model.rates(state, inputs)
         steady = _circuit_states(model) if initial.settled else {}
-        g = casadi.vertcat(
-            *(casadi.SX(values[n]) for n in initial.known),
-            *(casadi.SX(rates[n]) for n in initial.stationary),
-            *(casadi.SX(values[a] - values[b]) for a, b in initial.equal),
-            *(casadi.SX(state[n] - steady[n]) for n in initial.settled),
+        g = nodes.as_nodes(
+            [
+                *(values[n] for n in initial.known),
+                *(rates[n] for n in initial.stationary),
+                *(values[a] - values[b] for a, b in initial.equal),
+                *(state[n] - steady[n] for n in initial.settled),
+            ]
         )
-        outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
+        outputs = {
+            "values": g,
+            "by_state": slopes.by_row(slopes.jacobian(g, x)),
+            "by_leaf": slopes.by_row(slopes.jacobian(g, p)),
+        }
         _compiled_conditions[key] = Function({"x": x, "leaves": p}, outputs)
     return _compiled_conditions[key]
 

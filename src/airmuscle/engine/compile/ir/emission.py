@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ....core import TraceError
-from .instructions import CALLED, Code, Operand, Operation
+from ....core import Operation, TraceError
+from .instructions import CALLED, Code, Operand
 from .scheduling import ConditionalBlock, Item
 from .skipped_blocks import COMMANDED, STEADY, VARYING, skipping
 
@@ -143,8 +143,6 @@ class FunctionBlock(abc.ABC):
         if operation in _EXTREMES:
             return self.choose(_EXTREMES[operation], x[0], x[1], x[0], x[1])
         match operation:
-            case Operation.ASSIGN:
-                return x[0]
             case Operation.NEGATE:
                 return self.negative(x[0])
             case Operation.INVERSE:

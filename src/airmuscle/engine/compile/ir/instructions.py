@@ -1,14 +1,12 @@
-"""CasADi expressions as a list of instructions; those that depend on parameters only are
+"""Recorded expressions as a list of instructions; those that depend on parameters only are
 separated.
 """
 
 import dataclasses
-import enum
-import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ....core import TraceError, instructions_of
+from ....core import Node, Operation, nodes
 
 Operand = tuple[Any, ...]
 """("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an
@@ -17,43 +15,9 @@ input.
 ZERO: Operand = ("c", 0.0)
 ONE: Operand = ("c", 1.0)
 
-
-Operation = enum.IntEnum(
-    "Operation",
-    "ASSIGN ADD SUBTRACT MULTIPLY DIVIDE NEGATE SQUARE TWICE INVERSE SQRT ABS SIGN FLOOR POWER"
-    " CONSTANT_POWER EXP LOG LOG1P EXPM1 SIN COS TAN ASIN ACOS ATAN SINH COSH TANH ASINH FMIN FMAX"
-    " LESS LESS_EQUAL EQUAL NOT_EQUAL NOT AND OR MASK SELECT MAXIMUM MINIMUM",
-)
-"""Operations of an instruction list; all but the last three have the meaning that CasADi gives
-them.
-
-MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where
-the condition is not zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine
-instruction does.
-"""
-_CASADI_NAMES = {
-    Operation.SUBTRACT: "SUB",
-    Operation.MULTIPLY: "MUL",
-    Operation.DIVIDE: "DIV",
-    Operation.NEGATE: "NEG",
-    Operation.SQUARE: "SQ",
-    Operation.INVERSE: "INV",
-    Operation.ABS: "FABS",
-    Operation.POWER: "POW",
-    Operation.CONSTANT_POWER: "CONSTPOW",
-    Operation.LESS: "LT",
-    Operation.LESS_EQUAL: "LE",
-    Operation.EQUAL: "EQ",
-    Operation.NOT_EQUAL: "NE",
-    Operation.MASK: "IF_ELSE_ZERO",
-}
-"""Names in CasADi that differ, without their prefix OP_."""
-_OWN = (Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM)
 _COMPARE = (Operation.LESS_EQUAL, Operation.LESS)
-
 _OF_ONE = "exp log sin cos tan atan sinh cosh tanh asinh asin acos log1p expm1"
-POWERS = (Operation.POWER, Operation.CONSTANT_POWER)
-CALLED = {Operation[name.upper()]: name for name in _OF_ONE.split()} | dict.fromkeys(POWERS, "pow")
+CALLED = {Operation[name.upper()]: name for name in _OF_ONE.split()} | {Operation.POWER: "pow"}
 """The functions of the C library that are called for operations."""
 
 
@@ -80,52 +44,34 @@ class Code:
         return [operands.get(i, ZERO) for i in range(size)]
 
 
-@functools.cache
-def _casadi_operations() -> dict[int, Operation]:
-    """Operations by their number in CasADi."""
-    import casadi
-
-    named = {
-        operation: _CASADI_NAMES.get(operation, operation.name)
-        for operation in Operation
-        if operation not in _OWN
-    }
-    return {getattr(casadi, f"OP_{name}"): operation for operation, name in named.items()}
-
-
-def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
-    """The instructions that compute the non-zeros of `outputs` (CasADi SX) from `inputs`."""
+def instructions(inputs: Sequence[Sequence[Node]], outputs: Sequence[Sequence[Node]]) -> Code:
+    """The instructions that compute `outputs` from the symbols `inputs`, ready for printing."""
     return finished(recorded(inputs, outputs))
 
 
-def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
-    """The instructions as recorded by CasADi; maxima and minima are still selections, which can be
-    differentiated.
-    """
-    import casadi
+def recorded(inputs: Sequence[Sequence[Node]], outputs: Sequence[Sequence[Node]]) -> Code:
+    """The instructions as they were recorded; maxima and minima are still selections."""
+    operands: dict[int, Operand] = {
+        id(symbol): ("in", i, k)
+        for i, vector in enumerate(inputs)
+        for k, symbol in enumerate(vector)
+    }
 
-    operations = _casadi_operations()
-    function = casadi.Function("code", list(inputs), casadi.cse(list(outputs)))
-    current: dict[int, Operand] = {}
+    def operand_of(node: Node) -> Operand:
+        return ("c", node.value) if node.operation == nodes.CONSTANT else operands[id(node)]
+
+    roots = [node for vector in outputs for node in vector]
     body: list[Instruction] = []
-    results: list[tuple[int, int, Operand]] = []
-    for k, (code, target, source) in enumerate(instructions_of(function)):
-        if code == casadi.OP_CONST:
-            current[target[0]] = ("c", function.instruction_constant(k))
-        elif code == casadi.OP_INPUT:
-            current[target[0]] = ("in", source[0], source[1])
-        elif code == casadi.OP_OUTPUT:
-            results.append((target[0], target[1], current[source[0]]))
-        else:
-            name = ("t", len(body))
-            if code not in operations:
-                raise TraceError(
-                    f"CasADi operation {code} is not supported; write the law over"
-                    " airmuscle.core.ops."
-                )
-            body.append(Instruction(operations[code], name, tuple(current[i] for i in source)))
-            current[target[0]] = name
-    return Code(tuple(_selects(body)), tuple(results))
+    for node in nodes.in_order(roots, operands):
+        arguments = tuple(map(operand_of, node.arguments))
+        result = operands[id(node)] = ("t", len(body))
+        body.append(Instruction(node.operation, result, arguments))
+    results = [
+        (i, k, operand_of(node))
+        for i, vector in enumerate(outputs)
+        for k, node in enumerate(vector)
+    ]
+    return Code(tuple(body), tuple(results))
 
 
 def finished(code: Code) -> Code:

@@ -13,7 +13,8 @@ finite: its product with zero would be NaN and is zero here.
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from .instructions import ONE, ZERO, Code, Instruction, Operand, Operation
+from ....core import Operation
+from .instructions import ONE, ZERO, Code, Instruction, Operand
 from .scheduling import Gates, IndependentGroup, Item, in_order
 
 STEADY, COMMANDED, VARYING = range(3)
@@ -40,7 +41,6 @@ _SIMPLE = {
     Operation.AND,
     Operation.OR,
     Operation.MASK,
-    Operation.ASSIGN,
     Operation.FMIN,
     Operation.FMAX,
     Operation.SELECT,
@@ -53,7 +53,6 @@ _KEEP_ZERO = (
     Operation.TWICE,
     Operation.ABS,
     Operation.SQRT,
-    Operation.ASSIGN,
 )
 _CHOICES = (Operation.MASK, Operation.SELECT)
 _EXTREMES = (Operation.MAXIMUM, Operation.MINIMUM)

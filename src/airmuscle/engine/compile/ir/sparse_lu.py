@@ -8,23 +8,27 @@ dependent operations, not by their number.
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from ....core import Node, nodes
+
 Place = tuple[int, int]
 
 
-def distinct(expressions: Sequence[Any]) -> tuple[Any, tuple[int, ...]]:
-    """The distinct expressions as one vector, and the index of each given expression in it.
+def distinct(expressions: Sequence[Node]) -> tuple[list[Node], tuple[int, ...]]:
+    """The distinct expressions, and the index of each given expression among them.
 
     A system with its sensitivities has equal diagonal blocks: they are computed and factorised
     once.
     """
-    import casadi
-
-    merged = casadi.cse(casadi.vertcat(*expressions)) if expressions else casadi.SX(0, 1)
-    first: dict[int, int] = {}
-    slots = tuple(
-        first.setdefault(merged[i].element_hash(), len(first)) for i in range(len(expressions))
-    )
-    return casadi.vertcat(*(merged[slots.index(k)] for k in range(len(first)))), slots
+    first: dict[Any, int] = {}
+    merged: list[Node] = []
+    slots = []
+    for expression in expressions:
+        key = nodes.identity(expression)
+        if key not in first:
+            first[key] = len(merged)
+            merged.append(expression)
+        slots.append(first[key])
+    return merged, tuple(slots)
 
 
 class Factors:
@@ -36,12 +40,11 @@ class Factors:
     """
 
     def __init__(self, places: Sequence[Place], slots: Sequence[int], size: int) -> None:
-        import casadi
-
-        self.j, self.d = casadi.SX.sym("j", max(slots, default=-1) + 1), casadi.SX.sym("d")
-        a: dict[Place, Any] = {(i, i): self.d for i in range(size)}
+        self.j = nodes.symbols("j", max(slots, default=-1) + 1)
+        self.d = nodes.symbol("d")
+        a: dict[Place, Node] = {(i, i): self.d for i in range(size)}
         for slot, place in zip(slots, places, strict=True):
-            a[place] = a.get(place, casadi.SX(0)) - self.j[slot]
+            a[place] = a.get(place, nodes.ZERO) - self.j[slot]
         self.order = _order(a, size)
         _factorise(a, self.order)
         self.values, slot_of_each = distinct(list(a.values()))
@@ -64,12 +67,10 @@ class Factors:
         return x
 
 
-def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
+def _factorise(a: dict[Place, Node], order: Sequence[int]) -> None:
     """Replace the matrix by L below the diagonal (in the given order), U above it, and the inverse
     of D on it.
     """
-    import casadi
-
     for n, k in enumerate(order):
         later = order[n + 1 :]
         a[k, k] = 1 / a[k, k]
@@ -79,7 +80,7 @@ def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
                 continue
             a[i, k] = a[i, k] * a[k, k]
             for j, value in row.items():
-                a[i, j] = a.get((i, j), casadi.SX(0)) - a[i, k] * value
+                a[i, j] = a.get((i, j), nodes.ZERO) - a[i, k] * value
         for j, value in row.items():
             a[k, j] = value * a[k, k]
 

@@ -7,8 +7,9 @@ import functools
 import struct
 from collections.abc import Callable, Mapping, Sequence
 
+from ....core import Operation
 from ..ir.emission import FunctionBlock, TargetLanguage, nearest_single
-from ..ir.instructions import CALLED, POWERS, Operand, Operation
+from ..ir.instructions import CALLED, Operand
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or
@@ -264,7 +265,11 @@ class FunctionBody(FunctionBlock):
         return self.put(f"fneg {FLAGS} {self.number.text} {a}")
 
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        return self.power(x[0], x[1]) if operation in POWERS else super().operate(operation, x)
+        return (
+            self.power(x[0], x[1])
+            if operation == Operation.POWER
+            else super().operate(operation, x)
+        )
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, TraceError
+from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, TraceError, ops
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not
@@ -38,14 +38,12 @@ def values_or_nan(law: Callable[..., Any], *points: Array) -> Array:
 
 
 def check_numbers(*values: Any) -> None:
-    """Raise TraceError for values of a traced program: those within `jax.jit`, and symbols of
-    CasADi.
-    """
+    """Raise TraceError for values of a traced program: those within `jax.jit`, and symbols."""
     jax = sys.modules.get("jax")
     for value in values:
-        if type(value).__module__.startswith("casadi") or (
-            jax and isinstance(value, jax.core.Tracer)
-        ):
+        is_array_of_jax = type(value).__module__.partition(".")[0] in ("jax", "jaxlib")
+        has_numbers = is_array_of_jax and not isinstance(value, jax.core.Tracer)  # type: ignore[union-attr]
+        if ops.is_traced(value) and not has_numbers:
             raise TraceError(
                 "this direction of the characteristic is not in closed form: its root search needs"
                 f" numbers, but {type(value).__name__} is a value of a traced program. Call it"
@@ -64,7 +62,7 @@ def warn_above_whole_length(contraction: Any, owner: object) -> None:
     """Issue an AirmuscleWarning for contractions [1] above 1: probably percentages. Traced values
     are not checked.
     """
-    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+    if ops.is_traced(contraction):
         return
     values = np.asarray(contraction, dtype=float)
     largest = float(np.max(values, initial=0.0, where=~np.isnan(values)))
@@ -196,7 +194,7 @@ def check_solution(
     `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not
     checked. In `values_or_nan` a solution outside is NaN.
     """
-    if type(solution).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+    if ops.is_traced(solution):
         return solution
     values = np.asarray(solution, dtype=float)
     outside = ~((values >= bounds[0]) & (values <= bounds[1]))

@@ -5,7 +5,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core import Array, GeometryLimitError, ParameterError, Reference, Value, abridged, autodiff
+from ....core import (
+    Array,
+    GeometryLimitError,
+    ParameterError,
+    Reference,
+    Value,
+    abridged,
+    autodiff,
+    ops,
+)
 from ..quantity_arguments import QuantityMethods, Units
 
 
@@ -17,7 +26,7 @@ def check_contraction_range(
 
     `owner` names the model and `remark` extends the message.
     """
-    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+    if ops.is_traced(contraction):
         return
     values = np.asarray(contraction, dtype=float)
     outside = ~((values >= limits[0]) & (values <= limits[1]))

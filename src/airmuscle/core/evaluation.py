@@ -1,0 +1,344 @@
+"""Recorded expressions as functions of numbers and of whole arrays of points.
+
+A function is interpreted at first, and printed as Python text once it is called often: to print and
+to compile the text takes the time of some hundred interpretations. NumPy needs about a microsecond
+for an operation of few points, so that what depends on numbers alone is computed with numbers.
+"""
+
+import functools
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .errors import TraceError
+from .nodes import CONSTANT, Node, in_order
+from .operations import OF_NUMBERS, Operation
+
+PRINTED_AFTER = 20
+"""Calls after which a function is printed (chosen)."""
+Vector = Sequence[Any]
+"""Numbers, or arrays of equal shape with a number for each point."""
+
+
+def _mask(condition: Any, x: Any) -> Any:
+    """`x` where the condition holds, else 0; one number where it holds nowhere, as in most terms
+    beyond a validity range.
+    """
+    if np.ndim(condition) == 0:
+        return x if condition else 0.0
+    holds = np.not_equal(condition, 0.0)
+    if holds.all():
+        return x
+    return np.where(holds, x, 0.0) if holds.any() else 0.0
+
+
+def _select(condition: Any, x: Any, y: Any) -> Any:
+    if np.ndim(condition) == 0:
+        return x if condition else y
+    holds = np.not_equal(condition, 0.0)
+    if holds.all():
+        return x
+    return np.where(holds, x, y) if holds.any() else y
+
+
+# Operations of arrays. Conditions are numbers, 1 or 0, because laws multiply by them.
+OF_ARRAYS: dict[Operation, Callable[..., Any]] = {
+    Operation.NEGATE: np.negative,
+    Operation.INVERSE: lambda x: np.divide(1.0, x),
+    Operation.TWICE: lambda x: x + x,
+    Operation.SQUARE: lambda x: x * x,
+    Operation.DIVIDE: np.divide,
+    Operation.MULTIPLY: np.multiply,
+    Operation.ADD: np.add,
+    Operation.SUBTRACT: np.subtract,
+    Operation.SQRT: np.sqrt,
+    Operation.ABS: np.abs,
+    Operation.SIN: np.sin,
+    Operation.COS: np.cos,
+    Operation.TAN: np.tan,
+    Operation.ASIN: np.arcsin,
+    Operation.ACOS: np.arccos,
+    Operation.ATAN: np.arctan,
+    Operation.SINH: np.sinh,
+    Operation.COSH: np.cosh,
+    Operation.TANH: np.tanh,
+    Operation.ASINH: np.arcsinh,
+    Operation.EXP: np.exp,
+    Operation.LOG: np.log,
+    Operation.EXPM1: np.expm1,
+    Operation.LOG1P: np.log1p,
+    Operation.POWER: np.power,
+    Operation.SIGN: np.sign,
+    Operation.FLOOR: np.floor,
+    Operation.FMIN: np.fmin,
+    Operation.FMAX: np.fmax,
+    Operation.LESS: lambda x, y: np.less(x, y) * 1.0,
+    Operation.LESS_EQUAL: lambda x, y: np.less_equal(x, y) * 1.0,
+    Operation.EQUAL: lambda x, y: np.equal(x, y) * 1.0,
+    Operation.NOT_EQUAL: lambda x, y: np.not_equal(x, y) * 1.0,
+    Operation.NOT: lambda x: np.equal(x, 0.0) * 1.0,
+    Operation.AND: lambda x, y: np.logical_and(x, y) * 1.0,
+    Operation.OR: lambda x, y: np.logical_or(x, y) * 1.0,
+    Operation.MASK: _mask,
+    Operation.SELECT: _select,
+}
+_FAST_NUMBERS: dict[Operation, Callable[..., float]] = {
+    **OF_NUMBERS,
+    Operation.NEGATE: operator.neg,
+    Operation.DIVIDE: operator.truediv,
+    Operation.INVERSE: lambda x: 1.0 / x,
+    Operation.MULTIPLY: operator.mul,
+    Operation.ADD: operator.add,
+    Operation.SUBTRACT: operator.sub,
+}
+"""Operations of numbers that raise an ArithmeticError or ValueError outside their domain."""
+
+
+class Recorded:
+    """A function of vectors of symbols, evaluated at numbers or at arrays of points.
+
+    inputs     the symbols of each argument
+    outputs    the expressions of each result
+    """
+
+    def __init__(self, inputs: Sequence[Sequence[Node]], outputs: Sequence[Sequence[Node]]) -> None:
+        self.inputs = [list(vector) for vector in inputs]
+        self.outputs = [list(vector) for vector in outputs]
+        self.roots = [node for vector in self.outputs for node in vector]
+        self.ordered = in_order(self.roots)
+        self.place = {
+            id(node): (i, k)
+            for i, vector in enumerate(self.inputs)
+            for k, node in enumerate(vector)
+        }
+        self._evaluators: dict[Any, _Evaluator] = {}
+        for node in self.ordered:
+            if not node.arguments and id(node) not in self.place:
+                raise TraceError(f"the symbol {node} is no argument of the recorded function.")
+
+    def at_numbers(self, *vectors: Vector) -> list[list[float]]:
+        """The results at numbers."""
+        try:
+            values = self._evaluator(frozenset())(vectors)
+        except (ArithmeticError, ValueError):  # NaN or infinity, of which the module math has none
+            with np.errstate(all="ignore"):
+                of_numpy = [list(map(np.float64, vector)) for vector in vectors]
+                values = self._evaluator(None)(of_numpy)
+        return self._split([float(value) for value in values])
+
+    def at_points(self, *vectors: Vector) -> list[list[Any]]:
+        """The results at arrays of points; one that depends on no array may be a number."""
+        varying = frozenset(
+            i
+            for i, vector in enumerate(vectors)
+            if any(isinstance(value, np.ndarray) and value.ndim for value in vector)
+        )
+        with np.errstate(all="ignore"):
+            try:
+                return self._split(self._evaluator(varying)(vectors))
+            except (ArithmeticError, ValueError):  # of what depends on numbers alone
+                return self._split(self._evaluator(None)(vectors))
+
+    def _split(self, values: Sequence[Any]) -> list[list[Any]]:
+        parts = []
+        start = 0
+        for vector in self.outputs:
+            parts.append(list(values[start : start + len(vector)]))
+            start += len(vector)
+        return parts
+
+    def _evaluator(self, varying: frozenset[int] | None) -> "_Evaluator":
+        """The evaluator for arrays in these arguments; None for NumPy's operations throughout."""
+        if varying not in self._evaluators:
+            arrays = range(len(self.inputs)) if varying is None else varying
+            self._evaluators[varying] = _Evaluator(self, frozenset(arrays))
+        return self._evaluators[varying]
+
+
+class _Evaluator:
+    """All results of a recorded function, for arrays in some of its arguments."""
+
+    def __init__(self, function: Recorded, arrays: frozenset[int]) -> None:
+        self.function = function
+        self._calls = 0
+        self._evaluate: Callable[[Sequence[Vector]], Sequence[Any]] | None = None
+        self.beside = _of_arrays(function, arrays)
+
+    def __call__(self, vectors: Sequence[Vector]) -> Sequence[Any]:
+        self._calls += 1
+        if self._evaluate is None:
+            self._evaluate = _interpreted(self.function, self.beside)
+        if self._calls == PRINTED_AFTER:
+            self._evaluate = _printed(self.function, self.beside)
+        return self._evaluate(vectors)
+
+
+def _of_arrays(function: Recorded, arrays: frozenset[int]) -> set[int]:
+    """The identities of the nodes that are arrays if these arguments are."""
+    beside: set[int] = set()
+    for node in function.ordered:
+        if not node.arguments:
+            place = function.place.get(id(node))
+            if place is not None and place[0] in arrays:
+                beside.add(id(node))
+        elif any(id(argument) in beside for argument in node.arguments):
+            beside.add(id(node))
+    return beside
+
+
+class _Step(NamedTuple):
+    operation: Callable[..., Any]
+    target: int
+    sources: tuple[int, ...]
+    released: tuple[int, ...]
+    """Registers that no later step reads: their memory is used again while it is cached."""
+
+
+def _interpreted(
+    function: Recorded, beside: set[int]
+) -> Callable[[Sequence[Vector]], Sequence[Any]]:
+    """The function whose operations are called one after the other."""
+    register: dict[int, int] = {}
+    start: list[Any] = []
+    inputs: list[tuple[int, int, int]] = []
+    steps: list[_Step] = []
+
+    def place_of(node: Node) -> int:
+        if node.operation != CONSTANT:
+            return register[id(node)]
+        start.append(node.value)
+        return len(start) - 1
+
+    for node in function.ordered:
+        if not node.arguments:
+            argument, element = function.place[id(node)]
+            inputs.append((len(start), argument, element))
+        else:
+            sources = tuple(map(place_of, node.arguments))
+            table = OF_ARRAYS if id(node) in beside else _FAST_NUMBERS
+            steps.append(_Step(table[node.operation], len(start), sources, ()))
+        register[id(node)] = len(start)
+        start.append(None)
+    roots = [place_of(root) for root in function.roots]
+    program = _with_releases(steps, set(roots))
+
+    def evaluate(vectors: Sequence[Vector]) -> Sequence[Any]:
+        values = start.copy()
+        for target, argument, element in inputs:
+            values[target] = vectors[argument][element]
+        for operation, target, sources, released in program:
+            values[target] = operation(*[values[source] for source in sources])
+            for place in released:
+                values[place] = None
+        return [values[place] for place in roots]
+
+    return evaluate
+
+
+def _with_releases(steps: Sequence[_Step], roots: set[int]) -> list[_Step]:
+    """The steps with the registers that each is the last one to read."""
+    used = set(roots)
+    program = []
+    for step in reversed(steps):
+        released = tuple(set(step.sources) - used)
+        used.update(step.sources)
+        program.append(step._replace(released=released))
+    return program[::-1]
+
+
+# Printing
+
+_INFIX = {
+    Operation.ADD: "+",
+    Operation.SUBTRACT: "-",
+    Operation.MULTIPLY: "*",
+    Operation.DIVIDE: "/",
+}
+_FORMS = {
+    Operation.NEGATE: "-{0}",
+    Operation.INVERSE: "1.0 / {0}",
+    Operation.TWICE: "{0} + {0}",
+    Operation.SQUARE: "{0} * {0}",
+}
+_NUMBER_FORMS = {
+    Operation.MASK: "{1} if {0} else 0.0",
+    Operation.SELECT: "{1} if {0} else {2}",
+    Operation.LESS: "1.0 if {0} < {1} else 0.0",
+    Operation.LESS_EQUAL: "1.0 if {0} <= {1} else 0.0",
+    Operation.EQUAL: "1.0 if {0} == {1} else 0.0",
+    Operation.NOT_EQUAL: "1.0 if {0} != {1} else 0.0",
+    Operation.NOT: "0.0 if {0} else 1.0",
+    Operation.AND: "1.0 if {0} and {1} else 0.0",
+    Operation.OR: "1.0 if {0} or {1} else 0.0",
+}
+
+
+@functools.cache
+def _names() -> dict[str, Any]:
+    """The functions that a printed text calls: `a_` those of arrays, `n_` those of numbers."""
+    space: dict[str, Any] = {"inf": math.inf, "nan": math.nan}
+    for prefix, table in (("a_", OF_ARRAYS), ("n_", _FAST_NUMBERS)):
+        space |= {prefix + operation.name.lower(): of for operation, of in table.items()}
+    return space
+
+
+def _text(node: Node, names: Mapping[int, str]) -> str:
+    if node.operation != CONSTANT:
+        return names[id(node)]
+    return f"({node.value!r})" if node.value < 0 else repr(node.value)
+
+
+def _line(node: Node, texts: Sequence[str], of_arrays: bool) -> str:
+    """The right side of the assignment of a node."""
+    if node.operation in _INFIX:
+        return f"{texts[0]} {_INFIX[node.operation]} {texts[1]}"
+    if node.operation in _FORMS:
+        return _FORMS[node.operation].format(*texts)
+    if not of_arrays and node.operation in _NUMBER_FORMS:
+        return _NUMBER_FORMS[node.operation].format(*texts)
+    prefix = "a_" if of_arrays else "n_"
+    return f"{prefix}{node.operation.name.lower()}({', '.join(texts)})"
+
+
+def _printed(function: Recorded, beside: set[int]) -> Callable[[Sequence[Vector]], Sequence[Any]]:
+    """The function as Python text.
+
+    The name of a value is used again after its last use: its array is freed while it is cached.
+    """
+    last: dict[int, int] = {}
+    for node in function.ordered:
+        last.update((id(x), id(node)) for x in node.arguments)
+    for root in function.roots:
+        last.pop(id(root), None)
+    names: dict[int, str] = {}
+    free: list[str] = []
+    lines: list[str] = []
+    count = 0
+    for node in function.ordered:
+        if not node.arguments:
+            argument, element = function.place[id(node)]
+            names[id(node)] = f"x{argument}[{element}]"
+            continue
+        text = _line(node, [_text(x, names) for x in node.arguments], id(node) in beside)
+        for identity in {id(argument) for argument in node.arguments}:
+            name = names.get(identity, "")
+            if last.get(identity) == id(node) and name.startswith("v"):
+                free.append(name)
+        if free:
+            name = free.pop()
+        else:
+            name = f"v{count}"
+            count += 1
+        names[id(node)] = name
+        lines.append(f"    {name} = {text}")
+    arguments = "".join(f"x{i}, " for i in range(len(function.inputs)))
+    results = "".join(f"{_text(root, names)}, " for root in function.roots)
+    unpack = [f"    {arguments} = vectors"] if arguments else []
+    source = "\n".join(["def evaluate(vectors):", *unpack, *lines, f"    return ({results})"])
+    space = dict(_names())
+    exec(compile(source, "<recorded function>", "exec"), space)
+    evaluate: Callable[[Sequence[Vector]], Sequence[Any]] = space["evaluate"]
+    return evaluate
