@@ -26,7 +26,16 @@ PHYSICS = re.compile(
     r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE
 )
 # May be imported by other laws: the base, the solver, the validity range, the rubber of a wall.
-SHARED_LAWS = {"base", "solve", "validity_range", "rubber"}
+SHARED_LAWS = {
+    "base",
+    "beyond_range",
+    "calls",
+    "modes",
+    "rubber",
+    "sampling",
+    "solve",
+    "validity_range",
+}
 # Laws made of other laws, and the package itself.
 COMPOSITES = {"__init__", "scaled", "tangent", "polynomial_surrogate"}
 

@@ -304,13 +304,13 @@ def test_a_loop_that_fails_does_not_stop_the_others():
         {"controller.gain": gains},
         loop,
         duration=4.0,
-        integrator=RungeKutta4(0.2),
+        integrator=RungeKutta4(0.15),
         output_times=0.1,
         cores=1,
     )
     for row, gain in enumerate(gains):
         own = dataclasses.replace(loop, controller=dataclasses.replace(PI, gain=gain))
-        solution = solve(Problem(LIFT, own, 4.0, integrator=RungeKutta4(0.2), output_times=0.1))
+        solution = solve(Problem(LIFT, own, 4.0, integrator=RungeKutta4(0.15), output_times=0.1))
         assert Status(int(batch.status[row])) == solution.status
         if solution.status == Status.DONE:  # also in the arrays of a run that failed
             expected = solution.recording["pressure"]

@@ -105,7 +105,7 @@ def test_without_friction_a_plant_is_what_it_was():
     muscle = chosen_muscle()
     p, c, v = map(nodes.symbol, "pcv")
     bare = (
-        muscle.contractile.force(p, c)
+        muscle.contractile_force(p, c)
         - muscle.spring.force(p, c, 0.2)
         - muscle.damper.force(p, c, v)
     )

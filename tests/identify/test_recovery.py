@@ -38,7 +38,9 @@ def law_of(name: str):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         entry = library.load(name)
-    return entry.characteristic, entry.validity_range or ValidityRange(1e5, 6e5, 0.0, 0.2)
+    law = entry.characteristic
+    most = min(6e5, law.pressure_range[1])
+    return law, entry.validity_range or ValidityRange(1e5, most, 0.0, 0.2)
 
 
 def recoverable() -> list[str]:

@@ -6,6 +6,7 @@ N. Solutions are searched within the validity range; outside it a surface is fla
 extrapolated linearly.
 """
 
+import contextlib
 import dataclasses
 
 import numpy as np
@@ -151,8 +152,29 @@ def test_the_traced_model_gives_the_numeric_values():
     pressure = np.linspace(-1e5, 5e5, 30)
     force = np.linspace(0.0, 400.0, 30)
     values, by_parameters = autodiff.jacobian(EXPONENTIAL, "contraction", pressure, force)
-    assert values == pytest.approx(EXPONENTIAL.contraction(pressure, force), abs=1e-14)
+    assert values == pytest.approx(EXPONENTIAL.surface(pressure, force), abs=1e-14)
     assert by_parameters.shape == (30, 15 + 4 + 1)
+
+
+@pytest.mark.parametrize(
+    ("pressure", "force"), [(6e5, 200.0), (3e5, 300.0), (3e5, 20.0), (-1e4, 200.0)]
+)
+@pytest.mark.parametrize(
+    "law",
+    [EXPONENTIAL, load("borzikova-direct-repaired").characteristic],
+    ids=lambda law: type(law).__name__,
+)
+def test_no_direction_answers_outside_the_range_of_the_surface(law, pressure, force):
+    with pytest.raises(SolveError, match=r"outside the validity range of the surface, 0 to 350"):
+        law.contraction(pressure, force)
+    contraction = float(law.surface(pressure, force))
+    for direction, argument, (low, high) in (
+        (law.force, pressure, law.force_range),
+        (law.pressure, force, law.pressure_range),
+    ):
+        given = (argument, contraction) if direction == law.force else (contraction, argument)
+        with contextlib.suppress(SolveError):  # another point of the surface, which is inside
+            assert low <= direction(*given) <= high
 
 
 def test_the_misprinted_surface_loads_with_a_warning():

@@ -67,6 +67,9 @@ def test_texts_lists_and_integers_are_the_numbers_that_they_state(law, method, t
     ):  # it does not contract by 20 %
         texts = (texts[0], "5 %")
         numbers = (numbers[0], 0.05)
+    if isinstance(law, PressureLaw) and method == "pressure":  # at 20 % it is slack
+        texts = ("5 %", texts[1])
+        numbers = (0.05, numbers[1])
     expected = call(*numbers)
     assert call(*texts) == expected == call(numbers[0], texts[1])
     names = {"force": ("pressure", "contraction"), "contraction": ("pressure", "force")}.get(method)

@@ -10,9 +10,19 @@ import numpy as np
 import pytest
 from widths import widened
 
+from airmuscle.bench import approximate
+from airmuscle.core import model, parameter
 from airmuscle.errors import AirmuscleWarning, SolveError
 from airmuscle.files import library
-from airmuscle.physics import Braid, ChouHannaford1996, Tabulated, ValidityRange, as_force_law
+from airmuscle.physics import (
+    Braid,
+    ChouHannaford1996,
+    ContractileSurface,
+    ForceLaw,
+    Tabulated,
+    ValidityRange,
+    as_force_law,
+)
 from airmuscle.physics.muscle.characteristic.polynomial_surrogate import (
     estimate_maximum,
     values_or_nan,
@@ -79,7 +89,7 @@ def _points(validity_range: ValidityRange) -> tuple[np.ndarray, ...]:
 
 def test_a_law_has_a_solution_at_the_same_points_one_by_one_and_all_at_once():
     law = library.load("borzikova-monotone").characteristic
-    p, c = np.meshgrid(np.linspace(5e4, 4e5, 5), np.linspace(0.01, 0.3, 5))
+    p, c = np.meshgrid(np.linspace(5e4, 3.5e5, 5), np.linspace(0.01, 0.3, 5))
     single = [
         values_or_nan(law.force, *(np.array([float(v)]) for v in point))[0]
         for point in zip(p.ravel(), c.ravel(), strict=True)
@@ -142,3 +152,31 @@ def test_the_search_finds_the_maximum_at_the_edge_of_the_region_with_a_solution(
     y, x = np.meshgrid(NODES, NODES)
     assert np.nanmax(steep(x, y)) < 0.1
     assert _estimated(steep) == pytest.approx(1.0, abs=0.01)
+
+
+@model
+class PoleLaw(ForceLaw):
+    """A law of a user that is infinite within its range: F = p a/(eps - 0.1)^2."""
+
+    area: float = parameter("m2", "a", "area", bounds=(0.0, 1.0))
+
+    def force(self, pressure, contraction):
+        return pressure * self.area / (contraction - 0.1) ** 2
+
+
+@pytest.mark.parametrize(
+    "sample",
+    [
+        lambda law, known: as_force_law(law, known, degree=3),
+        lambda law, known: approximate(law, ContractileSurface.blank(3), known),
+    ],
+    ids=["as_force_law", "approximate"],
+)
+def test_what_is_infinite_or_not_approximated_is_refused_by_every_fit_of_a_law(sample):
+    law = PoleLaw(1e-4)
+    with pytest.raises(SolveError, match=r"does not approximate the law|is unbounded at a"):
+        sample(law, ValidityRange(1e5, 6e5, 0.0, 0.2))
+    beside = ValidityRange(1e5, 6e5, 0.13, 0.2)  # a smaller range, as the message proposes
+    assert sample(law, beside) is not None
+    with pytest.raises(SolveError, match=r"is unbounded at a contraction of .* such as"):
+        sample(PoleLaw(5e-3), ValidityRange(1e5, 6e5, 0.0, 0.0999))

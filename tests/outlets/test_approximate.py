@@ -8,6 +8,7 @@ parts of the muscle stay.
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -138,3 +139,30 @@ def test_what_cannot_be_converted_is_refused(arguments, message, tmp_path):
     assert result.exit_code == 1
     assert message in result.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("limits", [(), ("--min-contraction", "0.01 %")])
+def test_an_approximation_of_an_infinite_force_is_refused_and_the_remedy_works(limits, tmp_path):
+    out = tmp_path / "m.toml"
+    command = ("approximate", "saga2007", "ContractileSurface")
+    refused = airmuscle(*command, *limits, "--out", out)
+    assert refused.exit_code == 1
+    assert not out.exists()
+    assert "RuntimeWarning" not in refused.stderr
+    if limits:
+        assert "does not approximate the law: its rms error is" in refused.stderr
+        assert "Choose a smaller validity range" in refused.stderr
+        proposed = ("1 %", "40 %")
+    else:
+        said = r"the force of Saga2007 is unbounded at a contraction of 0 % .* from (.*) to (.*)\."
+        proposed = re.search(said, refused.stderr).groups()
+    ends = ("--min-contraction", proposed[0], "--max-contraction", proposed[1])
+    done = airmuscle(*command, *ends, "--out", out, "--json")
+    assert done.exit_code == 0, done.stderr
+    errors = json.loads(done.stdout)["approximation"]
+    surface = load(out).characteristic
+    assert errors["rms_error"] < 30.0
+    assert np.abs(surface.coefficients).max() < 1e4
+    assert surface.force(1e5, 0.2) == pytest.approx(
+        load("saga2007").characteristic.force(1e5, 0.2), abs=60
+    )

@@ -222,9 +222,14 @@ def test_pressure_starts_at_that_of_a_thin_ring():
 def test_straight_fibres_hold_any_tension():
     for law in (DEFAULT, circular_meridian(LINE_A)):
         start = law.threshold_pressure
-        for at in (0.0, np.array([0.0])):
-            assert law.force(2 * start, at) > 1e150
-            assert law.force(start / 2, at) < -1e150
+        for pull, pressure in ((1.0, 2 * start), (-1.0, start / 2)):
+            nearly_straight = np.array([law.force(pressure, at) for at in (1e-8, 1e-12, 1e-16)])
+            assert (np.diff(pull * nearly_straight) > 0).all()
+            assert nearly_straight[1] / nearly_straight[0] == pytest.approx(100.0, rel=1e-2)
+        for at in (0.0, np.array([0.1, 0.0])):
+            with pytest.raises(GeometryLimitError, match="straight and the force is infinite"):
+                law.force(2 * start, at)
+        assert law.force(2 * start, 1e-4) > 0  # what the message proposes
 
 
 def test_small_contraction_loses_no_digits():

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core import IdentificationError, SolveError, contraction_text, quantity_text
 from ...physics.muscle.characteristic import Characteristic, ValidityRange, values_or_nan
+from ...physics.muscle.characteristic.sampling import check_approximates, sample_force
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.shown import parameter_table
@@ -120,7 +121,8 @@ def approximate(
 
     `other` gives the structure and the initial values, as in `fit`. Only points where `law` gives a
     positive force are used. Raises IdentificationError where the validity range does not determine
-    the parameters of `other`, SolveError where `law` gives no positive force on it.
+    the parameters of `other`, SolveError where `law` gives no positive force on it or an infinite
+    one, and for a result that does not approximate it.
     """
     data = sample_on_grid(law, validity_range, GRID_POINTS)
     target = other
@@ -140,6 +142,9 @@ def approximate(
             f" {len(check_points)} points where {type(law).__name__} has one, the first at"
             f" {p / 1e3:.4g} kPa and {100 * c:.2f} %. Choose a smaller validity range."
         )
+    check_approximates(
+        "approximate", f"the fitted {type(other).__name__}", difference, check_points["force"]
+    )
     worst = int(np.argmax(np.abs(difference)))
     rmse = float(np.sqrt(np.mean(difference**2)))
     point = WorstPoint(
@@ -153,7 +158,7 @@ def approximate(
 def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:
     """The forces of a law on a Chebyshev-Lobatto grid of the validity range, `count` points in each
     direction. Points without a positive force are omitted. Raises SolveError where no point is
-    left."""
+    left, and where the force is infinite."""
     nodes = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
     p_low, p_high = validity_range.pressure
     c_low, c_high = validity_range.contraction
@@ -162,7 +167,7 @@ def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: in
     )
     p = pressure.ravel()
     c = contraction.ravel()
-    force = values_or_nan(law.force, p, c)
+    force = sample_force("approximate", law, validity_range, p, c)
     pulls = force > 0
     if not pulls.any():
         raise SolveError(

@@ -26,6 +26,7 @@ from ...physics.muscle.characteristic import (
     PooledLengthLaw,
     PressureLaw,
 )
+from ...physics.muscle.characteristic.modes import formula_alone
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from .weighting import UNCENSORED, Censoring
@@ -98,7 +99,7 @@ def of_length(law: Any, length: float | None) -> Any:
 
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
     """The values of `law.method(*arguments)` at every row, with the law of its specimen or resting
-    length; (N,).
+    length; (N,). They are those of the formula, also beyond the range of a law.
     """
     laws: list[tuple[Any, slice | npt.NDArray[np.intp]]]
     if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
@@ -112,8 +113,9 @@ def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording)
             (of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)
         ]
     values = np.zeros(len(data))
-    for single, rows in laws:
-        values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
+    with formula_alone():
+        for single, rows in laws:
+            values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
     return values
 
 

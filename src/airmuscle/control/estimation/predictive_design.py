@@ -9,7 +9,7 @@ import numpy as np
 from ...core import Array, Parameter, ParameterError, Reference, model, parameter
 from ...engine.loop.controller import Measurement, MultivariableController, relative_unit
 from ...physics.analysis.linear_model import LinearModel, linearise
-from ...physics.equilibrium import find_equilibrium
+from ...physics.equilibrium import nearest_equilibrium
 from ...physics.plant.plant import Plant
 from ..laws import CHISCI2001, RAWLINGS2017, LinearModelPredictive
 from ..laws.linear_model_predictive import CondensedProblem, ObservedModel, PredictiveMemory
@@ -231,7 +231,7 @@ class PredictiveControl(MultivariableController):
         }
         lower = numbers["minimum"]
         upper = numbers["maximum"]
-        state = find_equilibrium(
+        state = nearest_equilibrium(
             self.plant, pressure=self.pressures, inputs=numbers["operating_inputs"]
         )
         linear = linearise(self.plant, state, numbers["operating_inputs"]).select(

@@ -12,7 +12,7 @@ from ...core import ParameterError, ShortRepr, check_field_types, leaves
 from ...engine.loop import ColumnSensor, Driver, SolenoidDriver
 from ...files.library.loading import load_law
 from ...physics import Dahl, JointWithExternalTorque, LinearDamper, Plant
-from ...physics.equilibrium import find_equilibrium
+from ...physics.equilibrium import nearest_equilibrium
 from ...physics.pneumatics import FillDischarge, Orifice, Polytropic, Supply, TubeOrifice, Valve
 from ..tuning import RobustObjective
 from .tasks import DEGREE, ControlTask, SineMotion, commissioning_tasks, tuning_tasks
@@ -126,7 +126,7 @@ class BenchmarkJoint(ShortRepr):
 
     def start(self, plant: Plant) -> dict[str, float]:
         """The initial state of a plant: its equilibrium at the mean pressure in both muscles."""
-        return find_equilibrium(plant, pressure=self.mean_pressure)
+        return nearest_equilibrium(plant, pressure=self.mean_pressure)
 
 
 def kinds_of(plant: Plant) -> dict[str, set[str]]:

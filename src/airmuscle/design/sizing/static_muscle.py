@@ -13,6 +13,7 @@ from ...core import Array, ParameterError, ShortRepr, SolveError
 from ...files.library import Entry, own_length, scale_entry
 from ...physics.muscle import LENGTH_BOUNDS, Muscle
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from ...physics.muscle.characteristic.modes import formula_alone
 
 LEAST_DIAMETERS = 3.0
 """Least nominal length over the nominal diameter (chosen). The makers state one range of lengths
@@ -186,15 +187,16 @@ def _solve_for_force(law: Characteristic, pressure: Any, contraction: Any) -> An
         np.asarray(pressure, dtype=float), np.asarray(contraction, dtype=float)
     )
     low, high = (np.full(p.shape, limit) for limit in law.force_range)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        above = (
-            law.contraction(p, middle) < eps
-            if isinstance(law, ContractionLaw)
-            else law.pressure(eps, middle) > p
-        )
-        low = np.where(above, low, middle)
-        high = np.where(above, middle, high)
+    with formula_alone():  # a bisection looks beyond the range
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            above = (
+                law.contraction(p, middle) < eps
+                if isinstance(law, ContractionLaw)
+                else law.pressure(eps, middle) > p
+            )
+            low = np.where(above, low, middle)
+            high = np.where(above, middle, high)
     return 0.5 * (low + high)
 
 

@@ -18,7 +18,7 @@ from ...core import (
 )
 from ...core.errors import ParameterError, PhysicsError, check_known
 from ...engine.loop import Controller, ControlLoop
-from ...physics.equilibrium import find_equilibrium
+from ...physics.equilibrium import nearest_equilibrium
 from ...physics.plant.plant import Plant
 
 DIGITS = 5
@@ -157,7 +157,7 @@ class LoopCase(ShortRepr):
         if self.initial_state is not None:
             return dict(self.initial_state)
         try:
-            return find_equilibrium(self.plant, pressure=0.0)
+            return nearest_equilibrium(self.plant, pressure=0.0)
         except PhysicsError as error:
             raise error.located(f"case '{self.name}'") from None
 

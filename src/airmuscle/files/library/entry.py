@@ -30,6 +30,7 @@ from ...physics.muscle import (
     Stop,
     Wall,
 )
+from ...physics.muscle.characteristic.calls import with_stated_range
 from ...physics.pneumatics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Orifice
 from ...report.chapter import Table
 from .entry_display import CHECK_UNITS, EntryDisplay
@@ -145,6 +146,12 @@ class Entry(EntryDisplay):
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
     uncertainty: ParameterUncertainty | None = None
     error_band: StatedBand | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        permitted = None if self.ratings is None else self.ratings.max_force
+        law = with_stated_range(self.characteristic, self.validity_range, permitted)
+        object.__setattr__(self, "characteristic", law)
 
     @property
     def muscle(self) -> Muscle:

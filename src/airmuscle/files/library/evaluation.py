@@ -19,6 +19,7 @@ from ...core.errors import (
     SolveError,
 )
 from ...physics.muscle.characteristic import ForceLaw, ValidityRange, validity_range_of
+from ...physics.muscle.characteristic.calls import silent_beyond_range
 from ...physics.muscle.isobars import (
     Isobars,
     WorkingPoint,
@@ -170,7 +171,8 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
                 f"contraction: {100 * contraction:.6g} % is outside the range of"
                 f" {type(law).__name__}, {100 * low:.4g} to {100 * high:.4g} %.{hint}"
             )
-    point = WorkingPoint(**values, **{solved: float(getattr(law, solved)(*values.values()))})
+    with silent_beyond_range():  # the warnings below name the range of the entry
+        point = WorkingPoint(**values, **{solved: float(getattr(law, solved)(*values.values()))})
     if not math.isfinite(sum(point)) or (
         solved == "contraction" and not -0.5 <= point.contraction < 1.0
     ):

@@ -18,7 +18,7 @@ import numpy as np
 from ...bench.identify.dynamic import InitialConditions
 from ...core import EquilibriumError, HintedText, ParameterError
 from ...physics import Coordinate, Plant
-from ...physics.equilibrium import find_equilibrium
+from ...physics.equilibrium import nearest_equilibrium
 from ...recording import Recording
 from ..library.files import Location, check_keys, located_errors, read_finite_number, read_table
 
@@ -87,7 +87,7 @@ def build_initial_state(
             return plant.state_at(pressure=pressures, **values)
         try:
             return (
-                find_equilibrium(plant, pressure=tuple(pressures))
+                nearest_equilibrium(plant, pressure=tuple(pressures))
                 if equilibrium is None
                 else equilibrium
             )

@@ -3,6 +3,7 @@ plants.
 """
 
 import dataclasses
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -11,19 +12,21 @@ import numpy.typing as npt
 
 from ...core import (
     AirmuscleError,
+    AirmuscleWarning,
     Array,
     EquilibriumError,
     ParameterError,
     System,
     one_line,
     quantity,
+    select_prefix,
 )
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.inputs import check_input_names
 from ..plant.static_plant import StaticPlant
 from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
 from .stability import are_stable, equilibria_of_several_coordinates, no_equilibrium
-from .statics import Rows, Statics
+from .statics import Rows, Statics, shut_air_pressure
 
 MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 """One number for all muscles, or one for each; None where the other quantity is given."""
@@ -123,14 +126,53 @@ def find_equilibrium(
     """The stable equilibrium whose muscles are nearest to full length; arguments are those of
     `find_equilibria`.
 
-    Nearest to full length is the smallest sum of squared contractions. Raises EquilibriumError,
-    with the muscles and their forces, if no stable equilibrium is found.
+    Nearest to full length is the smallest sum of squared contractions. An AirmuscleWarning names
+    the muscles whose law is outside its range there. Raises EquilibriumError, with the muscles and
+    their forces, if no stable equilibrium is found.
     """
     one = _statics(plant, pressure, air_mass, inputs)
+    state = _nearest_state(one)
+    if texts := _range_excesses(plant, one, state):
+        warnings.warn(
+            f"find_equilibrium: {' '.join(texts)} The equilibrium is extrapolated.",
+            AirmuscleWarning,
+            stacklevel=3,
+        )
+    return state
+
+
+def nearest_equilibrium(
+    plant: StaticPlant,
+    *,
+    pressure: MuscleValues = None,
+    inputs: Mapping[str, float] | None = None,
+) -> dict[str, float]:
+    """That of `find_equilibrium`, for the beginning of a run, whose notes name the ranges."""
+    return _nearest_state(_statics(plant, pressure, None, inputs))
+
+
+def _nearest_state(one: Statics) -> dict[str, float]:
     state = _nearest(one)[0]
     if not np.isfinite(state).all():
         raise no_equilibrium(one)
     return dict(zip(one.names, state.tolist(), strict=True))
+
+
+def _range_excesses(plant: StaticPlant, one: Statics, state: Mapping[str, float]) -> list[str]:
+    """Sentences on the muscles whose contractile element is outside its range at a state."""
+    texts = []
+    contractions = plant.mechanism.contractions(state, plant.resting_lengths)
+    for prefix, muscle, air, contraction in zip(
+        plant.prefixes, plant.muscles, one.air, contractions, strict=True
+    ):
+        pressure = air
+        if one.shut:
+            pressure = float(shut_air_pressure(plant, muscle, air, np.array(contraction)))
+        inner = muscle.inner_contraction(contraction, select_prefix(prefix, state))
+        excess = muscle.range_excess(float(pressure), float(inner))
+        if excess:
+            texts.append(f"{muscle.name}: {excess}.")
+    return texts
 
 
 def find_equilibrium_of_each(

@@ -2,6 +2,7 @@
 volume.
 """
 
+import functools
 import textwrap
 import warnings
 from collections.abc import Mapping
@@ -22,6 +23,8 @@ from ...core import (
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
 from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, VirtualWork
+from .characteristic.beyond_range import ForceRange, extended_force
+from .characteristic.calls import excesses, with_stated_range
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
@@ -148,6 +151,9 @@ class Muscle(QuantityMethods, NotebookDisplay):
         return Card("Muscle" if self.name == "muscle" else f"Muscle {self.name}", rows, self.plot)
 
     def check(self) -> None:
+        permitted = None if self.ratings is None else self.ratings.max_force
+        stated = with_stated_range(self.contractile, self.validity_range, permitted)
+        object.__setattr__(self, "contractile", stated)
         if not self.name:
             raise ParameterError("Muscle: name is ''; it must be a non-empty text, such as 'left'.")
         if isinstance(self.series, ElasticSeriesElement):
@@ -306,13 +312,29 @@ class Muscle(QuantityMethods, NotebookDisplay):
         is slack.
         """
         total = (
-            self.contractile.force(pressure, contraction)
+            self.contractile_force(pressure, contraction)
             - self.spring.force(pressure, contraction, self.geometry.resting_length)
             - self.damper.force(pressure, contraction, speed)
             - self.friction_force(pressure, speed, state)
         )
         relaxed = {s.name: 0.0 for s in self.creep.states}
         return total - self.creep.force({**relaxed, **state}) if relaxed else total
+
+    def contractile_force(self, pressure: Value, contraction: Value) -> Value:
+        """Force of the contractile element [N] at a gauge pressure [Pa] and a contraction; outside
+        its range that of a stretched sleeve or of a slack muscle, and limited (`extended_force`).
+        """
+        return extended_force(self.contractile, self._force_range, pressure, contraction)
+
+    @functools.cached_property
+    def _force_range(self) -> ForceRange:
+        permitted = None if self.ratings is None else self.ratings.max_force
+        return ForceRange.of(self.contractile, self.validity_range, permitted)
+
+    def range_excess(self, pressure: float, contraction: float) -> str:
+        """Text on how far a gauge pressure [Pa] and a contraction of the contractile element are
+        outside its range; empty inside."""
+        return "; ".join(excesses(self._force_range, pressure, contraction))
 
     def static_force(self, pressure: Value, contraction: Value) -> Value:
         """Sum of the forces of all elements and the end stop [N] at zero speed, friction and creep

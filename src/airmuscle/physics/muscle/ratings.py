@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from ...core import INFINITY, ParameterError, model, parameter, parameters
-from .characteristic.validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS
+from .characteristic.validity_range import CONTRACTION_BOUNDS, FORCE_BOUNDS, PRESSURE_BOUNDS
 
-FORCE_BOUNDS = (0.0, 1e6)
 LENGTH_BOUNDS = (1e-3, 20.0)
 TEMPERATURE_BOUNDS = (1.0, 1000.0)
 """Physical bounds; a limit that is not stated is equal to its bound."""

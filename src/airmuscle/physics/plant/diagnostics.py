@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...core import describe_model
+from ...core import Array, describe_model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle, RatedRange
+from ..muscle.characteristic import values_or_nan
 from ..muscle.friction import NoFriction
 
 MARGIN = 1e-3
@@ -161,6 +162,11 @@ def _shown_unit(quantity: str) -> tuple[float, str]:
     )
 
 
+def _forces_at(muscle: Muscle, contractions: Array) -> Array:
+    """Forces of the contractile element at 1 bar, NaN where it has none."""
+    return values_or_nan(muscle.contractile.force, np.full(contractions.shape, 1e5), contractions)
+
+
 def geometry_limit_hint(muscle: Muscle, contraction: float) -> str:
     """Remedy for a muscle whose contractile part is at a limit of its geometry; empty if it is not
     at a limit.
@@ -174,8 +180,7 @@ def geometry_limit_hint(muscle: Muscle, contraction: float) -> str:
     if low + margin < inner < high - margin:
         return ""
     inside = float(np.clip(inner, low + margin, high - margin))
-    with np.errstate(all="ignore"):
-        there, near = (float(abs(muscle.contractile.force(1e5, each))) for each in (inner, inside))
+    there, near = (abs(float(force)) for force in _forces_at(muscle, np.array([inner, inside])))
     if not there <= SINGULAR_FACTOR * max(near, 1.0):
         return (
             f"At a contraction of {100 * inner:.2f} %, an end of the geometry of {muscle.name}, the"

@@ -164,7 +164,7 @@ def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
     if isinstance(part.series, ElasticSeriesElement):
         absorbed = absorbed + muscle.tension * (speed - muscle.speed)
     powers = {
-        "work_of_contractile": part.contractile.force(pressure, inner) * speed,
+        "work_of_contractile": part.contractile_force(pressure, inner) * speed,
         "element_work": absorbed,
         "damping_heat": part.damper.force(pressure, inner, speed) * speed,
     }

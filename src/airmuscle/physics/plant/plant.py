@@ -14,7 +14,7 @@ from ...core import Array, GeometryLimitError, ParameterError, Value, Values, mo
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ...engine.compile.program import compile_system
-from ..equilibrium.equilibrium import complete_inputs, find_equilibrium, find_equilibrium_of_each
+from ..equilibrium.equilibrium import complete_inputs, find_equilibrium_of_each, nearest_equilibrium
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
@@ -116,7 +116,7 @@ class Plant(PlantDisplay, StaticPlant):
 
     def default_state(self) -> dict[str, float]:
         """The state of `find_equilibrium` at gauge pressure 0 and inputs 0."""
-        return find_equilibrium(self, pressure=0.0)
+        return nearest_equilibrium(self, pressure=0.0)
 
     def default_states(self, parameters: Array) -> Array:
         """The same (N, n) for plants of this structure with parameters (N, P); NaN where there is

@@ -25,7 +25,8 @@ from ....core import (
 from ....engine import InputSignal, PiecewiseLinear
 from ....engine.compile.cache.kernel import newton
 from ....engine.compile.function import Function
-from ....physics import Plant, find_equilibrium
+from ....physics import Plant
+from ....physics.equilibrium import nearest_equilibrium
 from ....physics.plant.validation import check_pressures
 
 PRESSURE_STEP = 100.0
@@ -65,7 +66,7 @@ class InitialConditions:
         """
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
         return _steady_conditions(
-            plant, find_equilibrium(plant, pressure=tuple(pressures)), pressures, at_rest=True
+            plant, nearest_equilibrium(plant, pressure=tuple(pressures)), pressures, at_rest=True
         )
 
     @classmethod

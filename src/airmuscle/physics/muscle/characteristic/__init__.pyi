@@ -41,5 +41,5 @@ from .virtual_work import VirtualWork as VirtualWork
 # For the other rooms, not in __all__
 from .contractile_surface import HOSOVSKY_HILL as HOSOVSKY_HILL
 from .energy_defect import EnergyDefect as EnergyDefect
-from .solve import values_or_nan as values_or_nan
+from .modes import values_or_nan as values_or_nan
 from .validity_range import validity_range_of as validity_range_of

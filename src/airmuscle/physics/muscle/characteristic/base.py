@@ -8,8 +8,9 @@ returned: the smallest contraction, pressure or force in equilibrium.
 """
 
 import abc
+import inspect
 from collections.abc import Callable, Iterable
-from typing import ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 from ....core import (
     INFINITY,
@@ -23,20 +24,14 @@ from ....core import (
 )
 from ....core.declaration import forwarded
 from ..quantity_arguments import QuantityMethods, Units
+from .beyond_range import SEARCHED_CONTRACTIONS
+from .calls import Slopes, in_range
+from .modes import formula_alone
 from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
 from .validity_range import MeasuredPoints
 
 MIN_PRESSURE = 1e-300
 """Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
-
-
-class Slopes(NamedTuple):
-    """Partial derivatives of the tension at a point of the surface."""
-
-    by_pressure: Value
-    """dF/dp at constant contraction [N/Pa]."""
-    by_contraction: Value
-    """dF/deps at constant pressure [N]; its negative is the stiffness per unit of contraction."""
 
 
 class Characteristic(QuantityMethods, abc.ABC):
@@ -52,6 +47,8 @@ class Characteristic(QuantityMethods, abc.ABC):
     """Whether the model is in closed form over `ops`; otherwise a plant uses it through
     `as_force_law`.
     """
+    refuses_beyond: ClassVar[bool] = False
+    """Whether the methods of the law refuse points beyond its range themselves."""
     redundant: ClassVar[tuple[str, ...]] = ()
     """Parameters that a fit keeps at those of `guess`, because they only scale other parameters."""
     argument_units: ClassVar[Units] = {
@@ -62,6 +59,13 @@ class Characteristic(QuantityMethods, abc.ABC):
         "stiffness": ("Pa", "1"),
     }
     check_ratio = staticmethod(warn_above_whole_length)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        for name in ("force", "contraction", "pressure", "slopes"):
+            method = cls.__dict__.get(name)
+            if inspect.isfunction(method) and not getattr(method, "__isabstractmethod__", False):
+                setattr(cls, name, in_range(name, method))
+        super().__init_subclass__(**options)
 
     @classmethod
     def guess(cls, data: MeasuredPoints) -> Self:
@@ -106,7 +110,24 @@ class Characteristic(QuantityMethods, abc.ABC):
     @property
     def contraction_range(self) -> tuple[float, float]:
         """Minimum and maximum contraction [1] of a solution; geometric models restrict it."""
-        return (-0.05, 0.6)
+        return SEARCHED_CONTRACTIONS
+
+    @property
+    def begins_at_straight_fibres(self) -> bool:
+        """Whether the range begins with straight fibres, whose force is infinite."""
+        return False
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether limits are applied to the force, as which `unclamped_force` differs from it."""
+        return type(self).unclamped_force is not Characteristic.unclamped_force
+
+    @property
+    def formula_range(self) -> tuple[Value, Value]:
+        """Minimum and maximum contraction [1] of the formula in a muscle without a validity range;
+        the parameters may be symbols.
+        """
+        return self.contraction_range
 
     @abc.abstractmethod
     def force(self, pressure: Value, contraction: Value) -> Value:
@@ -115,8 +136,11 @@ class Characteristic(QuantityMethods, abc.ABC):
         """
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N] before any limit is applied; fits evaluate the residuals with it."""
-        return self.force(pressure, contraction)
+        """Tension [N] before any limit is applied, the formula also beyond the range; fits
+        evaluate the residuals with it.
+        """
+        with formula_alone():
+            return self.force(pressure, contraction)
 
     @abc.abstractmethod
     def contraction(self, pressure: Value, force: Value) -> Value:

@@ -5,6 +5,8 @@ The coefficients are given as printed in the paper, in per cent, bar and newton.
 when used and are not refitted.
 """
 
+import abc
+from collections.abc import Callable
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +23,8 @@ from ....core import (
 )
 from ....core.units import bar, percent
 from .base import ContractionLaw
+from .modes import is_formula_alone
+from .solve import check_solution, describe_range
 
 BORZIKOVA = published("borzikova-sam")
 
@@ -128,6 +132,7 @@ class _PolynomialSurface(ContractionLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (BORZIKOVA,)
+    refuses_beyond: ClassVar[bool] = True
 
     coefficients: tuple[float, ...] = parameter(
         "1/(bar^i N^j)",
@@ -174,6 +179,46 @@ class _PolynomialSurface(ContractionLaw):
         in_pressure = ops.both(pressure >= self.min_pressure, pressure <= self.max_pressure)
         return ops.both(in_pressure, ops.both(force >= self.min_force, force <= self.max_force))
 
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        self._check_pressure(pressure + 0.0 * contraction)
+        return super().force(pressure, contraction)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        self._check_force(force + 0.0 * contraction)
+        return super().pressure(contraction, force)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        if not is_formula_alone():  # a search looks beyond the range
+            self._check_pressure(pressure + 0.0 * force)
+            self._check_force(force + 0.0 * pressure)
+        return self.surface(pressure, force)
+
+    def _check_pressure(self, pressure: Value) -> None:
+        """Raise SolveError for a gauge pressure [Pa] outside the validity range."""
+        self._check(pressure, self.pressure_range, lambda p: f"{p / 1e3:.4g} kPa is")
+
+    def _check_force(self, force: Value) -> None:
+        """Raise SolveError for a tension [N] outside the validity range."""
+        self._check(force, self.force_range, lambda f: f"{f:.4g} N is")
+
+    def _check(
+        self, value: Value, limits: tuple[float, float], text: Callable[[float], str]
+    ) -> None:
+        def message(number: float, _: float) -> str:
+            pressures = describe_range(self.min_pressure / 1e3, self.max_pressure / 1e3, "kPa")
+            return (
+                f"{type(self).__name__}: {text(number)} outside the validity range of the surface,"
+                f" {pressures} and {describe_range(*self.force_range, 'N')}. Choose a point inside,"
+                " or fit a law to measurements there."
+            )
+
+        check_solution(value, limits, (value, value), message)
+
+    @abc.abstractmethod
+    def surface(self, pressure: Value, force: Value) -> Value:
+        """Contraction [1] at a gauge pressure [Pa] and a tension [N], extrapolated outside the
+        validity range."""
+
     def polynomial(self, pressure: Value, force: Value) -> Value:
         """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; linear extrapolation outside
         the validity range.
@@ -205,7 +250,7 @@ class BorzikovaDirect(_PolynomialSurface):
     which belongs to this polynomial and not to the exponent of equation (1).
     """
 
-    def contraction(self, pressure: Value, force: Value) -> Value:
+    def surface(self, pressure: Value, force: Value) -> Value:
         return percent * self.polynomial(pressure, force)
 
 
@@ -224,5 +269,5 @@ class BorzikovaExponential(_PolynomialSurface):
         "1", "k_max", "saturation contraction", bounds=(1e-3, 1.0), kw_only=True
     )
 
-    def contraction(self, pressure: Value, force: Value) -> Value:
+    def surface(self, pressure: Value, force: Value) -> Value:
         return self.saturation * (1.0 - ops.exp(self.polynomial(pressure, force)))

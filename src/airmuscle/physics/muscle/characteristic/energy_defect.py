@@ -9,6 +9,7 @@ import numpy as np
 from ....core import Array, SolveError
 from ..geometry.base import Geometry
 from .base import Characteristic
+from .modes import values_or_nan
 from .validity_range import ValidityRange
 
 _POINTS = 41
@@ -94,7 +95,9 @@ def _largest(
         for limits in (validity_range.pressure, validity_range.contraction)
     )
     p, c = (side.reshape(-1) for side in np.meshgrid(*edges))
-    taut = np.asarray(law.force(p, c)) > 0
+    force = values_or_nan(law.force, p, c)
+    taut = force > 0
+    slack = float(np.mean(force[np.isfinite(force)] <= 0)) if np.isfinite(force).any() else 1.0
     if not taut.any():
         raise SolveError(
             f"{type(law).__name__} is slack in its whole validity range; the defect is not defined."
@@ -109,6 +112,4 @@ def _largest(
     worst = float(difference[at])
     scale = float(np.abs(expected).max())
     relative = worst / scale if scale > 0 else math.nan
-    return EnergyDefect(
-        worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean())
-    )
+    return EnergyDefect(worst, unit, float(p[at]), float(c[at]), relative, slack=slack)

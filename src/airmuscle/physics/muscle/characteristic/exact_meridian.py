@@ -11,7 +11,8 @@ from ....core import Array, Reference, Value, model, parameter
 from ..geometry.base import Profile, check_contraction_range
 from ..geometry.meridian import SAGA_2007, CircularArc
 from ..geometry.straight_fibre import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
-from .base import PressureLaw, Slopes
+from .base import PressureLaw
+from .calls import Slopes
 from .rubber import RubberLaw, RubberLine
 from .solve import as_arrays, check_numbers, check_solution, find_first_root
 
@@ -97,6 +98,7 @@ class ExactMeridian(RubberLaw, PressureLaw):
 
     references: ClassVar[tuple[Reference, ...]] = (SAGA_2007, DAERDEN_LEFEBER_2001)
     traceable: ClassVar[bool] = False
+    refuses_beyond: ClassVar[bool] = True
 
     geometry: PleatedTube
     rubber: RubberLine
@@ -254,6 +256,8 @@ class ExactMeridian(RubberLaw, PressureLaw):
             force = force + size * other_step
         return self._evaluate_shape(radius, pressure, force)
 
+    # without pressure there is no shape: its lengths are not finite
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def _evaluate_shape(self, radius: Value, pressure: Value, force: Value) -> MeridianShape:
         """Arc and chord length of the shape with these parameters, and their derivatives."""
         radius, pressure, force = as_arrays(radius, pressure, force)
@@ -273,15 +277,14 @@ class ExactMeridian(RubberLaw, PressureLaw):
         )
         first = axial_by[0] + v * v * (z + bulge * z_by[0])
         fibre_by = (first, axial_by[1] + bulge * v * v * z_by[1], axial_by[2])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            g = weights * curve.factor
-            lengths = np.stack([(fibre * g).sum(axis=0), (axial * g).sum(axis=0)])
-            jacobian = np.empty((2, 3, *radius.shape))
-            for i in range(3):
-                relative = -0.5 * (z_by[i] / z + (fibre_by[i] + axial_by[i]) / (fibre + axial))
-                jacobian[0, i] = ((fibre_by[i] + fibre * relative) * g).sum(axis=0)
-                jacobian[1, i] = ((axial_by[i] + axial * relative) * g).sum(axis=0)
-            jacobian[:, 0] += lengths / (2 * bulge)
+        g = weights * curve.factor
+        lengths = np.stack([(fibre * g).sum(axis=0), (axial * g).sum(axis=0)])
+        jacobian = np.empty((2, 3, *radius.shape))
+        for i in range(3):
+            relative = -0.5 * (z_by[i] / z + (fibre_by[i] + axial_by[i]) / (fibre + axial))
+            jacobian[0, i] = ((fibre_by[i] + fibre * relative) * g).sum(axis=0)
+            jacobian[1, i] = ((axial_by[i] + axial * relative) * g).sum(axis=0)
+        jacobian[:, 0] += lengths / (2 * bulge)
         return MeridianShape(radius, pressure, force, lengths, jacobian)
 
     def _curve(self, radius: Any, pressure: Any, force: Any, v: Any) -> _Curve:

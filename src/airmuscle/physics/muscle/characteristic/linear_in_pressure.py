@@ -4,6 +4,7 @@ size.
 
 from ....core import ParameterError, Value, model, ops, parameter
 from .base import ForceLaw
+from .validity_range import CONTRACTION_BOUNDS
 
 
 @model
@@ -41,6 +42,11 @@ class LinearInPressure(ForceLaw):
             raise ParameterError(
                 "LinearInPressure: area and passive_force need at least one coefficient each."
             )
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """All contractions: the law has no length, and its polynomials are those of its fit."""
+        return CONTRACTION_BOUNDS
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         x = contraction - self.reference

@@ -11,7 +11,8 @@ from ....core import AirmuscleWarning, Array, SolveError, Value, model, paramete
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .contractile_surface import ContractileSurface, exponents
-from .solve import values_or_nan
+from .modes import values_or_nan
+from .sampling import check_approximates, sample_force
 from .validity_range import ValidityRange
 
 _STARTS = 40
@@ -80,14 +81,14 @@ def as_force_law(
     A polynomial of total degree `degree` is fitted by least squares on a dense grid; the errors are
     evaluated on a second grid between its points, from which the search for the maximum error
     starts. Points without a solution are omitted, with an AirmuscleWarning that states their
-    fraction. Raises SolveError if too few points have a solution, or if the force is unbounded at
-    one of them, as that of straight fibres at zero contraction, and ParameterError for a degree
-    that is not an integer, 0 or more.
+    fraction. Raises SolveError if too few points have a solution, if the force is unbounded at one
+    of them, as that of straight fibres at zero contraction, and if the polynomial does not
+    approximate the law; ParameterError for a degree that is not an integer, 0 or more.
     """
     check_degree("as_force_law", degree)
     count = 4 * (degree + 1)
     pressure, contraction = _grid(validity_range, np.cos(np.pi * (np.arange(count) + 0.5) / count))
-    force = values_or_nan(law.force, pressure, contraction)
+    force = sample_force("as_force_law", law, validity_range, pressure, contraction)
     known = np.isfinite(force)
     if known.sum() < 2 * len(exponents(degree)):
         raise SolveError(
@@ -110,16 +111,11 @@ def _with_errors(
     """Return the surrogate of a fitted surface with its errors."""
     nodes = np.linspace(-1.0, 1.0, 4 * surface.degree + 3)
     pressure, contraction = _grid(limits, nodes)
-    force = values_or_nan(law.force, pressure, contraction)
-    if (unbounded := np.abs(force) > _NO_CLAMP).any():
-        at = int(np.argmax(unbounded))
-        raise SolveError(
-            f"as_force_law: the force of {type(law).__name__} is unbounded at a contraction of"
-            f" {100 * contraction[at]:.4g} % and {pressure[at] / 1e3:.4g} kPa. Choose a validity"
-            " range without this point."
-        )
+    force = sample_force("as_force_law", law, limits, pressure, contraction)
     error = surface.force(pressure, contraction) - force
     known = np.isfinite(error)
+    name = f"a polynomial of degree {surface.degree}"
+    check_approximates("as_force_law", name, error[known], force[known])
     if not known.all():
         warnings.warn(
             f"{type(law).__name__} has no solution on {100 * (1 - known.mean()):.2g} % of the"

@@ -17,10 +17,11 @@ from ....core import (
     ops,
     parameter,
 )
-from ..geometry.base import check_contraction_range
+from ..geometry.base import check_contraction_range, check_not_straight
 from ..geometry.meridian import SAGA_2007, Parabola
 from ..geometry.straight_fibre import FibreSum, HalfShellFibreSum, StraightFibre
 from .base import PressureLaw
+from .modes import is_formula_alone
 from .rubber import AxialIntegral, RubberIntegral, RubberLaw, RubberLine
 from .solve import check_solution, solve_direction
 
@@ -68,6 +69,8 @@ class Saga2007(RubberLaw, PressureLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (SAGA_2007,)
+    refuses_beyond: ClassVar[bool] = True
+    begins_at_straight_fibres = True
 
     geometry: StraightFibre
     rubber: RubberLine
@@ -150,8 +153,11 @@ class Saga2007(RubberLaw, PressureLaw):
         )
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N]; unbounded at zero contraction, where the fibres are straight."""
+        """Tension [N]. Raises GeometryLimitError at zero contraction, where straight fibres pull
+        infinitely."""
         self._check_contraction(contraction)
+        if not is_formula_alone():  # a search goes there
+            check_not_straight(contraction, "Saga2007")
         shell, rubber, lever = self._terms(contraction)
         return (pressure * shell - rubber) / ops.maximum(lever, _MIN_SLOPE)
 

@@ -1,6 +1,5 @@
 """Root search for the directions of a characteristic that are not in closed form."""
 
-import contextvars
 import sys
 import warnings
 from collections.abc import Callable
@@ -8,33 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, TraceError, ops
+from ....core import AirmuscleWarning, SolveError, TraceError, ops
+from .modes import formula_alone, is_unsolved_nan
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not
 resolved.
 """
 _TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
-_UNSOLVED_AS_NAN = contextvars.ContextVar("unsolved_as_nan", default=False)
-"""Whether points without a solution are NaN in the results of the functions below, not an error."""
-
-
-def values_or_nan(law: Callable[..., Any], *points: Array) -> Array:
-    """Values of a law at points (N,), NaN where it has no solution; halves of the points isolate
-    those.
-    """
-    token = _UNSOLVED_AS_NAN.set(True)
-    try:
-        with np.errstate(all="ignore"):  # a law may be singular at the end of its range
-            return np.broadcast_to(np.asarray(law(*points), dtype=float), points[0].shape)
-    except PhysicsError:
-        if points[0].size == 1:
-            return np.array([np.nan])
-    finally:
-        _UNSOLVED_AS_NAN.reset(token)
-    half = points[0].size // 2
-    halves = ([each[part] for each in points] for part in (slice(None, half), slice(half, None)))
-    return np.concatenate([values_or_nan(law, *each) for each in halves])
 
 
 def check_numbers(*values: Any) -> None:
@@ -104,6 +84,16 @@ def find_first_root(
     maximum are the extreme values of `function` within `bounds`; in `values_or_nan` such a pair
     gives NaN. Raises TraceError for traced values, which have no numbers.
     """
+    with formula_alone():
+        return _find_first_root(function, bounds, args, message)
+
+
+def _find_first_root(
+    function: Callable[[Any, Any, Any], Any],
+    bounds: tuple[float, float],
+    args: tuple[Any, Any],
+    message: Callable[[float, float, float, float], str],
+) -> Any:
     from scipy.optimize import elementwise
 
     first, second = as_arrays(*args)
@@ -116,7 +106,7 @@ def find_first_root(
     rises = (values[:-1] < 0) & (values[1:] >= 0)
     at_start = values[0] == 0
     unsolved = ~(rises.any(axis=0) | at_start)
-    if unsolved.any() and not _UNSOLVED_AS_NAN.get():
+    if unsolved.any() and not is_unsolved_nan():
         first_unsolved = int(np.argmax(unsolved))
         finite = values[~np.isnan(values[:, first_unsolved]), first_unsolved]
         extremes = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
@@ -198,7 +188,7 @@ def check_solution(
         return solution
     values = np.asarray(solution, dtype=float)
     outside = ~((values >= bounds[0]) & (values <= bounds[1]))
-    if outside.any() and _UNSOLVED_AS_NAN.get():
+    if outside.any() and is_unsolved_nan():
         return np.where(outside, np.nan, values)
     if outside.any():
         first, second = (

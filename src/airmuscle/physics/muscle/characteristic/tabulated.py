@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, ParameterError, SolveError, Value, model, parameter
-from .base import Characteristic, Slopes
+from .base import Characteristic
+from .calls import Slopes
 from .solve import as_arrays, describe_range
 
 _BISECTIONS = 60
@@ -33,6 +34,7 @@ class Tabulated(Characteristic):
     """
 
     traceable: ClassVar[bool] = False
+    refuses_beyond: ClassVar[bool] = True
 
     pressures: tuple[float, ...] = parameter(
         "Pa", "p_i", "gauge pressures of the rows", fitted=False

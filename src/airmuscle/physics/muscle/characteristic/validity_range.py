@@ -17,6 +17,7 @@ Limits = tuple[float, float]
 """Lower and upper limit."""
 PRESSURE_BOUNDS = (-101_325.0, 1e8)
 CONTRACTION_BOUNDS = (-0.5, 1.0)
+FORCE_BOUNDS = (0.0, 1e6)
 """Physical bounds: pressure not below absolute vacuum, contraction not above the whole length."""
 
 
@@ -79,10 +80,17 @@ def validity_range_of(
     """Return the stated validity range, otherwise the one stored in the law by its fit, otherwise
     None.
     """
-    names = [field.name for field in dataclasses.fields(ValidityRange)]
-    if stated is not None or not all(hasattr(characteristic, name) for name in names):
+    if stated is not None or not states_validity_range(characteristic):
         return stated
-    return ValidityRange(*(getattr(characteristic, name) for name in names))
+    return ValidityRange(*(getattr(characteristic, name) for name in _LIMITS))
+
+
+_LIMITS = tuple(field.name for field in dataclasses.fields(ValidityRange))
+
+
+def states_validity_range(characteristic: Any) -> bool:
+    """Whether the parameters of a law contain the limits of a validity range."""
+    return all(hasattr(characteristic, name) for name in _LIMITS)
 
 
 BRAID_ANGLE = 0.45

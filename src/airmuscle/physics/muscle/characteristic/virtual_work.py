@@ -7,11 +7,13 @@ from typing import ClassVar
 
 from ....core import ParameterError, Reference, TraceError, Value, model, ops, parameter
 from ....core.declaration import forwarded
-from ..geometry.base import Geometry, check_contraction_range
+from ..geometry.base import Geometry, check_contraction_range, check_not_straight
 from ..geometry.braid import CHOU_HANNAFORD_1996
 from ..geometry.meridian import FERRARESI_2001, SAGA_2007, CircularArc
-from ..geometry.straight_fibre import StraightFibre
-from .base import AreaLaw, ForceLaw, Slopes
+from ..geometry.straight_fibre import FibreTube, StraightFibre
+from .base import AreaLaw, ForceLaw
+from .calls import Slopes
+from .modes import is_formula_alone
 from .rubber import RubberLaw, RubberLine
 from .solve import check_solution, find_first_root
 
@@ -31,6 +33,11 @@ class VirtualWork(AreaLaw):
     geometry: Geometry
 
     contraction_range = forwarded("geometry.contraction_range")
+
+    @property
+    def begins_at_straight_fibres(self) -> bool:
+        """True for fibre tubes, whose volume increases infinitely fast at zero contraction."""
+        return isinstance(self.geometry, FibreTube)
 
     def effective_area(self, contraction: Value) -> Value:
         return self.geometry.volume_derivative(contraction) / self.geometry.resting_length
@@ -67,6 +74,7 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FERRARESI_2001, SAGA_2007)
+    refuses_beyond: ClassVar[bool] = True
 
     geometry: StraightFibre
     rubber: RubberLine
@@ -87,11 +95,20 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
         """
         return (0.0, _contraction_of_max_volume(self.geometry) * (1.0 - 1e-9))
 
+    begins_at_straight_fibres = True
+
+    @property
+    def formula_range(self) -> tuple[Value, Value]:
+        """That of the geometry."""
+        return self.geometry.contraction_range
+
     def force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N]; negative beyond the maximum volume, unbounded at zero contraction (straight
-        fibres).
+        """Tension [N]; negative beyond the maximum volume. Raises GeometryLimitError at zero
+        contraction, where straight fibres pull infinitely.
         """
         self._check_contraction(contraction, self.geometry.contraction_range)
+        if not is_formula_alone():  # a search goes there
+            check_not_straight(contraction, "CircleVirtualWork")
         area, rubber, angle = self._work_terms(contraction)
         return (pressure * area - rubber) / ops.maximum(angle, _MIN_ANGLE)
 

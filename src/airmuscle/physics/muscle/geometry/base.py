@@ -37,6 +37,18 @@ def check_contraction_range(
         )
 
 
+def check_not_straight(contraction: Value, owner: str) -> None:
+    """Raise GeometryLimitError at a contraction [1] of 0, where straight fibres pull infinitely;
+    symbols and JAX arrays are not checked."""
+    if ops.is_traced(contraction):
+        return
+    if np.any(np.asarray(contraction, dtype=float) == 0.0):
+        raise GeometryLimitError(
+            f"{owner}: at a contraction of 0 % the fibres are straight and the force is infinite."
+            " Give a contraction greater than 0, such as 0.01 %."
+        )
+
+
 RESTING_LENGTH = ("m", "L_0", "length between the fittings, unpressurised and unloaded")
 """Unit, symbol and meaning of the parameter of a resting length."""
 LENGTHS = (1e-3, 20.0)
