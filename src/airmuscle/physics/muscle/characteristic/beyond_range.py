@@ -132,6 +132,8 @@ def extended_force(law: Any, limits: ForceRange, pressure: Value, contraction: V
     sleeve adds at most 0.5 times the rated force.
     """
     with formula_alone():
+        if law.begins_at_straight_fibres:
+            return _bounded_at_straight_fibres(law, limits, pressure, contraction)
         if not ops.is_traced(pressure, contraction, limits.min_contraction) and np.all(
             limits.contains(pressure, contraction)
         ):
@@ -140,8 +142,6 @@ def extended_force(law: Any, limits: ForceRange, pressure: Value, contraction: V
                 return force
             greatest = limits.greatest_force(law)
             return limits.limited(force, limits.rated_force(greatest), greatest)
-        if law.begins_at_straight_fibres:
-            return _bounded_at_straight_fibres(law, limits, pressure, contraction)
         inner = ops.clip(contraction, limits.min_contraction, limits.end)
         force = formula_or_slack(law, pressure, inner, limits.min_contraction)
         # a constant of the kind of the arguments, as which a traced law is evaluated at a number
