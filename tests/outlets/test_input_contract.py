@@ -9,6 +9,7 @@ it, to the last bit.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import dataclasses
 import importlib.util
@@ -489,7 +490,8 @@ def of_mujoco(folder):
         for opening in openings:
             before = warning.number
             data.ctrl[0] = opening
-            mujoco.mj_step(model, data)
+            with contextlib.chdir(folder):  # where MuJoCo writes MUJOCO_LOG.TXT on a warning
+                mujoco.mj_step(model, data)
             responses.append(Response(warning.number > before, tuple(data.act.tolist())))
         return responses
 

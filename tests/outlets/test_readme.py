@@ -84,7 +84,7 @@ TOOLS = {
     "python-control": ("../dynamics/test_linearise", "control"),
     "JAX": ("test_jax", "jax"),
     "PyTorch, mjlab, Isaac Lab": ("test_actuators", "torch"),
-    "Warp, Newton": ("test_actuators", "newton"),
+    "Warp, Newton": ("test_frameworks", "newton"),
     "ONNX Runtime": ("test_actuators", "onnxruntime"),
 }
 """The test of each way into a tool, and the program or package that it needs."""
@@ -96,5 +96,6 @@ def test_each_way_into_a_tool_has_a_test_in_it():
     assert rows == list(TOOLS)
     for row, (file, tool) in TOOLS.items():
         text = (Path(__file__).parent / f"{file}.py").read_text(encoding="utf-8")
-        needed = re.search(rf'(importorskip|require)\([^)]*["\']{re.escape(tool)}', text)
+        asked = rf'(importorskip|require|NAMES = )\([^)]*["\']{re.escape(tool)}'
+        needed = re.search(asked, text)
         assert needed or (f"require({tool})" in text), row
