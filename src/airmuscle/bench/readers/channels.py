@@ -48,28 +48,28 @@ class RawTable:
         """The number in the file, from 1 on, of a column by its index."""
         return self.numbers[column] if self.numbers else column + 1
 
-    def of_columns(self, kept: Sequence[int], **changes: Any) -> "RawTable":
+    def of_columns(self, indices: Sequence[int], **changes: Any) -> "RawTable":
         """The table with these columns alone, by their indices, and with further changes of its
         fields.
         """
         units = (
             None
             if self.units is None
-            else tuple(self.units[i] for i in kept if i < len(self.units))
+            else tuple(self.units[i] for i in indices if i < len(self.units))
         )
-        headings = tuple(self.headings[i] for i in kept)
-        columns = tuple(self.columns[i] for i in kept)
-        numbers = tuple(self.number(i) for i in kept)
+        headings = tuple(self.headings[i] for i in indices)
+        columns = tuple(self.columns[i] for i in indices)
+        numbers = tuple(self.number(i) for i in indices)
         return dataclasses.replace(
             self, headings=headings, units=units, columns=columns, numbers=numbers, **changes
         )
 
-    def of_rows(self, kept: npt.NDArray[np.intp], **changes: Any) -> "RawTable":
+    def of_rows(self, indices: npt.NDArray[np.intp], **changes: Any) -> "RawTable":
         """The table with these rows alone, by their indices, and with further changes of its
         fields.
         """
-        columns = tuple(taken(cells, kept) for cells in self.columns)
-        return dataclasses.replace(self, columns=columns, rows=self.rows[kept], **changes)
+        columns = tuple(taken(cells, indices) for cells in self.columns)
+        return dataclasses.replace(self, columns=columns, rows=self.rows[indices], **changes)
 
     def noted(self, *notes: str) -> "RawTable":
         """The table with further notes."""
@@ -130,7 +130,7 @@ def merge_channels(
     notes = tuple[str, ...]()
     time = times[0] if times else None
     if len({len(c.values) for c in channels}) > 1 or not all(
-        np.array_equal(each, times[0]) for each in times
+        np.array_equal(stamps, times[0]) for stamps in times
     ):
         channels, time, notes = _on_common_rows(origin, channels, mapped)
     has_time = any(
@@ -246,13 +246,13 @@ def _common_times(
         times.append(channel.time)
     longest = max(range(len(measured)), key=lambda i: len(measured[i].values))
     leading = times[longest]
-    low = max(each[0] for each in times)
-    high = min(each[-1] for each in times)
+    low = max(stamps[0] for stamps in times)
+    high = min(stamps[-1] for stamps in times)
     rounding = _rounding(leading)
     time = leading[(leading >= low - rounding) & (leading <= high + rounding)]
     if not len(time):
-        late = measured[int(np.argmax([each[0] for each in times]))].name
-        early = measured[int(np.argmin([each[-1] for each in times]))].name
+        late = measured[int(np.argmax([stamps[0] for stamps in times]))].name
+        early = measured[int(np.argmin([stamps[-1] for stamps in times]))].name
         raise ColumnError(
             f"{origin}: the time ranges of the measured channels do not overlap: '{early}' ends"
             f" before '{late}' begins.",
@@ -296,8 +296,8 @@ def _left_out(channel: Channel, time: Array | None, rows: int) -> str:
     )
 
 
-def _differ(one: Array | None, other: Array | None) -> bool:
-    return one is not None and other is not None and not np.array_equal(one, other)
+def _differ(first: Array | None, second: Array | None) -> bool:
+    return first is not None and second is not None and not np.array_equal(first, second)
 
 
 def _names(channels: Sequence[Channel]) -> str:

@@ -35,13 +35,13 @@ def split_specimens(table: RawTable) -> tuple[RawTable, ...]:
     values = list(dict.fromkeys(labels.tolist()))
     if not 0 < len(values) <= MAX_SPECIMENS:
         return (table,)
-    others = table.of_columns([i for i in range(len(names)) if i != column])
+    remaining = table.of_columns([i for i in range(len(names)) if i != column])
     origins = [
         table.origin if len(values) == 1 else f"{table.origin}, specimen {value}"
         for value in values
     ]
     return tuple(
-        others.of_rows(
+        remaining.of_rows(
             np.flatnonzero(labels == value),
             origin=origin,
             constants={**table.constants, SPECIMEN: value},
@@ -102,7 +102,7 @@ def parse_constant_name(text: str) -> tuple[str, str] | None:
     )
     word = re.sub(r"[\s-]+", "_", name.strip()).lower()
     return next(
-        ((key, unit) for key, (*_, others) in _TABLE.items() if word in (key, *others.split())),
+        ((key, unit) for key, (*_, synonyms) in _TABLE.items() if word in (key, *synonyms.split())),
         None,
     )
 

@@ -128,16 +128,16 @@ class RowReader:
         self._first = recording
         self.notes = recording.notes
         self._ambient = ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
-        held = {find_quantity_name(name) for name in self.mapping.constants}
-        self._held = {name: float(recording[name][0]) for name in recording if name in held}
+        stated_names = {find_quantity_name(name) for name in self.mapping.constants}
+        self._held = {name: float(recording[name][0]) for name in recording if name in stated_names}
         self._width = len(headings)
         known = (
-            (i, each)
-            for i, each in enumerate(resolve_headings(table, self.mapping.units))
-            if each.known
+            (i, heading)
+            for i, heading in enumerate(resolve_headings(table, self.mapping.units))
+            if heading.known
         )
         self._conversions = [
-            (i, each.name, unit_conversion(table, each, ambient)) for i, each in known
+            (i, heading.name, unit_conversion(table, heading, ambient)) for i, heading in known
         ]
         return self._read_row(line)
 

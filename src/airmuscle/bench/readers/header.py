@@ -53,10 +53,10 @@ def stated_heading_row(
             if number > skip_rows:
                 return index
             continue
-        found = len({*cells, *map(bare_heading, cells)} & set(named))
-        if found > most:
+        matches = len({*cells, *map(bare_heading, cells)} & set(named))
+        if matches > most:
             best = index
-            most = found
+            most = matches
         if most == len(named):
             break
     return best
@@ -201,7 +201,7 @@ class FileNamePattern:
             raise ColumnError(
                 f"file name pattern '{self.text}': '{{{name}}}' is not a quantity with its unit."
                 " Write '{length [cm]}',"
-                f" {', '.join(f'{{{each} [{u}]}}' for each, u in CONSTANT_UNITS.items())},"
+                f" {', '.join(f'{{{key} [{u}]}}' for key, u in CONSTANT_UNITS.items())},"
                 " {specimen}, {run}, or {} for any text."
             )
         return _NUMBER

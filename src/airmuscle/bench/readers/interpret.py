@@ -49,14 +49,17 @@ def interpret(
     constants = mapping.constants_of() if constants is None else constants
     check_width(table)
     table = without_repeated_columns(table)
-    held = {
+    held_constants = {
         n: value
         for n, value in constants.items()
         if parse_constant_name(n) is None and parse_heading(n).known
     }
     run_constants = fixed.collect_constants(
         table.origin,
-        {**table.constants, **{n: value for n, value in constants.items() if n not in held}},
+        {
+            **table.constants,
+            **{n: value for n, value in constants.items() if n not in held_constants},
+        },
     )
     headings = resolve_headings(table, mapping.units)
     table = mapping.missing.treat(table, headings)
@@ -69,7 +72,7 @@ def interpret(
     fixed.check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns, notes = _converted_columns(table, headings, ambient, "ambient" in run_constants)
-    for text, value in held.items():
+    for text, value in held_constants.items():
         heading = parse_heading(text)
         where = f"{table.origin}: {heading.name}"
         if heading.name in columns:
@@ -118,10 +121,10 @@ def _converted_columns(
             note = _keep_unknown_column(table, heading, cells, columns, unknown)
         notes += [note] if note and note not in notes else []
     if unknown:
-        one = len(unknown) == 1
+        is_single = len(unknown) == 1
         what = (
             "Column {} is not a known quantity and is"
-            if one
+            if is_single
             else "Columns {} are not known quantities and are"
         )
         notes.append(f"{what.format(listed(unknown))} kept without conversion.")
@@ -148,7 +151,9 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
     user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
     names = [heading.name for heading in parsed]
     for key in (
-        each for each in user_units if each not in {*names, *(heading.text for heading in parsed)}
+        user_name
+        for user_name in user_units
+        if user_name not in {*names, *(heading.text for heading in parsed)}
     ):
         raise ColumnError(
             f"{table.origin}: a unit is given for '{key}', but the columns are"
@@ -188,11 +193,13 @@ def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
     if not below or heading.unit is None or below == heading.unit:
         return
     with contextlib.suppress(UnitError):  # of a unit that is none; its conversion states the reason
-        one, other = (conversion(unit, heading.target or "1") for unit in (heading.unit, below))
-        reference_differs = one.offset != other.offset and not (
-            one.assumed_gauge or other.assumed_gauge
+        in_heading, in_row = (
+            conversion(unit, heading.target or "1") for unit in (heading.unit, below)
         )
-        if one.factor != other.factor or reference_differs:
+        reference_differs = in_heading.offset != in_row.offset and not (
+            in_heading.assumed_gauge or in_row.assumed_gauge
+        )
+        if in_heading.factor != in_row.factor or reference_differs:
             raise ColumnError(
                 f"{table.origin}: the heading '{heading.text}' states {heading.unit}, but the row"
                 f" of units below it {below}. Correct one of them.",
@@ -292,7 +299,7 @@ def _keep_unknown_column(
     columns[heading.text or "unnamed"] = cells
     if heading.text in table.fields:
         quantity = next(
-            (name for name, each in QUANTITIES.items() if each.unit == heading.unit), ""
+            (name for name, declared in QUANTITIES.items() if declared.unit == heading.unit), ""
         )
         mapped = f"'{heading.text}' = '{quantity or 'force'} [{heading.unit if quantity else 'N'}]'"
         unit = f" in {heading.unit}" if heading.unit else ""

@@ -148,12 +148,14 @@ class ColumnMapping:
         check_field_types(self)
         for name in set(STATED) & set(self.constants):
             object.__setattr__(self, name, self.constants[name])
-        others = {name: value for name, value in self.constants.items() if name not in STATED}
-        object.__setattr__(self, "constants", others)
+        further_constants = {
+            name: value for name, value in self.constants.items() if name not in STATED
+        }
+        object.__setattr__(self, "constants", further_constants)
         _ = self.text_format  # checks delimiter and decimal mark
         if self.skip_rows is not None and self.skip_rows < 0:
             raise ColumnError(f"mapping: skip_rows is {self.skip_rows}; it must be 0 or more.")
-        for name in others:
+        for name in further_constants:
             if name not in CONSTANT_NAMES and not (
                 parse_constant_name(name) or parse_heading(name).known
             ):
@@ -208,30 +210,30 @@ def mapping_of_tables(
 ) -> ColumnMapping:
     """The mapping `base` with what the keys of a TOML table state; tables are merged, and None
     states nothing. `where` begins the messages. Raises as `read_mapping`."""
-    given = {key: value for key, value in content.items() if value is not None}
-    for key, value in given.items():
+    entries = {key: value for key, value in content.items() if value is not None}
+    for key, value in entries.items():
         _check_entry(key, value, where)
     columns = {
-        name: _parse_entry(where, name, value) for name, value in given.pop("columns", {}).items()
+        name: _parse_entry(where, name, value) for name, value in entries.pop("columns", {}).items()
     }
-    codes = tuple(parse_code(each) for each in given.pop("missing_codes", base.missing.codes))
-    treatment = MISSING_VALUES.get(given.pop("missing", ""))
+    codes = tuple(parse_code(code) for code in entries.pop("missing_codes", base.missing.codes))
+    treatment = MISSING_VALUES.get(entries.pop("missing", ""))
     values = {
         "columns": {**{str(key): heading for key, heading in base.columns.items()}, **columns},
-        "units": {**base.units, **given.pop("units", {})},
+        "units": {**base.units, **entries.pop("units", {})},
         "constants": (
             base.constants
-            | given.pop("constants", {})
-            | {n: given.pop(n) for n in OTHERS if n in given}
+            | entries.pop("constants", {})
+            | {n: entries.pop(n) for n in OTHERS if n in entries}
         ),
-        "time": TIME_BASES.get(given.pop("time", ""), base.time),
+        "time": TIME_BASES.get(entries.pop("time", ""), base.time),
         "missing": (
             treatment(codes) if treatment else dataclasses.replace(base.missing, codes=codes)
         ),
-        "drop_outliers": OUTLIERS.get(given.pop("outliers", ""), base.drop_outliers),
+        "drop_outliers": OUTLIERS.get(entries.pop("outliers", ""), base.drop_outliers),
     }
     try:
-        mapping = dataclasses.replace(base, **values, **given)
+        mapping = dataclasses.replace(base, **values, **entries)
     except AirmuscleError as error:
         raise error.located(where) from None
     named = {**content, **(content.get("constants") or {})}
@@ -275,7 +277,7 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
     """`pressure [bara]`, from this text or from `{quantity = "pressure", unit = "bara"}`."""
     if isinstance(value, str):
         return value
-    texts = isinstance(value, dict) and all(isinstance(each, str) for each in value.values())
+    texts = isinstance(value, dict) and all(isinstance(part, str) for part in value.values())
     if texts and set(value) <= {"quantity", "unit"}:
         return (
             f"{value.get('quantity', '')} [{value['unit']}]"

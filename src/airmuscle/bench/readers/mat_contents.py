@@ -99,8 +99,8 @@ def read_contents(path: Path, downsampling: Downsampling) -> MatContents:
         for names in [[name] for name, _, _ in shapes] if one_by_one else [None]:
             read = loadmat(str(path), variable_names=names, simplify_cells=True, appendmat=False)
             fields = {
-                key: each
-                for key, each in read.items()
+                key: value
+                for key, value in read.items()
                 if not key.startswith(_INTERNAL) and key != _UNNAMED
             }
             variables |= _reduced(path.name, "", fields, downsampling, reductions, longest)
@@ -165,11 +165,11 @@ class _Hdf5Reader:
             and isinstance(group.get(name, getlink=True), self._h5py.HardLink)
         }
         arrays = {
-            key: each
-            for key, each in items.items()
-            if self._is_array(each) and each.ndim <= 2 and not in_cell
+            key: dataset
+            for key, dataset in items.items()
+            if self._is_array(dataset) and dataset.ndim <= 2 and not in_cell
         }
-        shapes = {key: each.shape for key, each in arrays.items()}
+        shapes = {key: dataset.shape for key, dataset in arrays.items()}
         rows = {
             key: max(shape) if len(shape) == 1 or 1 in shape else shape[-1]
             for key, shape in shapes.items()
@@ -177,14 +177,14 @@ class _Hdf5Reader:
         reduction = Reduction(self._downsampling, max(rows.values(), default=0))
         if arrays:
             self.reductions[place] = reduction
-        found = {}
+        contents = {}
         for key, item in items.items():
             if key in arrays:
-                found[key] = reduction.read(functools.partial(_rows, item), rows[key])
+                contents[key] = reduction.read(functools.partial(_rows, item), rows[key])
             else:
-                found[key] = self._value(item, f"{place}.{key}".lstrip("."), in_cell)
-        check_reduced_lengths(self._origin, rows.values(), (len(found[key]) for key in arrays))
-        return {key: value for key, value in found.items() if value is not None}
+                contents[key] = self._value(item, f"{place}.{key}".lstrip("."), in_cell)
+        check_reduced_lengths(self._origin, rows.values(), (len(contents[key]) for key in arrays))
+        return {key: value for key, value in contents.items() if value is not None}
 
     def _is_array(self, item: Any) -> bool:
         """Whether a variable, a field or an element contains several real numbers."""
@@ -209,8 +209,8 @@ class _Hdf5Reader:
         if kind == "char":
             return "".join(map(chr, item[()].T.ravel().tolist()))
         if self._is_array(item):
-            whole = np.asarray(item[()].T)
-            return whole.reshape(-1) if whole.size == max(whole.shape, default=0) else whole
+            matrix = np.asarray(item[()].T)
+            return matrix.reshape(-1) if matrix.size == max(matrix.shape, default=0) else matrix
         is_dataset = isinstance(item, self._h5py.Dataset)
         if is_dataset and item.dtype.kind in "biuf" and kind not in ("", "function_handle"):
             return float(item[()].item())
@@ -219,7 +219,9 @@ class _Hdf5Reader:
             and self._h5py.check_ref_dtype(item.dtype) is not None
             and item.size <= MAX_CELLS
         ):
-            return [self._value(self._file[each], place, True) for each in item[()].ravel()]
+            return [
+                self._value(self._file[reference], place, True) for reference in item[()].ravel()
+            ]
         kinds = {"cell": "a cell array", "function_handle": "a function"}
         what = "a sparse matrix" if is_group else kinds.get(kind, "which contains no real numbers")
         self.notes.append(f"Not read: {place}, {what}.")
@@ -361,13 +363,15 @@ def read_objects(path: Path, objects: Sequence[MatlabObject]) -> dict[str, Mappi
     """The numeric columns of the tables and timetables, by variable; with their units in `units`,
     if stated. Empty without the package mat-io. A timetable has the column `time`, in seconds from
     its first row."""
-    names = [each.name for each in objects if each.class_name in READABLE]
+    names = [
+        stored_object.name for stored_object in objects if stored_object.class_name in READABLE
+    ]
     if not names or not is_installed(_PACKAGE):
         return {}
     frames = import_lab_package(_PACKAGE, path).load_from_mat(
         str(path), variable_names=names, add_table_attrs=True
     )
-    found: dict[str, Mapping[str, Any]] = {}
+    tables: dict[str, Mapping[str, Any]] = {}
     for variable in (name for name in names if hasattr(frames.get(name), "columns")):
         frame = frames[variable]
         fields = dict[str, Any]()
@@ -382,8 +386,8 @@ def read_objects(path: Path, objects: Sequence[MatlabObject]) -> dict[str, Mappi
         dated = {str(name) for name in frame.columns if frame[name].dtype.kind in "mM"}
         stated |= {name: "s" for name in fields if name == "time" or name in dated}
         known = {name: values for name, values in fields.items() if values is not None}
-        found[variable] = known | {"units": stated}
-    return found
+        tables[variable] = known | {"units": stated}
+    return tables
 
 
 def _numbers(values: Any) -> Array | None:

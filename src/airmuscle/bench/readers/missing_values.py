@@ -91,24 +91,24 @@ def number(cell: str) -> float:
         return math.nan
 
 
-def _describe_faulty(table: RawTable, found: Sequence[tuple[int, ExaminedColumn]]) -> str:
+def _describe_faulty(table: RawTable, faulty_cells: Sequence[tuple[int, ExaminedColumn]]) -> str:
     """The cells with their rows in the file, and what to do."""
-    if len(found) == 1:
-        ((row, each),) = found
+    if len(faulty_cells) == 1:
+        ((row, column),) = faulty_cells
         return (
-            f"{table.location(row)}: {each.describe(row)}. Correct the cell or delete the"
+            f"{table.location(row)}: {column.describe(row)}. Correct the cell or delete the"
             f" {table.row_label}."
         )
     listed = [
-        f"{table.row_label} {table.rows[row]} ({each.brief(row)})"
-        for row, each in found[:MAX_LISTED]
+        f"{table.row_label} {table.rows[row]} ({column.brief(row)})"
+        for row, column in faulty_cells[:MAX_LISTED]
     ]
-    more = f" and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else ""
-    rows = len({row for row, _ in found})
+    more = f" and {len(faulty_cells) - MAX_LISTED} more" if len(faulty_cells) > MAX_LISTED else ""
+    rows = len({row for row, _ in faulty_cells})
     return (
-        f"{table.origin}: {len(found)} cells in {rows} of {len(table.rows)} {table.row_label}s are"
-        f" no finite numbers: {', '.join(listed)}{more}. Correct the cells or delete the"
-        f" {table.row_label}s."
+        f"{table.origin}: {len(faulty_cells)} cells in {rows} of {len(table.rows)}"
+        f" {table.row_label}s are no finite numbers: {', '.join(listed)}{more}. Correct the cells"
+        f" or delete the {table.row_label}s."
     )
 
 
@@ -143,15 +143,23 @@ class MissingValues(abc.ABC):
         which lists others.
         """
         known = [
-            i for i, each in enumerate(headings) if each.known or parse_constant_name(each.text)
+            i
+            for i, heading in enumerate(headings)
+            if heading.known or parse_constant_name(heading.text)
         ]
         cells = [_examined(i, headings[i], table.columns[i], self.codes) for i in known]
         strict = isinstance(self, RefuseMissing)
-        faulty = [(each, each.bad | each.missing if strict else each.bad) for each in cells]
-        found = [(int(row), each) for each, mask in faulty for row in np.flatnonzero(mask)]
-        if found:
-            found.sort(key=lambda pair: pair[0])
-            raise ColumnError(HintedText(_describe_faulty(table, found), *_remedies(found)))
+        faulty = [
+            (column, column.bad | column.missing if strict else column.bad) for column in cells
+        ]
+        faulty_cells = [
+            (int(row), column) for column, mask in faulty for row in np.flatnonzero(mask)
+        ]
+        if faulty_cells:
+            faulty_cells.sort(key=lambda pair: pair[0])
+            raise ColumnError(
+                HintedText(_describe_faulty(table, faulty_cells), *_remedies(faulty_cells))
+            )
         return self.completed(table, cells)
 
     @abc.abstractmethod
@@ -175,7 +183,7 @@ class DropMissing(MissingValues):
 
     def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
         return (
-            _without_rows(table, np.any([each.missing for each in cells], axis=0))
+            _without_rows(table, np.any([column.missing for column in cells], axis=0))
             if cells
             else table
         )
@@ -191,9 +199,9 @@ class InterpolateMissing(MissingValues):
     """
 
     def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
-        if not any(each.missing.any() for each in cells):
+        if not any(column.missing.any() for column in cells):
             return table
-        timed = next((each for each in cells if each.heading.name == "time"), None)
+        timed = next((column for column in cells if column.heading.name == "time"), None)
         if timed is None:
             raise ColumnError(
                 f"{table.origin}: missing values are interpolated in time, but there is no time"
@@ -202,24 +210,27 @@ class InterpolateMissing(MissingValues):
                     "To leave out the rows", "missing", DropMissing(self.codes), "ColumnMapping"
                 ),
             )
-        kept = np.flatnonzero(~timed.missing)
+        timed_rows = np.flatnonzero(~timed.missing)
         table = _without_rows(table, timed.missing)
         cells = [
             dataclasses.replace(
-                c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept]
+                c,
+                cells=taken(c.cells, timed_rows),
+                missing=c.missing[timed_rows],
+                bad=c.bad[timed_rows],
             )
             for c in cells
         ]
-        time = taken(timed.cells, kept)  # [in the unit of the file]
+        time = taken(timed.cells, timed_rows)  # [in the unit of the file]
         if isinstance(time, list):
             clock = seconds_from_clock(time)
             time = np.array([float(cell) for cell in time]) if clock is None else clock
         columns, filled, left = list(table.columns), *np.zeros((2, len(time)), dtype=bool)
-        for each in cells:
-            if each.missing.any():
-                columns[each.index], done = _interpolated(each, time)
+        for column in cells:
+            if column.missing.any():
+                columns[column.index], done = _interpolated(column, time)
                 filled = filled | done
-                left = left | (each.missing & ~done)
+                left = left | (column.missing & ~done)
         table = dataclasses.replace(table, columns=tuple(columns))
         if (filled & ~left).any():
             table = table.noted(
@@ -246,8 +257,8 @@ def parse_code(code: float | str) -> float | str:
         return str(code).strip()
 
 
-def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
-    bad = list(dict.fromkeys(each.cells[row] for row, each in found if each.bad[row]))
+def _remedies(faulty_cells: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
+    bad = list(dict.fromkeys(column.cells[row] for row, column in faulty_cells if column.bad[row]))
     texts = [cell for cell in bad if isinstance(cell, str)]
     grouped = next(filter(_GROUPED.fullmatch, texts), None)
     if grouped is not None:
@@ -261,7 +272,7 @@ def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
         yield Hint(
             "If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping"
         )
-    if any(each.missing[row] for row, each in found):
+    if any(column.missing[row] for row, column in faulty_cells):
         yield Hint(
             "To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping"
         )

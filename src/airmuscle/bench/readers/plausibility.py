@@ -176,17 +176,17 @@ def check_unit_consistency(recordings: Sequence[Recording]) -> None:
     for name in dict.fromkeys(name for recording in recordings for name in recording.units):
         quantity = quantity_of(name)
         by_unit: dict[str, list[tuple[Recording, float]]] = {}
-        for each in recordings:
-            if name in each.units and len(each) and quantity:
+        for recording in recordings:
+            if name in recording.units and len(recording) and quantity:
                 offset = (
-                    conversion(each.units[name], "Pa").offset
+                    conversion(recording.units[name], "Pa").offset
                     if name.rpartition(".")[2] == "pressure"
                     else 0.0
                 )
                 magnitude = float(
-                    np.quantile(np.abs(each.columns[name] - offset), 0.95)
+                    np.quantile(np.abs(recording.columns[name] - offset), 0.95)
                 )  # [SI], absolute as written
-                by_unit.setdefault(each.units[name], []).append((each, magnitude))
+                by_unit.setdefault(recording.units[name], []).append((recording, magnitude))
         size = operator.itemgetter(1)
         groups = [sorted(group, key=size) for group in by_unit.values()]
         ends = ((group[0], group[-1]) for group in groups if len(group) > 1)
@@ -197,14 +197,19 @@ def check_unit_consistency(recordings: Sequence[Recording]) -> None:
 
 
 def _compare(
-    name: str, target: str, one: tuple[Recording, float], two: tuple[Recording, float]
+    name: str,
+    target: str,
+    first_column: tuple[Recording, float],
+    second_column: tuple[Recording, float],
 ) -> None:
     """Compare the units of a column in two recordings, each with its magnitude [SI]."""
-    first, size = one
-    second, other_size = two
+    first, size = first_column
+    second, other_size = second_column
     unit = first.units[name]
     other_unit = second.units[name]
-    factor, other_factor = (file_conversion(each, target).factor for each in (unit, other_unit))
+    factor, other_factor = (
+        file_conversion(stated_unit, target).factor for stated_unit in (unit, other_unit)
+    )
     written = size / factor
     other_written = other_size / other_factor
     if (
@@ -228,9 +233,12 @@ def _compare(
             " units."
         )
         warnings.warn(text, AirmuscleWarning, stacklevel=2)
-    changes = [conversion(each, "Pa") for each in (unit, other_unit) if target == "Pa"]
+    changes = [
+        conversion(stated_unit, "Pa") for stated_unit in (unit, other_unit) if target == "Pa"
+    ]
     stated = {
-        "none" if each.assumed_gauge else "absolute" if each.offset else "gauge" for each in changes
+        "none" if change.assumed_gauge else "absolute" if change.offset else "gauge"
+        for change in changes
     }
     if len(stated) > 1 and "none" in stated:
         text = (
@@ -253,27 +261,27 @@ def without_repeated_columns(table: RawTable) -> RawTable:
     names them.
     """
     units = table.units or ("",) * len(table.headings)
-    kept = list[int]()
+    distinct = list[int]()
     repeated = list[str]()
     same: dict[tuple[str, str], list[int]] = {}
 
-    def equal(one: Cells, other: Cells) -> bool:
-        if isinstance(one, list) or isinstance(other, list):
-            return type(one) is type(other) and one == other
-        return np.array_equal(one, other, equal_nan=True)
+    def equal(earlier: Cells, cells: Cells) -> bool:
+        if isinstance(earlier, list) or isinstance(cells, list):
+            return type(earlier) is type(cells) and earlier == cells
+        return np.array_equal(earlier, cells, equal_nan=True)
 
     for i, pair in enumerate(zip(table.headings, units, strict=True)):
         before = same.setdefault(pair, [])
         if pair[0] and any(equal(table.columns[k], table.columns[i]) for k in before):
             repeated.append(pair[0])
         else:
-            kept.append(i)
+            distinct.append(i)
             before.append(i)
     if not repeated:
         return table
     names = ", ".join(f"'{name}'" for name in dict.fromkeys(repeated))
     note = f"Columns that repeat the values of an equally named column are read once: {names}."
-    return table.of_columns(kept).noted(note)
+    return table.of_columns(distinct).noted(note)
 
 
 def check_width(table: RawTable) -> None:

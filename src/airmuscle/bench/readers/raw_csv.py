@@ -156,15 +156,17 @@ def _check_decimal_sign(
             if sign.fullmatch(cell)
         )
 
-    other = matching(POINT_NUMBER if decimal == "," else COMMA_NUMBER)
-    found = [(i, cell) for i, cell in other if not (decimal and _THOUSANDS.fullmatch(cell))]
-    if not found:
+    suspect_cells = matching(POINT_NUMBER if decimal == "," else COMMA_NUMBER)
+    ambiguous_cells = [
+        (i, cell) for i, cell in suspect_cells if not (decimal and _THOUSANDS.fullmatch(cell))
+    ]
+    if not ambiguous_cells:
         return
-    line, cell = found[0]
-    lines = list(dict.fromkeys(line for line, _ in found))
+    line, cell = ambiguous_cells[0]
+    lines = list(dict.fromkeys(line for line, _ in ambiguous_cells))
     further = (
-        f"; there are {len(found)} such cells ({list_rows('line', lines, MAX_LISTED)})"
-        if len(found) > 1
+        f"; there are {len(ambiguous_cells)} such cells ({list_rows('line', lines, MAX_LISTED)})"
+        if len(ambiguous_cells) > 1
         else ""
     )
     if decimal:
@@ -264,14 +266,14 @@ def read_text_stream(
     stride = 1
     total = 0
     while chunk := list(itertools.islice(body, _CHUNK_ROWS)):
-        kept = chunk[-total % stride :: stride]
+        sampled_lines = chunk[-total % stride :: stride]
         total += len(chunk)
-        if not kept:
+        if not sampled_lines:
             continue
-        parts.append(parse_columns(origin, header, kept, text_format))
-        rows += [line for line, _ in kept]
+        parts.append(parse_columns(origin, header, sampled_lines, text_format))
+        rows += [line for line, _ in sampled_lines]
         while isinstance(downsampling, Decimation) and len(rows) > downsampling.max_rows:
-            parts = [tuple(each[::2] for each in _joined(parts))]
+            parts = [tuple(column[::2] for column in _joined(parts))]
             rows = rows[::2]
             stride = 2 * stride
     notes = (downsampling.note(total, stride),) if stride > 1 else ()

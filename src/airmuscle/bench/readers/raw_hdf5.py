@@ -34,8 +34,8 @@ def read_hdf5_tables(path: Path, selection: Selection = Selection()) -> tuple[Ra
         links = tuple(_external_links(h5py, file))
         tables = _groups(h5py, file, path.name, selection.downsampling)
         contents = {
-            name: (channels, constants, kept)
-            for name, channels, constants, kept in tables
+            name: (channels, constants, reduction)
+            for name, channels, constants, reduction in tables
             if channels
         }
     if not contents:
@@ -83,16 +83,16 @@ def _datasets(h5py: Any, group: Any) -> dict[str, Any]:
     """The datasets of numbers in a group, and those of the groups inside it; no links are
     followed.
     """
-    found: dict[str, Any] = {}
+    datasets: dict[str, Any] = {}
     for name in group:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
         item = group[name]
         if isinstance(item, h5py.Group):
-            found[name] = _datasets(h5py, item)
+            datasets[name] = _datasets(h5py, item)
         elif isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf":
-            found[name] = item
-    return found
+            datasets[name] = item
+    return datasets
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:

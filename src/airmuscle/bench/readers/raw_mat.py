@@ -46,8 +46,8 @@ def read_mat_tables(path: Path, selection: Selection = Selection()) -> tuple[Raw
         contents = read_contents(path, selection.downsampling)
         objects = find_objects(path)
         tables = read_objects(path, objects)
-    unread = [each for each in objects if each.name not in tables]
-    opaque = {each.name for each in objects}
+    unread = [stored_object for stored_object in objects if stored_object.name not in tables]
+    opaque = {stored_object.name for stored_object in objects}
     variables = {
         name: value for name, value in contents.variables.items() if name not in opaque
     } | tables
@@ -60,7 +60,10 @@ def read_mat_tables(path: Path, selection: Selection = Selection()) -> tuple[Raw
             f"{', '.join([*variables, *map(str, unread)]) or 'no variables'}). {_remedy(unread)}"
         )
     constants = _scalar_fields(variables)
-    notes = (*(f"Not read: {each}. {_remedy([each])}" for each in unread), *contents.notes)
+    notes = (
+        *(f"Not read: {stored_object}. {_remedy([stored_object])}" for stored_object in unread),
+        *contents.notes,
+    )
     origins = {
         name: f"{path.name}, {name or 'variables'}" if len(groups) > 1 else path.name
         for name in groups
@@ -69,9 +72,9 @@ def read_mat_tables(path: Path, selection: Selection = Selection()) -> tuple[Raw
         name: _make_table(origins[name], fields, constants, selection.columns)
         for name, fields in selected.items()
     }
-    whole = Reduction(selection.downsampling)
+    no_reduction = Reduction(selection.downsampling)
     return tuple(
-        contents.reductions.get(name, whole).noted(table).noted(*notes)
+        contents.reductions.get(name, no_reduction).noted(table).noted(*notes)
         for name, table in made.items()
     )
 
@@ -100,8 +103,10 @@ def _remedy(unread: Sequence[MatlabObject]) -> str:
     """The commands of MATLAB that export the objects, and the package that reads tables."""
     if not unread:
         return "Save the measured columns as vectors, or as a struct with vectors."
-    commands = "; ".join(f"{each.name}: {each.export}" for each in unread)
-    readable = any(each.class_name in READABLE for each in unread)
+    commands = "; ".join(
+        f"{stored_object.name}: {stored_object.export}" for stored_object in unread
+    )
+    readable = any(stored_object.class_name in READABLE for stored_object in unread)
     package = (
         " Tables and timetables are also read with the package mat-io: pip install mat-io."
         if readable
@@ -133,14 +138,16 @@ def _elements(value: Any) -> Sequence[Mapping[str, Any]]:
     else none.
     """
     if isinstance(value, Mapping):
-        cells = {name: each for name, each in value.items() if _is_cell(each)}
-        if any(map(_is_array, value.values())) or len({len(each) for each in cells.values()}) != 1:
+        cells = {name: cell for name, cell in value.items() if _is_cell(cell)}
+        if any(map(_is_array, value.values())) or len({len(cell) for cell in cells.values()}) != 1:
             return ()
         return [
             {**value, **dict(zip(cells, run, strict=True))}
             for run in zip(*cells.values(), strict=True)
         ]
-    return value if _is_cell(value) and all(isinstance(each, Mapping) for each in value) else ()
+    return (
+        value if _is_cell(value) and all(isinstance(element, Mapping) for element in value) else ()
+    )
 
 
 def _is_cell(value: Any) -> bool:
@@ -165,7 +172,8 @@ def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any] | None:
         signals.get("values"), list
     ):  # an array of structs, by field
         signals = [
-            dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)
+            dict(zip(signals, field_values, strict=True))
+            for field_values in zip(*signals.values(), strict=True)
         ]
     parts = (
         [signals]
@@ -208,7 +216,7 @@ def _make_table(
             and not _is_array(value)
         ):
             is_complex = isinstance(value, np.ndarray) and value.dtype.kind == "c"
-            kind = "texts" if all(isinstance(each, str) for each in value) else "cells"
+            kind = "texts" if all(isinstance(cell, str) for cell in value) else "cells"
             left_out.append(f"{key} ({'complex numbers' if is_complex else kind})")
     if left_out:
         notes = (*notes, f"Not read, because it contains no real numbers: {', '.join(left_out)}.")
@@ -258,13 +266,13 @@ def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
     units_field = fields.get("units", fields.get("unit", {}))
     units = units_field if isinstance(units_field, Mapping) else {}
     lists = (
-        each.tolist() if isinstance(each, np.ndarray) and each.dtype.kind in "UO" else each
-        for each in fields.values()
+        field.tolist() if isinstance(field, np.ndarray) and field.dtype.kind in "UO" else field
+        for field in fields.values()
     )
     columns = [
-        [text.strip() for text in each]
-        for each in lists
-        if isinstance(each, list) and all(isinstance(text, str) for text in each)
+        [text.strip() for text in entries]
+        for entries in lists
+        if isinstance(entries, list) and all(isinstance(text, str) for text in entries)
     ]
     for name, value in fields.items():
         if _is_array(value) and value.ndim == 1:
@@ -274,7 +282,7 @@ def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
                 1
             ]  # without a list of texts next to the matrix, expressions of MATLAB: `data(:,1)`
             indexed = [f"{name}(:,{j})" for j in range(1, width + 1)]
-            names = next((each for each in columns if len(each) == width), indexed)
+            names = next((headings for headings in columns if len(headings) == width), indexed)
             yield from (Channel(names[j], value[:, j]) for j in range(width))
         elif isinstance(value, np.ndarray) and value.ndim > 2:
             raise ColumnError(

@@ -37,9 +37,9 @@ def read_mdf_tables(path: Path, selection: Selection = Selection()) -> tuple[Raw
             path.name, list(_channels(file, reductions)), {}, mapped=selection.columns
         )
         notes = [
-            f"Channel group '{names[i]}': {each.note}"
-            for i, each in reductions.items()
-            if each.note
+            f"Channel group '{names[i]}': {reduction.note}"
+            for i, reduction in reductions.items()
+            if reduction.note
         ]
         return (table.noted(*notes),)
 

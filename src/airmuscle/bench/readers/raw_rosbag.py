@@ -131,10 +131,10 @@ def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, fl
             continue
         if isinstance(item, bool | int | float | np.number):
             number = item.item() if isinstance(item, np.number) else item
-            own = len(field) > 1 and not kind.startswith(
+            is_named = len(field) > 1 and not kind.startswith(
                 STANDARD
             )  # x, y and z are parts of a vector in every message
-            yield _Field(inner, within, stated or own), number
+            yield _Field(inner, within, stated or is_named), number
         elif (
             isinstance(item, np.ndarray)
             and item.dtype.kind in "biuf"

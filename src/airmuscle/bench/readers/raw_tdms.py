@@ -28,15 +28,17 @@ def read_tdms_tables(path: Path, selection: Selection = Selection()) -> tuple[Ra
             raise FileError(f"{path.name}: no channel contains values.")
         selected = [nonempty[name] for name in selection.groups(path.name, "group", nonempty)]
         tables = list[RawTable]()
-        for each in selected:
+        for group in selected:
             constants = {
                 name: value
-                for name, value in {**file.properties, **each.properties}.items()
+                for name, value in {**file.properties, **group.properties}.items()
                 if isinstance(value, float | int | str)
                 and name not in ("name", "description", "title", "author")
             }
             channels = []
-            for channel, start in zip(each.channels(), _start_times(each.channels()), strict=True):
+            for channel, start in zip(
+                group.channels(), _start_times(group.channels()), strict=True
+            ):
                 unit = str(
                     channel.properties.get("unit_string")
                     or channel.properties.get("NI_UnitDescription")
@@ -48,7 +50,7 @@ def read_tdms_tables(path: Path, selection: Selection = Selection()) -> tuple[Ra
                     offset = float(channel.properties.get("wf_start_offset", 0.0))
                     time = np.asarray(start + offset + step * np.arange(len(channel)))
                 channels.append(Channel(channel.name, channel[:], time, unit))
-            origin = f"{path.name}, group '{each.name}'" if len(selected) > 1 else path.name
+            origin = f"{path.name}, group '{group.name}'" if len(selected) > 1 else path.name
             tables.append(merge_channels(origin, channels, constants, mapped=selection.columns))
         return tuple(tables)
 

@@ -31,9 +31,9 @@ def read_workbook_tables(path: Path, selection: Selection = Selection()) -> tupl
     calamine = import_lab_package("python_calamine", path)
     with reading(path, "a workbook"), calamine.CalamineWorkbook.from_path(str(path)) as book:
         names = [
-            each.name
-            for each in book.sheets_metadata
-            if each.typ == calamine.SheetTypeEnum.WorkSheet
+            sheet.name
+            for sheet in book.sheets_metadata
+            if sheet.typ == calamine.SheetTypeEnum.WorkSheet
         ]
         check_known(
             f"{path.name}: no sheet",
@@ -47,12 +47,12 @@ def read_workbook_tables(path: Path, selection: Selection = Selection()) -> tupl
             for name in names
             if selection.sheet in (None, name)
         }
-    found = {
+    filled_rows = {
         name: [(i, row) for i, row in enumerate(rows, 1) if header.count_cells(row)]
         for name, rows in cells.items()
     }
     sheets = {
-        name: rows for name, rows in found.items() if any(_is_numeric(row) for _, row in rows)
+        name: rows for name, rows in filled_rows.items() if any(_is_numeric(row) for _, row in rows)
     }
     if not sheets:
         raise FileError(
@@ -61,8 +61,8 @@ def read_workbook_tables(path: Path, selection: Selection = Selection()) -> tupl
         )
     origins = [f"{path.name}, sheet '{name}'" if len(sheets) > 1 else path.name for name in sheets]
     return tuple(
-        _parse_table(*each, selection.text_format)
-        for each in zip(origins, sheets.values(), strict=True)
+        _parse_table(*part, selection.text_format)
+        for part in zip(origins, sheets.values(), strict=True)
     )
 
 

@@ -54,9 +54,9 @@ def read(
     """
     mapping = _as_mapping(mapping, fields)
     recordings = [
-        each
+        recording
         for path in find_files(source)
-        for each in read_file(path, mapping, downsampling, progress)
+        for recording in read_file(path, mapping, downsampling, progress)
     ]
     return tuple(complete_bench(recordings, mapping))
 
@@ -140,7 +140,7 @@ def find_files(source: Source) -> list[Path]:
                 f"read: {abridged(source)} is not a path. Pass a file, a folder, a glob pattern, or"
                 " a list of them."
             )
-        return [path for each in source for path in find_files(each)]
+        return [path for part in source for path in find_files(part)]
     path = Path(source)
     files = [Path(source)]
     missing = ""

@@ -32,9 +32,13 @@ class Selection:
         known = {name.strip("/"): name for name in names}
         if self.group is None:
             return tuple(known.values())
-        whole = self.group.strip("/")
+        complete_name = self.group.strip("/")
         # a name may contain a comma itself
-        wanted = [whole] if whole in known else [_bare(part) for part in self.group.split(",")]
+        wanted = (
+            [complete_name]
+            if complete_name in known
+            else [_bare(part) for part in self.group.split(",")]
+        )
         for name in wanted:
             if name not in known:
                 there = alternatives(name, tuple(known.values()), f"the {kind}s are")

@@ -38,10 +38,10 @@ class TextFormat:
 
     def __post_init__(self) -> None:
         for name, (signs, text) in _SIGNS.items():
-            given = getattr(self, name)
-            if given is not None and given not in signs:
+            sign = getattr(self, name)
+            if sign is not None and sign not in signs:
                 raise ParameterError(
-                    f"{name} is {abridged(given)}; it must be {text}. Omit it for automatic"
+                    f"{name} is {abridged(sign)}; it must be {text}. Omit it for automatic"
                     " detection."
                 )
         if self.delimiter == self.decimal == ",":

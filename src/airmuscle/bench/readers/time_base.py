@@ -200,9 +200,9 @@ class Downsampling(abc.ABC):
 
     def note(self, rows: int, step: int) -> str:
         """The note for the user on the reduction of `rows` rows."""
-        kept = math.ceil(rows / step)
+        remaining = math.ceil(rows / step)
         return RowNote(
-            f"The file has {rows} rows; {self.rule.format(step)}, {kept} in total (max_rows)."
+            f"The file has {rows} rows; {self.rule.format(step)}, {remaining} in total (max_rows)."
         )
 
 

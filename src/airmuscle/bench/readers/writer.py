@@ -152,21 +152,23 @@ def from_pandas(
     if not len(frame.columns) or not len(frame):
         raise ParameterError(f"from_pandas: {origin} has no columns or no rows.")
     series = [frame.iloc[:, i] for i in range(len(frame.columns))]
-    dated = (each for each in series if each.dtype.kind == "M")
+    dated = (column for column in series if column.dtype.kind == "M")
     text = "Column '{}' contains dates; time is counted from the first, {}."
-    notes = tuple(text.format(each.name, each.iloc[0]) for each in dated)
+    notes = tuple(text.format(column.name, column.iloc[0]) for column in dated)
     channels = []
     for (
-        each
+        column
     ) in series:  # numbers, dates or durations where a column has such a type, otherwise texts
-        kind = each.dtype.kind
+        kind = column.dtype.kind
         if kind in "Mm":
-            values = each.to_numpy(dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
+            values = column.to_numpy(dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
         else:
             values = (
-                np.asarray(each.to_numpy(), dtype=float) if kind in "biuf" else list(map(str, each))
+                np.asarray(column.to_numpy(), dtype=float)
+                if kind in "biuf"
+                else list(map(str, column))
             )
-        channels.append(Channel(str(each.name), values))
+        channels.append(Channel(str(column.name), values))
     table = merge_channels(origin, channels, {})
     table = dataclasses.replace(table, rows=np.arange(len(frame)), notes=notes)
     return interpret(apply_mapping(table, mapping), mapping)
