@@ -104,7 +104,7 @@ def estimate_angles(
     rows = fitted.rows("angle") if any_pose else np.array([run.angle[0] for run in fitted.runs])
     poses = rows[rng.choice(len(rows), min(MEMBERS, len(rows)), replace=False)]
     known = fitted[-CALIBRATED:]
-    own = in_pairs(episodes, fit.pairs)
+    ordered = in_pairs(episodes, fit.pairs)
     before, _ = _runs(fit.arm, known.runs, known.sample_time, fit.inspection.delay, poses)
     seen = _seen(before, known.runs)
     errors = before - _padded(known.runs, "angle")
@@ -119,9 +119,9 @@ def estimate_angles(
         1.0, COVERAGE * (1 + 1 / len(known))
     )  # so that it holds for one further episode, too
     limits = np.nanquantile(np.abs(np.concatenate(left)), level, axis=0, method="higher")
-    angle, spread = _runs(fit.arm, own.runs, own.sample_time, fit.inspection.delay, poses)
-    angle = angle - _predicted_errors(seen, errors, _seen(angle, own.runs))
-    measured = _padded(own.runs, "angle")
+    angle, spread = _runs(fit.arm, ordered.runs, ordered.sample_time, fit.inspection.delay, poses)
+    angle = angle - _predicted_errors(seen, errors, _seen(angle, ordered.runs))
+    measured = _padded(ordered.runs, "angle")
     limits = limits[np.minimum(np.arange(angle.shape[1]), len(limits) - 1)]
     unseen = np.where(np.isfinite(measured), spread > UNSEEN * poses.std(axis=0), np.nan)
     span = np.ptp(np.quantile(fitted.rows("angle"), (0.01, 0.99), axis=0), axis=0)
@@ -135,7 +135,7 @@ def _predicted_errors(seen: Array, errors: Array, further: Array) -> Array:
     """
     enough = np.isfinite(errors).all(axis=2).sum(axis=0) >= FEWEST
     last = max(int(np.count_nonzero(enough)) - 1, 0)
-    found = np.zeros((len(further), further.shape[1], errors.shape[2]))
+    predicted = np.zeros((len(further), further.shape[1], errors.shape[2]))
     for row in range(further.shape[1]) if enough.any() else ():
         k = min(row, last)
         there = np.isfinite(errors[:, k]).all(axis=1)
@@ -147,15 +147,15 @@ def _predicted_errors(seen: Array, errors: Array, further: Array) -> Array:
         slope = np.linalg.solve(
             z.T @ z + RIDGE * len(z) * np.eye(z.shape[1]), z.T @ (e - e.mean(axis=0))
         )
-        found[:, row] = e.mean(axis=0) + (further[:, row] - mean) / scale @ slope
-    return found
+        predicted[:, row] = e.mean(axis=0) + (further[:, row] - mean) / scale @ slope
+    return predicted
 
 
 def _seen(angle: Array, runs: Sequence[Episode]) -> Array:
     """What a correction sees in every row (N, R, F): angles of the runs, pressures of the row and
     of an earlier one.
     """
-    pressure = _padded(runs, "pressure", held=True)
+    pressure = _padded(runs, "pressure", hold_last=True)
     earlier = np.maximum(np.arange(pressure.shape[1]) - EARLIER, 0)
     return np.concatenate([angle, pressure, pressure[:, earlier]], axis=-1)
 
@@ -166,7 +166,7 @@ def _runs(
     """Mean and standard deviation (N, R, J) of the free runs from all poses; NaN after the end of
     an episode.
     """
-    pressure = _padded(runs, "pressure", held=True)
+    pressure = _padded(runs, "pressure", hold_last=True)
     rows = pressure.shape[1]
     names = [c.name for c in arm.mechanism.coordinates]
     later = np.minimum(np.arange(rows) + delay, rows - 1)
@@ -176,15 +176,15 @@ def _runs(
         f"{p}pressure": np.repeat(pressure[:, later[0], i], len(poses))
         for i, p in enumerate(arm.prefixes)
     }
-    found = angles(arm, np.repeat(pressure[:, later], len(poses), axis=0), state, sample_time)
-    stacked = found.reshape(len(runs), len(poses), rows, len(names))
+    simulated = angles(arm, np.repeat(pressure[:, later], len(poses), axis=0), state, sample_time)
+    stacked = simulated.reshape(len(runs), len(poses), rows, len(names))
     ended = np.isnan(_padded(runs, "angle"))
     return np.where(ended, np.nan, stacked.mean(axis=1)), np.where(
         ended, np.nan, stacked.std(axis=1)
     )
 
 
-def _padded(runs: Sequence[Episode], name: str, held: bool = False) -> Array:
+def _padded(runs: Sequence[Episode], name: str, hold_last: bool = False) -> Array:
     """One quantity of all episodes (N, R, columns), its last row held or NaN after the end of an
     episode.
     """
@@ -192,6 +192,6 @@ def _padded(runs: Sequence[Episode], name: str, held: bool = False) -> Array:
     longest = max(map(len, columns))
     padded = []
     for column in columns:
-        end = column[-1:] if held else np.full_like(column[-1:], np.nan)
+        end = column[-1:] if hold_last else np.full_like(column[-1:], np.nan)
         padded.append(np.concatenate([column, np.repeat(end, longest - len(column), axis=0)]))
     return np.stack(padded)

@@ -167,10 +167,10 @@ class Descent:
         windows.
         """
         arm = with_values(self.arm, self.names, values)
-        some = self.windows.sample(SAMPLE, rows)
-        errors = self.errors(arm, self.joint, some)
+        sampled = self.windows.sample(SAMPLE, rows)
+        errors = self.errors(arm, self.joint, sampled)
         errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
-        errors = errors[some.counts[:, HISTORY + 1 :]]
+        errors = errors[sampled.counts[:, HISTORY + 1 :]]
         return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
 
     def _step(self, normal: Array, slope: Array, rate: float, damping: float) -> None:
@@ -206,7 +206,7 @@ def with_slopes(
     """
     observed = system
     keep = list(names)
-    own = [[sensitivity(n, k) for k in range(len(paths))] for n in names]
+    slope_names = [[sensitivity(n, k) for k in range(len(paths))] for n in names]
     if paths:
         zeros = np.zeros(len(inputs))
         state = {
@@ -215,7 +215,7 @@ def with_slopes(
         observed = WithSensitivities(
             system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names)
         )
-        keep += itertools.chain(*own)
+        keep += itertools.chain(*slope_names)
     times = step * np.arange(inputs.shape[1])
     signals = [WindowSignal(np.ascontiguousarray(u), step) for u in inputs]
     run = simulate_batch(
@@ -229,7 +229,7 @@ def with_slopes(
         integrator=RungeKutta4(step / SUBSTEPS),
     )
     columns = np.stack([run[name] for name in names], axis=-1)
-    slopes = [np.stack([run[name] for name in row], axis=-1) for row in own if row]
+    slopes = [np.stack([run[name] for name in row], axis=-1) for row in slope_names if row]
     return columns, np.stack(slopes, axis=2) if slopes else np.zeros((*columns.shape, 0))
 
 
@@ -262,8 +262,10 @@ def _run_of_joint(
     motion = [column[:, HISTORY:, i, None] for i in system.others for column in measured]
     inputs = np.concatenate([windows.pressure[:, HISTORY:], *motion], axis=-1)
     of_arm = [f"arm.{path}" for path in paths]
-    found, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
-    return np.asarray(found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint]), slopes[:, 1:, 0]
+    simulated, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
+    return np.asarray(simulated[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint]), slopes[
+        :, 1:, 0
+    ]
 
 
 def with_values(arm: Arm, paths: Sequence[str], values: Sequence[float] | Array) -> Arm:
@@ -348,11 +350,11 @@ class OneJoint(System):
             self.arm.muscle, pressures, mechanism.contractions(place, lengths), strict=True
         )
         tensions = [muscle.tension(p, eps) for muscle, p, eps in acting]
-        others = {
+        accelerations = {
             mechanism.coordinates[i].name: inputs[mechanism.coordinates[i].acceleration]
             for i in self.others
         }
-        needed = mechanism.inverse_dynamics(place, place, {**others, c.name: 0.0})[c.name]
+        needed = mechanism.inverse_dynamics(place, place, {**accelerations, c.name: 0.0})[c.name]
         outer = cast(WithStickSlip, self.arm.mechanism)
         read = {
             f"{prefix}pressure": p for prefix, p in zip(self.arm.prefixes, pressures, strict=True)
@@ -363,7 +365,7 @@ class OneJoint(System):
         element = outer.elements[self.joint]
         bristle = state[self.states[2].name]
         if element.bearing_arms:
-            load += outer.bearing_load(self.joint, place, place, others)
+            load += outer.bearing_load(self.joint, place, place, accelerations)
         friction = element.torque(bristle, load, state[c.speed])
         rates = {
             c.name: state[c.speed],

@@ -105,7 +105,9 @@ class EpisodeMapping:
     def columns(self) -> tuple[str, ...]:
         """Names of all columns and arrays that are used."""
         quantities = (self.angles, self.pressures, self.speeds, self.commands)
-        named = [name for each in quantities if each is not None for name in each.columns]
+        named = [
+            name for channels in quantities if channels is not None for name in channels.columns
+        ]
         return (*named, *(name for name in (self.time, self.starts) if name is not None))
 
 
@@ -176,10 +178,10 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
 
 
 def _pairs(path: Path, pairs: Any) -> tuple[tuple[int, int], ...]:
-    whole = isinstance(pairs, list | tuple) and all(
+    is_list_of_pairs = isinstance(pairs, list | tuple) and all(
         isinstance(pair, list) and len(pair) == 2 for pair in pairs
     )
-    flat = [muscle for pair in pairs for muscle in pair] if whole else [None]
+    flat = [muscle for pair in pairs for muscle in pair] if is_list_of_pairs else [None]
     if not all(isinstance(muscle, int) and muscle > 0 for muscle in flat) or len(set(flat)) < len(
         flat
     ):
@@ -207,12 +209,13 @@ def read_episodes(source: str | Path, mapping: str | Path | EpisodeMapping) -> E
     path = Path(source)
     rules = mapping if isinstance(mapping, EpisodeMapping) else read_episode_mapping(mapping)
     files = find_episode_files(path)
-    found = join([_episodes_of(each, rules) for each in files])
-    kinds = sorted({each.suffix or "bags" for each in files})
+    episodes = join([_episodes_of(file, rules) for file in files])
+    kinds = sorted({file.suffix or "bags" for file in files})
     count = (
-        f"{counted(len(found), 'episode')} from {counted(len(files), 'file')} ({', '.join(kinds)})"
+        f"{counted(len(episodes), 'episode')} from {counted(len(files), 'file')}"
+        f" ({', '.join(kinds)})"
     )
-    return dataclasses.replace(found, notes=(count, *found.notes))
+    return dataclasses.replace(episodes, notes=(count, *episodes.notes))
 
 
 def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
@@ -221,9 +224,9 @@ def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
     times = []
     for number, arrays in enumerate(tables):
         name = path.name if len(tables) == 1 else f"{path.name}, episode {number + 1}"
-        whole, step = _episode(name, arrays, mapping)
+        record, step = _episode(name, arrays, mapping)
         times.append(step)
-        runs += _split(whole, arrays, mapping, step)
+        runs += _split(record, arrays, mapping, step)
     known = (
         mapping.speeds is not None
         or mapping.time is not None
@@ -232,30 +235,30 @@ def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
     return Episodes(tuple(runs), float(np.median(times)), notes, known)
 
 
-def _split(whole: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float) -> list[Episode]:
+def _split(record: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float) -> list[Episode]:
     if mapping.starts is None:
-        return [whole]
-    marks = _array(whole.name, arrays, mapping.starts).ravel()
-    flags = len(marks) == len(whole) and bool(np.isin(marks, (0, 1)).all())
+        return [record]
+    marks = _array(record.name, arrays, mapping.starts).ravel()
+    flags = len(marks) == len(record) and bool(np.isin(marks, (0, 1)).all())
     starts = np.flatnonzero(marks) if flags else marks
     if (
         not len(starts)
         or np.any(starts != starts.astype(int))
-        or np.any(np.diff([*starts, len(whole) + 0.5]) <= 0.0)
+        or np.any(np.diff([*starts, len(record) + 0.5]) <= 0.0)
     ):
         raise ColumnError(
-            f"{whole.name}: starts, column '{mapping.starts}', must be the first rows of the"
-            f" episodes, from 0, whole and rising below {len(whole)} rows, or 1 in these rows and 0"
-            " elsewhere."
+            f"{record.name}: starts, column '{mapping.starts}', must be the first rows of the"
+            f" episodes, from 0, whole and rising below {len(record)} rows, or 1 in these rows and"
+            " 0 elsewhere."
         )
-    edges = [*(int(row) for row in starts if row < len(whole)), len(whole)]
+    edges = [*(int(row) for row in starts if row < len(record)), len(record)]
     runs = []
     for number, (a, b) in enumerate(itertools.pairwise(edges), start=1):
-        angle = whole.angle[a:b]
-        command = None if whole.command is None else whole.command[a:b]
-        speed = whole.speed[a:b] if mapping.speeds else speed_of(angle, step)
+        angle = record.angle[a:b]
+        command = None if record.command is None else record.command[a:b]
+        speed = record.speed[a:b] if mapping.speeds else speed_of(angle, step)
         runs.append(
-            Episode(angle, speed, whole.pressure[a:b], command, f"{whole.name}, episode {number}")
+            Episode(angle, speed, record.pressure[a:b], command, f"{record.name}, episode {number}")
         )
     return runs
 
@@ -287,17 +290,17 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
                 )
     speed = _columns(name, arrays, mapping.speeds) if mapping.speeds else speed_of(angle, step)
     command = _columns(name, arrays, mapping.commands) if mapping.commands else None
-    for what, given in (("pressures", pressure), ("speeds", speed), ("commands", command)):
-        if given is not None and len(given) != len(angle):
+    for what, readings in (("pressures", pressure), ("speeds", speed), ("commands", command)):
+        if readings is not None and len(readings) != len(angle):
             raise ColumnError(
-                f"{name}: {what} have {len(given)} rows, angles {len(angle)}; they must have as"
+                f"{name}: {what} have {len(readings)} rows, angles {len(angle)}; they must have as"
                 " many."
             )
     return Episode(angle, speed, pressure, command, name), step
 
 
 def _times(arrays: Arrays) -> list[str]:
-    return [each for each in arrays if each.lower() in TIMES and arrays[each].size > 1]
+    return [name for name in arrays if name.lower() in TIMES and arrays[name].size > 1]
 
 
 def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:

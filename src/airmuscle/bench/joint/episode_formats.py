@@ -35,13 +35,13 @@ def find_episode_files(path: Path) -> list[Path]:
     """
     if not path.is_dir() or _is_bag(path):
         return [path]
-    found = sorted(each for each in path.iterdir() if _is_episode(each))
-    if not found:
-        steps = any(".tfrecord" in each.name for each in path.iterdir())
+    files = sorted(entry for entry in path.iterdir() if _is_episode(entry))
+    if not files:
+        steps = any(".tfrecord" in entry.name for entry in path.iterdir())
         raise FileError(
             f"{path}: {TFRECORD if steps else f'the folder holds no file of episodes; {FORMATS}'}"
         )
-    return found
+    return files
 
 
 def _is_episode(path: Path) -> bool:
@@ -76,7 +76,7 @@ def _read_bag(
     file = (
         path
         if path.is_file()
-        else min(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
+        else min(entry for entry in path.iterdir() if entry.suffix in (".db3", ".mcap"))
     )
     (table,) = format_of(file).read_tables(file, Selection(columns=tuple(mapped)))
     columns = arrays_of_table(table)
@@ -130,7 +130,7 @@ def propose_mapping(source: str | Path) -> str:
     """
     path = find_episode_files(Path(source))[0]
     arrays = read_arrays(path)[0][0]
-    found = {
+    names_by_role = {
         role: [n for n, a in arrays.items() if _role(n) == role and a.size > 1] for role in ROLES
     }
     lines = [
@@ -143,13 +143,15 @@ def propose_mapping(source: str | Path) -> str:
         )
     else:
         lines.append(
-            f'time = "{found["time"][0]}"' if found["time"] else _sample_time(arrays, found)
+            f'time = "{names_by_role["time"][0]}"'
+            if names_by_role["time"]
+            else _sample_time(arrays, names_by_role)
         )
-    lines += [f'starts = "{found["starts"][0]}"'] if found["starts"] else []
+    lines += [f'starts = "{names_by_role["starts"][0]}"'] if names_by_role["starts"] else []
     for role in ("angles", "speeds", "pressures", "commands"):
-        if found[role] or role in ("angles", "pressures"):
-            columns = json.dumps(found[role] or ["name the columns"])
-            lines += ["", f"[{role}]", f"columns = {columns}", *_scale(role, found, arrays)]
+        if names_by_role[role] or role in ("angles", "pressures"):
+            columns = json.dumps(names_by_role[role] or ["name the columns"])
+            lines += ["", f"[{role}]", f"columns = {columns}", *_scale(role, names_by_role, arrays)]
     return "\n".join(lines) + "\n"
 
 
@@ -164,15 +166,17 @@ def _size(names: Iterable[str], arrays: Arrays) -> float:
     )
 
 
-def _sample_time(arrays: Arrays, found: Mapping[str, list[str]]) -> str:
+def _sample_time(arrays: Arrays, names_by_role: Mapping[str, list[str]]) -> str:
     """The step with which the angles move as fast as the speeds say."""
     for name, array in arrays.items():
         if array.size == 1 and STEP_WORDS & set(re.findall("[a-z]+", name.lower())):
             return f'sample_time = "{1e3 * float(array.ravel()[0]):.6g} ms"  # {name} of the record'
     angles, speeds = (
         (
-            np.concatenate([arrays[n].reshape(len(arrays[n]), -1) for n in found[role]], axis=1)
-            if found[role]
+            np.concatenate(
+                [arrays[n].reshape(len(arrays[n]), -1) for n in names_by_role[role]], axis=1
+            )
+            if names_by_role[role]
             else np.zeros((1, 0))
         )
         for role in ("angles", "speeds")
@@ -189,15 +193,16 @@ def _sample_time(arrays: Arrays, found: Mapping[str, list[str]]) -> str:
     )
 
 
-def _scale(role: str, found: Mapping[str, list[str]], arrays: Arrays) -> list[str]:
+def _scale(role: str, names_by_role: Mapping[str, list[str]], arrays: Arrays) -> list[str]:
     if role in ("angles", "speeds"):
-        unit = "deg" if _size(found["angles"], arrays) > TURN else "rad"
+        unit = "deg" if _size(names_by_role["angles"], arrays) > TURN else "rad"
         return [f'unit = "{unit}"  # guessed from the size of the angles']
     if role == "commands":
         return []
     divisors = [f'divisors = "{name}"' for name in arrays if _role(name) == "divisors"]
     unit = next(
-        (unit for limit, unit in PRESSURE_SCALES if _size(found[role], arrays) < limit), "1 Pa"
+        (unit for limit, unit in PRESSURE_SCALES if _size(names_by_role[role], arrays) < limit),
+        "1 Pa",
     )
     return [
         *divisors,

@@ -85,19 +85,19 @@ class EpisodeInspection(Reported):
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """For each joint the muscle, from 1, that raises its angle and the one that lowers it.
         Raises IdentificationError where the pressures do not show it with certainty."""
-        found = []
+        pairs = []
         for joint in range(1, self.episodes.joints + 1):
-            own = [a for a in self.actions if a.joint == joint and a.certain]
-            up = [a.muscle for a in own if a.sign > 0]
-            down = [a.muscle for a in own if a.sign < 0]
+            certain_actions = [a for a in self.actions if a.joint == joint and a.certain]
+            up = [a.muscle for a in certain_actions if a.sign > 0]
+            down = [a.muscle for a in certain_actions if a.sign < 0]
             if (len(up), len(down)) != (1, 1):
                 raise IdentificationError(
                     f"joint {joint}: {counted(len(up), 'pressure')} with certainty for raising its"
                     f" angle, {len(down)} for lowering it; one of each is needed. State the muscles"
                     " of each joint in the mapping file: pairs = [[1, 2], ...]."
                 )
-            found.append((up[0], down[0]))
-        return tuple(found)
+            pairs.append((up[0], down[0]))
+        return tuple(pairs)
 
     def chapter(self) -> Chapter:
         """The description: ranges of the readings, which pressure acts on which angle, and
@@ -122,7 +122,8 @@ class EpisodeInspection(Reported):
         readings = np.concatenate([e.rows("angle"), e.rows("pressure")], axis=1)
         low, middle, high = np.quantile(readings, (0.01, 0.5, 0.99), axis=0).tolist()
         units, shown = (
-            np.repeat(each, counts).tolist() for each in (("rad", "Pa"), ("deg", "kPa"))
+            np.repeat(units_of_kinds, counts).tolist()
+            for units_of_kinds in (("rad", "Pa"), ("deg", "kPa"))
         )
         columns = {
             "reading": names,
@@ -153,8 +154,8 @@ class EpisodeInspection(Reported):
                 for i, x in enumerate(e.rows("pressure").T, 1)
             ),
             *said[1 + len(e.notes) :],
-            *(f"remark: {each}" for each in self.remarks),
-            *(f"error: {each}" for each in self.errors),
+            *(f"remark: {remark}" for remark in self.remarks),
+            *(f"error: {error}" for error in self.errors),
         ]
         return "\n".join(lines)
 
@@ -237,43 +238,43 @@ def _doubtful(episodes: Episodes) -> list[str]:
     sample time.
     """
     spans = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0)
-    found = list[str]()
+    remarks = list[str]()
     for i, x in enumerate(spans, 1):
         if not NARROW < x < WIDE:
             kind = "degrees read as radians" if x > WIDE else "radians read as degrees"
             text = f"angle {i} spans {np.degrees(x):.3g} deg, as {kind} do"
-            found.append(f"{text}: check its unit in the mapping file, [angles]")
+            remarks.append(f"{text}: check its unit in the mapping file, [angles]")
     pressure = episodes.rows("pressure")
     high = float(np.quantile(np.abs(pressure), 0.99))
-    whole = bool(np.all(pressure == np.round(pressure)))
-    if high < 1e4 or whole:
-        kind = "whole numbers, as counts" if whole else "small, as shares of a range"
-        found.append(
+    is_integral = bool(np.all(pressure == np.round(pressure)))
+    if high < 1e4 or is_integral:
+        kind = "whole numbers, as counts" if is_integral else "small, as shares of a range"
+        remarks.append(
             f"pressures look like a scale and not like Pa: they are {kind}, up to {high:.4g}. Zero"
             " and gain are absorbed by the reduced law; state pressures.scale for forces of the"
             " right size"
         )
     if not episodes.confirmed:
-        found.append(
+        remarks.append(
             f"the sample time of {1e3 * episodes.sample_time:.4g} ms cannot be checked, because the"
             " record has neither times nor speeds: with another one other inertias, dampings and"
             " lags explain the same rows"
         )
-    return found
+    return remarks
 
 
 def _constant(episodes: Episodes) -> list[str]:
-    found = []
+    errors = []
     for name, unit in (("pressure", "Pa"), ("angle", "rad")):
         low, high = np.quantile(episodes.rows(name), (0.01, 0.99), axis=0)
         dead = np.flatnonzero(high - low <= DEAD * np.max(high - low))
-        found += [
+        errors += [
             f"{name} {i + 1} never varies, it is {low[i]:.4g} to {high[i]:.4g} {unit} in 98 % of"
             " the rows: its sensor does not record. Leave its joint out, or give commands in place"
             " of pressures."
             for i in dead
         ]
-    return found
+    return errors
 
 
 def _sample_time(episodes: Episodes) -> list[str]:
@@ -284,7 +285,7 @@ def _sample_time(episodes: Episodes) -> list[str]:
         np.cumsum(run.speed[1:] + run.speed[:-1], axis=0) * (0.5 * episodes.sample_time)
         for run in episodes.runs
     ]
-    said = np.concatenate([each[TRAVEL:] - each[:-TRAVEL] for each in path])
+    said = np.concatenate([integral[TRAVEL:] - integral[:-TRAVEL] for integral in path])
     moved = np.concatenate(
         [run.angle[1 + TRAVEL :] - run.angle[1:-TRAVEL] for run in episodes.runs]
     )
@@ -321,12 +322,12 @@ def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
     ]
     if not blocks:
         return 0, ()
-    found = [_regress(blocks, delay) for delay in range(MAX_DELAY + 1)]
-    delay = int(np.argmin([residual for _, residual in found]))
+    regressions = [_regress(blocks, delay) for delay in range(MAX_DELAY + 1)]
+    delay = int(np.argmin([residual for _, residual in regressions]))
     actions = []
-    for muscle, row in enumerate(found[delay][0], start=1):
-        joint, *others = np.argsort(-np.abs(row)).tolist()
-        following = float(abs(row[others[0]])) if others else 0.0
+    for muscle, row in enumerate(regressions[delay][0], start=1):
+        joint, *further_joints = np.argsort(-np.abs(row)).tolist()
+        following = float(abs(row[further_joints[0]])) if further_joints else 0.0
         sign = int(np.sign(row[joint]))
         t_value = float(abs(row[joint]))
         actions.append(PressureAction(muscle, joint + 1, sign, t_value, following))
@@ -343,17 +344,19 @@ def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[
         for _, s, p in blocks
     ]
     y = [a[rows] for a, _, _ in blocks]
-    whole = np.concatenate(x)
+    regressors = np.concatenate(x)
     target = np.concatenate(y)
-    mean = whole.mean(axis=0)
-    spread = whole.std(axis=0) + 1e-12
-    design = np.column_stack([(whole - mean) / spread, np.ones(len(whole))])
+    mean = regressors.mean(axis=0)
+    spread = regressors.std(axis=0) + 1e-12
+    design = np.column_stack([(regressors - mean) / spread, np.ones(len(regressors))])
     inverse = np.linalg.pinv(design.T @ design)
     coefficients = inverse @ (design.T @ target)
     residual = target - design @ coefficients
     muscles = blocks[0][2].shape[1]
-    ends = np.cumsum([len(each) for each in x])[:-1]
-    ends = ends if len(x) >= PIECES else np.linspace(0, len(whole), PIECES + 1).astype(int)[1:-1]
+    ends = np.cumsum([len(part) for part in x])[:-1]
+    ends = (
+        ends if len(x) >= PIECES else np.linspace(0, len(regressors), PIECES + 1).astype(int)[1:-1]
+    )
     pieces = zip(np.split(design, ends), np.split(residual, ends), strict=True)
     scores = np.array([a.T @ r for a, r in pieces])
     t_values = np.empty((muscles, target.shape[1]))
@@ -409,17 +412,17 @@ def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, li
     not count, and a remark on these; all rows count where less than LEAST would be left."""
     ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= saturated(episodes)[0], axis=-1)
     hit = np.cumsum(ends, axis=1)[:, SETTLED:] > 0
-    few = hit[:, 1:].mean() <= 1.0 - LEAST
+    leaves_enough = hit[:, 1:].mean() <= 1.0 - LEAST
     text = (
         f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its"
         " upper end, whose true value is unknown: they "
         + (
             "do not count, except in the errors of the report"
-            if few
+            if leaves_enough
             else "are too many to leave out"
         )
     )
     counts = np.concatenate([windows.counts[:, :HISTORY], ~hit], axis=1)
-    return dataclasses.replace(windows, counts=counts) if few else windows, (
+    return dataclasses.replace(windows, counts=counts) if leaves_enough else windows, (
         [text] if hit.any() else []
     )

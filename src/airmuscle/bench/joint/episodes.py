@@ -46,11 +46,11 @@ class Episodes:
 
     def __post_init__(self) -> None:
         if not self.runs or not self.sample_time > 0.0:
-            given = f"{len(self.runs)} runs at a sample time of {self.sample_time:g} s are given"
+            stated = f"{len(self.runs)} runs at a sample time of {self.sample_time:g} s are given"
             raise ParameterError(
-                f"Episodes: {given}; give one run at least and a sample time above 0."
+                f"Episodes: {stated}; give one run at least and a sample time above 0."
             )
-        if len(shapes := {(each.angle.shape[1], each.pressure.shape[1]) for each in self.runs}) > 1:
+        if len(shapes := {(run.angle.shape[1], run.pressure.shape[1]) for run in self.runs}) > 1:
             different = f"runs have different numbers of joints and muscles, {sorted(shapes)}"
             raise ParameterError(f"Episodes: {different}; fit each arm alone.")
 
@@ -72,7 +72,7 @@ class Episodes:
 
     def rows(self, name: str) -> Array:
         """The rows of all runs of one quantity: angle, speed, pressure or command."""
-        return np.concatenate([getattr(each, name) for each in self.runs])
+        return np.concatenate([getattr(run, name) for run in self.runs])
 
 
 ENOUGH = 19
@@ -106,14 +106,14 @@ def speed_of(angle: Array, sample_time: float) -> Array:
 
 def join(parts: Sequence[Episodes]) -> Episodes:
     """Episodes of several files as one. Raises ParameterError for different sample times."""
-    times = {round(each.sample_time, 6) for each in parts}
+    times = {round(part.sample_time, 6) for part in parts}
     if len(times) > 1:
         raise ParameterError(
             f"Episodes: files have different sample times [s], {sorted(times)}; fit each alone."
         )
-    notes = tuple(dict.fromkeys(note for each in parts for note in each.notes))
-    runs = tuple(run for each in parts for run in each.runs)
-    confirmed = all(each.confirmed for each in parts)
+    notes = tuple(dict.fromkeys(note for part in parts for note in part.notes))
+    runs = tuple(run for part in parts for run in part.runs)
+    confirmed = all(part.confirmed for part in parts)
     return Episodes(runs, parts[0].sample_time, notes, confirmed)
 
 
@@ -200,8 +200,8 @@ def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
     none does.
     """
     needed = HISTORY + rows + 2
-    kept = tuple(run for run in episodes.runs if len(run) >= needed)
-    if not kept:
+    runs = tuple(run for run in episodes.runs if len(run) >= needed)
+    if not runs:
         raise IdentificationError(
             f"no episode is as long as a window: the longest has {max(map(len, episodes.runs))}"
             f" rows, a window needs {needed} ({HISTORY} before its start). Give longer episodes, or"
@@ -212,30 +212,30 @@ def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
         f"{len(short)} of {counted(len(episodes), 'episode')}, shorter than a window of {needed}"
         f" rows, left out: {', '.join(short[:3])}{', ...' if len(short) > 3 else ''}"
     )
-    return dataclasses.replace(episodes, runs=kept), [text] if short else []
+    return dataclasses.replace(episodes, runs=runs), [text] if short else []
 
 
 def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS) -> Windows:
     """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows`
     further rows follow. Pressures are read `delay` rows later, because their sensors lag; the last
     reading is held. Raises IdentificationError if no episode is long enough."""
-    found = [
+    starts = [
         (n, k)
         for n, run in enumerate(episodes.runs)
         for k in range(HISTORY, len(run) - rows - 1, stride)
     ]
-    if not found:
+    if not starts:
         long_enough(episodes, rows)  # raises
     runs = episodes.runs
     at = np.arange(-HISTORY, rows + 1)
     step = episodes.sample_time
-    rates = {number: speed_of(runs[number].angle, step) for number, _ in found}
+    rates = {number: speed_of(runs[number].angle, step) for number, _ in starts}
     angle, speed = (
-        np.array([getattr(runs[n], name)[k + at] for n, k in found]) for name in ("angle", "speed")
+        np.array([getattr(runs[n], name)[k + at] for n, k in starts]) for name in ("angle", "speed")
     )
-    rate = np.array([rates[n][k + at] for n, k in found])
-    pressure = np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in found])
-    episode, first = np.array(found).T
+    rate = np.array([rates[n][k + at] for n, k in starts])
+    pressure = np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in starts])
+    episode, first = np.array(starts).T
     counts = np.ones(angle.shape[:2], dtype=bool)
     return Windows(angle, speed, rate, pressure, episode, first, step, counts)
 
@@ -328,5 +328,5 @@ def coverage(errors: Array, episode: Array) -> Array:
     odd = np.searchsorted(np.unique(episode), episode) % 2 == 1
     if odd.all() or not odd.any():
         return np.full(errors.shape[2], np.nan)
-    held = [np.abs(errors[part]) <= band(errors[~part]) for part in (odd, ~odd)]
-    return np.asarray(np.mean(np.concatenate(held), axis=(0, 1)))
+    inside = [np.abs(errors[part]) <= band(errors[~part]) for part in (odd, ~odd)]
+    return np.asarray(np.mean(np.concatenate(inside), axis=(0, 1)))

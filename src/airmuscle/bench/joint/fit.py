@@ -89,14 +89,14 @@ def fit_joint(
     episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
     inspection = checked_inspection(episodes, tuple(pairs), rows)
-    found = tuple(pairs) or inspection.pairs
-    if (axes and len(axes) != episodes.joints) or len(found) != episodes.joints:
+    muscle_pairs = tuple(pairs) or inspection.pairs
+    if (axes and len(axes) != episodes.joints) or len(muscle_pairs) != episodes.joints:
         raise ParameterError(
-            f"fit_joint: {len(found)} pairs and {len(axes)} axes are given for {episodes.joints}"
-            " joints; give one each."
+            f"fit_joint: {len(muscle_pairs)} pairs and {len(axes)} axes are given for"
+            f" {episodes.joints} joints; give one each."
         )
     progress(f"delay of the pressures: {inspection.delay} rows")
-    ordered = in_pairs(episodes, found)
+    ordered = in_pairs(episodes, muscle_pairs)
     fitted = ordered[:split]
     left = ordered[split:]
     delay = inspection.delay
@@ -104,7 +104,7 @@ def fit_joint(
     train, clipped = without_saturated(cut(fitted, delay, rows), ordered)
     with thread_pool(len(STRENGTHS)) if workers == 1 else process_pool(workers) as executor:
         arm, paths = _search(fitted, train, tuple(axes), seed, progress, executor)
-    separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
+    separated = [separate(arm, joint, joint_paths, train) for joint, joint_paths in paths.items()]
     gain = None
     apart = [text for _, texts, _ in separated for text in texts]
     remarks = [*short, *inspection.remarks, *clipped, SCALE, *apart]
@@ -119,18 +119,18 @@ def fit_joint(
     errors = run_errors(arm, judge)
     regulators = fit_regulator_lags(fitted, rows)
     commanded, unlike = (
-        from_commands(regulators, left, delay, rows, found) if regulators else (None, [])
+        from_commands(regulators, left, delay, rows, muscle_pairs) if regulators else (None, [])
     )
     remarks += _contacts(ordered, errors, judge, split) + unlike
     return ArmFit(
         arm,
         inspection,
-        found,
+        muscle_pairs,
         errors,
         judge.episode,
         baseline_errors(fitted, left, rows),
         band(errors),
-        tuple(e for each, _, _ in separated for e in each),
+        tuple(e for estimates, _, _ in separated for e in estimates),
         tuple(dict.fromkeys(remarks)),
         split,
         regulators,
@@ -254,16 +254,16 @@ def separate(
 ) -> tuple[list[ArmParameter], list[str], Array]:
     """Estimates of one joint, what the record does not separate, in words, and the covariance (P,
     P) along what it separates; from the Fisher information."""
-    some = windows.sample(WINDOWS)
+    sampled = windows.sample(WINDOWS)
     leaves = {leaf.path: leaf for leaf in tree.leaves(arm)}
     values = np.array([float(leaves[path].value) for path in paths])
     sizes = np.maximum(np.abs(values), [typical_size(path, leaves) for path in paths])
-    error, gradient = gradients(arm, joint, paths, some)
+    error, gradient = gradients(arm, joint, paths, sampled)
     scaled = gradient * sizes
     weight = 1.0 / np.sqrt(1.0 + (error / CLIP) ** 2)
     scale = np.sqrt(np.mean(error**2) * windows.rows)  # the errors of one window count as one
     of_sample = np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled)
-    information = of_sample * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
+    information = of_sample * (len(windows) / len(sampled)) / max(scale, 1e-9) ** 2
     estimates, covariance, shares = separated(information, paths, values, sizes)
     return (
         estimates,
@@ -377,9 +377,11 @@ def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:
     of its inertia.
     """
     fields = ("area", "passive_force", "slack_width", "coulomb_torque", "damping")
-    own = [path for path in own_parameters(arm, joint) if path.rsplit(".")[-1].startswith(fields)]
+    strength_paths = [
+        path for path in own_parameters(arm, joint) if path.rsplit(".")[-1].startswith(fields)
+    ]
     values = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm)}
-    return with_values(arm, own, [factor * values[path] for path in own])
+    return with_values(arm, strength_paths, [factor * values[path] for path in strength_paths])
 
 
 def own_parameters(arm: PressureDriven, joint: int) -> list[str]:

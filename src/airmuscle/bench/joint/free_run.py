@@ -20,11 +20,15 @@ def free_run(arm: PressureDriven, windows: Windows) -> Array:
     """Angles (N, rows, J) [rad] from the start of every window, which a run that fails keeps, and
     pressures alone.
     """
-    found = angles(arm, windows.pressure[:, HISTORY:], start_of(arm, windows), windows.sample_time)[
-        :, 1:
-    ]
-    kept = windows.angle[:, HISTORY : HISTORY + 1]
-    return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
+    simulated = angles(
+        arm, windows.pressure[:, HISTORY:], start_of(arm, windows), windows.sample_time
+    )[:, 1:]
+    start_angle = windows.angle[:, HISTORY : HISTORY + 1]
+    return np.where(
+        np.isfinite(simulated) & (np.abs(simulated - start_angle) < 2 * np.pi),
+        simulated,
+        start_angle,
+    )
 
 
 def run_errors(arm: PressureDriven, windows: Windows) -> Array:
@@ -114,24 +118,24 @@ class RegulatorLag:
         follow from commands.
         """
         gain, first, second, to_level, to_pilot, low, high, zero = self.values
-        found = pressure / UNIT
+        modelled = pressure / UNIT
         step = gain * command
-        level = found[:, 0]
-        pilot = found[:, 0]
-        p = found[:, 0]
-        for k in range(1, found.shape[1]):
+        level = modelled[:, 0]
+        pilot = modelled[:, 0]
+        p = modelled[:, 0]
+        for k in range(1, modelled.shape[1]):
             aim = (level if self.increments else zero) + step[:, max(k - self.delay, 0)]
             level = np.minimum(np.maximum(aim, low), high)  # np.clip takes ten times as long
             pilot = pilot + first * (level - pilot)
             p = p + second * (pilot - p)
             if k <= HISTORY:
-                error = found[:, k] - p
-                p = found[:, k]
+                error = modelled[:, k] - p
+                p = modelled[:, k]
                 level = level + to_level * error
                 pilot = pilot + to_pilot * error
             else:
-                found[:, k] = p
-        return found * UNIT
+                modelled[:, k] = p
+        return modelled * UNIT
 
 
 def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorLag, ...]:
@@ -141,8 +145,10 @@ def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorL
         return ()
     pressure = cut(episodes, 0, rows).pressure
     command = _commands(episodes, rows)
-    some = np.linspace(0, len(pressure) - 1, min(SAMPLE, len(pressure))).astype(int)
-    columns = zip(pressure[some].transpose(2, 0, 1), command[some].transpose(2, 0, 1), strict=True)
+    sampled = np.linspace(0, len(pressure) - 1, min(SAMPLE, len(pressure))).astype(int)
+    columns = zip(
+        pressure[sampled].transpose(2, 0, 1), command[sampled].transpose(2, 0, 1), strict=True
+    )
     return tuple(_fit(p, u) for p, u in columns)
 
 
@@ -159,8 +165,8 @@ def _fit(p: Array, u: Array) -> RegulatorLag:
 
     def search(model: RegulatorLag, evaluations: int) -> tuple[float, RegulatorLag]:
         def errors(values: Array) -> Array:
-            found = dataclasses.replace(model, values=tuple(values.tolist())).pressures(p, u)
-            return (found - p)[:, HISTORY + 1 :].ravel() / UNIT
+            modelled = dataclasses.replace(model, values=tuple(values.tolist())).pressures(p, u)
+            return (modelled - p)[:, HISTORY + 1 :].ravel() / UNIT
 
         fit = least_squares(
             errors,
@@ -193,10 +199,10 @@ def _fit(p: Array, u: Array) -> RegulatorLag:
             search(dataclasses.replace(best[1], delay=longest), TRIED),
             key=lambda trial: trial[0],
         )
-    found = search(best[1], REFINED)[1]
-    gain, *shares = found.values[:5]
+    refined = search(best[1], REFINED)[1]
+    gain, *shares = refined.values[:5]
     return dataclasses.replace(
-        found, values=(gain * scale / unit, *shares, *(scale * v for v in found.values[5:]))
+        refined, values=(gain * scale / unit, *shares, *(scale * v for v in refined.values[5:]))
     )
 
 
@@ -211,11 +217,11 @@ def from_commands(
     remark on muscles whose pressures hardly do."""
     windows = cut(episodes, 0, rows)
     command = _commands(episodes, rows)
-    found = [
+    modelled = [
         r.pressures(windows.pressure[:, :, i], command[:, :, i]) for i, r in enumerate(regulators)
     ]
     later = np.minimum(np.arange(HISTORY + 1 + rows) + delay, HISTORY + rows)
-    commanded = np.stack(found, axis=-1)[:, later]
+    commanded = np.stack(modelled, axis=-1)[:, later]
     true = windows.pressure[:, later]
     errors = rms((commanded - true)[:, HISTORY + 1 :])
     changes = rms(true[:, HISTORY + 1 :] - true[:, HISTORY : HISTORY + 1])
@@ -317,32 +323,34 @@ def fit_residual(
     """
     split = max(1, round((1.0 - HELD_BACK) * len(episodes)))
     every = cut(episodes[:split], delay, rows, stride=max(1, rows // 2))
-    held = cut(episodes[split:], delay, rows)
+    held_back = cut(episodes[split:], delay, rows)
     train, _ = without_saturated(every, episodes)
     residual = _gaussian_residual(arm, episodes[:split], centres, seed)
     accepted = list[int]()
     hybrid_mechanism = dataclasses.replace(cast(WithStickSlip, arm.mechanism), residual=residual)
-    found = dataclasses.replace(arm, mechanism=hybrid_mechanism)
-    far = distance(found, held)
+    accepted_arm = dataclasses.replace(arm, mechanism=hybrid_mechanism)
+    far = distance(accepted_arm, held_back)
     for joint in range(episodes.joints):
-        before = run_errors(found, held)
+        before = run_errors(accepted_arm, held_back)
         trials = []
         count = len(residual.energies)
         paths = [f"mechanism.residual.energies[{k}]" for k in range(count)]
         paths += [f"mechanism.residual.friction_logs[{joint * count + k}]" for k in range(count)]
-        values = {leaf.path: float(leaf.value) for leaf in tree.leaves(found)}
-        descent = Descent(found, train, joint, paths, seed, {path: values[path] for path in paths})
+        values = {leaf.path: float(leaf.value) for leaf in tree.leaves(accepted_arm)}
+        descent = Descent(
+            accepted_arm, train, joint, paths, seed, {path: values[path] for path in paths}
+        )
         for ridge in RIDGES:
             descent.ridge = ridge
             descent.run(SEARCH_OF_RESIDUAL)
-            gain = ResidualGain(before, run_errors(descent.arm, held), far)
+            gain = ResidualGain(before, run_errors(descent.arm, held_back), far)
             trials.append((float(rms(gain.hybrid)[joint]), descent.arm, gain))
             progress(f"residual of joint {joint + 1}, ridge of {ridge:g}: {gain}")
         _, hybrid, gain = min(trials, key=lambda trial: (not trial[2].accepts(joint), trial[0]))
         if gain.accepts(joint):
-            found = hybrid
+            accepted_arm = hybrid
             accepted = [*accepted, joint + 1]
-    return found, accepted
+    return accepted_arm, accepted
 
 
 def judged_residual(
@@ -383,19 +391,20 @@ def _gaussian_residual(
     """
     rows = [episodes.rows(name) for name in ("angle", "pressure")]
     scales = [
-        np.maximum(each.std(axis=0), least) for each, least in zip(rows, (1e-3, 1e3), strict=True)
+        np.maximum(readings.std(axis=0), least)
+        for readings, least in zip(rows, (1e-3, 1e3), strict=True)
     ]
     scaled = np.concatenate(
-        [each / scale for each, scale in zip(rows, scales, strict=True)], axis=1
+        [readings / scale for readings, scale in zip(rows, scales, strict=True)], axis=1
     )
     count = min(centres, len(scaled))
     joints = episodes.joints
-    some = scaled[np.random.default_rng(seed).permutation(len(scaled))[:count]]
+    centre_rows = scaled[np.random.default_rng(seed).permutation(len(scaled))[:count]]
     return GaussianResidual(
         tuple(f"{prefix}pressure" for prefix in arm.prefixes),
         tuple(scales[0].tolist()),
         tuple(scales[1].tolist()),
-        tuple(some.ravel().tolist()),
+        tuple(centre_rows.ravel().tolist()),
         (0.0,) * count,
         (0.0,) * (count * joints),
     )

@@ -67,16 +67,16 @@ class ReadPressures(System):
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         acting = dict(state)
-        given = dict(inputs)
+        readings = dict(inputs)
         for prefix, gain, zero in zip(self.arm.prefixes, self.gains, self.zeros, strict=True):
             acting[f"{prefix}pressure"] = gain * (state[f"{prefix}pressure"] - zero)
-            given[f"{prefix}measured_pressure"] = gain * (
+            readings[f"{prefix}measured_pressure"] = gain * (
                 inputs[f"{prefix}measured_pressure"] - zero
             )
-        found = self.arm.rates(acting, given)
+        rates = self.arm.rates(acting, readings)
         for prefix, gain in zip(self.arm.prefixes, self.gains, strict=True):
-            found[f"{prefix}pressure"] = found[f"{prefix}pressure"] / gain
-        return found
+            rates[f"{prefix}pressure"] = rates[f"{prefix}pressure"] / gain
+        return rates
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
         return {}
@@ -117,21 +117,21 @@ def fit_known_joint(
             f" angles, the arm {count} muscles and {joints} coordinates; give two muscles for each"
             " angle, in the order of the columns."
         )
-    own = _pairs(arm, episodes)
-    if pairs and tuple(pairs) != own:
+    joint_pairs = _pairs(arm, episodes)
+    if pairs and tuple(pairs) != joint_pairs:
         raise ParameterError(
             f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has"
-            f" {list(own)}; leave pairs out of the mapping file, or order its columns of pressures"
-            " as the muscles of the joint."
+            f" {list(joint_pairs)}; leave pairs out of the mapping file, or order its columns of"
+            " pressures as the muscles of the joint."
         )
-    inspection = checked_inspection(episodes, own, rows)
+    inspection = checked_inspection(episodes, joint_pairs, rows)
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
-    judge, whole = (
+    judge, fit_windows = (
         cut(part, inspection.delay, rows) for part in (episodes[split:], episodes[:split])
     )
-    train, clipped = without_saturated(whole, episodes)
+    train, clipped = without_saturated(fit_windows, episodes)
     sample = train.part(range(0, len(train), -(-len(train) // SAMPLE)))
     search = KnownSearch(system, paths, sample)
     system = stored_result(f"{__name__}:search", (system, paths, sample), search.run)
@@ -145,7 +145,7 @@ def fit_known_joint(
     return ArmFit(
         system.arm,
         inspection,
-        own,
+        joint_pairs,
         errors,
         judge.episode,
         baseline_errors(episodes[:split], episodes[split:], rows),
@@ -164,9 +164,11 @@ def _pairs(arm: PressureDriven, episodes: Episodes) -> tuple[tuple[int, int], ..
     names = [c.name for c in arm.mechanism.coordinates]
     at = dict(zip(names, np.median(episodes.rows("angle"), axis=0).tolist(), strict=True))
     unit = np.eye(len(arm.muscle)).tolist()
-    moments = [arm.mechanism.generalised_forces(at, each, arm.resting_lengths) for each in unit]
-    ways = [moments[2 * j + 1][name] > moments[2 * j][name] for j, name in enumerate(names)]
-    return tuple((2 * j + 1 + bool(way), 2 * j + 2 - bool(way)) for j, way in enumerate(ways))
+    moments = [
+        arm.mechanism.generalised_forces(at, tensions, arm.resting_lengths) for tensions in unit
+    ]
+    swapped = [moments[2 * j + 1][name] > moments[2 * j][name] for j, name in enumerate(names)]
+    return tuple((2 * j + 1 + bool(swap), 2 * j + 2 - bool(swap)) for j, swap in enumerate(swapped))
 
 
 def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
@@ -179,18 +181,20 @@ def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
             if path.startswith("arm.mechanism.") and path.rsplit(".")[-1] in FIELDS
         ]
         free = [*(path.removeprefix("arm.") for path in fields), "lags", "zeros"]
-    found = []
+    paths = []
     for name in free:
-        whole = name if name.split("[")[0] in READINGS else f"arm.{name}"
-        own = [path for path in leaves if path == whole or path.startswith(f"{whole}[")]
-        if not own:
+        full_name = name if name.split("[")[0] in READINGS else f"arm.{name}"
+        matching = [
+            path for path in leaves if path == full_name or path.startswith(f"{full_name}[")
+        ]
+        if not matching:
             raise ParameterError(
                 f"fit_known_joint: the arm has no parameter '{name}'; allowed are zeros, gains and"
                 " the paths of its parameters, such as"
-                f" {leaves[-1].removeprefix('arm.')}.{suggestion(whole, leaves)}"
+                f" {leaves[-1].removeprefix('arm.')}.{suggestion(full_name, leaves)}"
             )
-        found += own
-    return list(dict.fromkeys(found))
+        paths += matching
+    return list(dict.fromkeys(paths))
 
 
 def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
@@ -205,8 +209,10 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
         state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, step)
     names = [c.name for c in arm.mechanism.coordinates]
-    found, slopes = with_slopes(system, paths, windows.pressure[:, HISTORY:], step, state, names)
-    error = found[:, 1:] - windows.angle[:, HISTORY + 1 :]
+    simulated, slopes = with_slopes(
+        system, paths, windows.pressure[:, HISTORY:], step, state, names
+    )
+    error = simulated[:, 1:] - windows.angle[:, HISTORY + 1 :]
     counts = windows.counts[:, HISTORY + 1 :, None]
     return np.where(counts, error, 0.0), np.where(counts[..., None], slopes[:, 1:], 0.0)
 
@@ -247,7 +253,7 @@ class KnownSearch:
         """The system with the estimates."""
         from scipy.optimize import least_squares
 
-        found = least_squares(
+        solution = least_squares(
             lambda x: self._evaluate(x)[0].ravel(),
             np.clip(self.start, self.low, self.high) / self.sizes,
             jac=lambda x: self._evaluate(x)[1].reshape(-1, len(self.paths)),
@@ -256,7 +262,7 @@ class KnownSearch:
             bounds=(self.low / self.sizes, self.high / self.sizes),
             max_nfev=EVALUATIONS,
         )
-        return with_values(self.system, self.paths, found.x * self.sizes)
+        return with_values(self.system, self.paths, solution.x * self.sizes)
 
     def separate(self, system: ReadPressures) -> tuple[list[ArmParameter], Array, list[str]]:
         """Estimates, their covariance along what the record separates, and remarks; a window is one
@@ -270,18 +276,22 @@ class KnownSearch:
         information = flat.T @ flat / (np.mean(error**2) * self.windows.rows)
         estimates, covariance, shares = separated(information, names, values, self.sizes)
         remarks = [
-            f"{field[:-1]} of pressure {int(number[:-1]) + 1}: {each.value:.4g} ± "
-            f"{float(f'{each.standard_error:.2g}'):g}{READINGS[field]}"
-            for each in estimates
-            for field, _, number in [each.path.partition("[")]
+            f"{field[:-1]} of pressure {int(number[:-1]) + 1}: {estimate.value:.4g} ± "
+            f"{float(f'{estimate.standard_error:.2g}'):g}{READINGS[field]}"
+            for estimate in estimates
+            for field, _, number in [estimate.path.partition("[")]
             if field in READINGS
         ]
         far = []  # estimates that no such joint has
-        for name, value, own, *ends in zip(
+        for name, value, first_value, *ends in zip(
             names, values, self.start, self.low, self.high, strict=True
         ):
-            if abs(value) > FAR * abs(own) > 0.0 or (ends[0] > 0.0 and value < own / FAR):
-                far.append(f"{name} is {value:.3g}, {value / own:.3g} times its first value")
+            if abs(value) > FAR * abs(first_value) > 0.0 or (
+                ends[0] > 0.0 and value < first_value / FAR
+            ):
+                far.append(
+                    f"{name} is {value:.3g}, {value / first_value:.3g} times its first value"
+                )
             elif value and np.isclose(value, ends, 1e-3).any():
                 far.append(f"{name} ends at the limit of its range, {value:.3g}")
         text = (

@@ -133,13 +133,13 @@ class ArmFit(Reported):
         paths = []
         slopes = []
         bounds = {leaf.path: leaf.declared.bounds for leaf in tree.leaves(self.arm)}
-        for each in self.estimates:
-            lag = re.fullmatch(r"lags(\[\d+\])", each.path)
-            paths.append((f"circuit{lag[1]}.lag.frequency" if lag else each.path,))
+        for estimate in self.estimates:
+            lag = re.fullmatch(r"lags(\[\d+\])", estimate.path)
+            paths.append((f"circuit{lag[1]}.lag.frequency" if lag else estimate.path,))
             slopes.append(
-                -1 / (2 * np.pi * each.value**2)
+                -1 / (2 * np.pi * estimate.value**2)
                 if lag
-                else float(each.value not in bounds[each.path])
+                else float(estimate.value not in bounds[estimate.path])
             )
         errors = {
             c.name: float(rms)
@@ -175,13 +175,13 @@ class ArmFit(Reported):
         )
         bands: dict[str, Any] = {"horizon": TableColumn(self.horizon, "s")}
         bands |= {
-            f"joint {j}": TableColumn(each, "rad", "deg")
-            for j, each in enumerate(self.band.T, start=1)
+            f"joint {j}": TableColumn(half_width, "rad", "deg")
+            for j, half_width in enumerate(self.band.T, start=1)
         }
         parameters = {
-            "parameter": [each.path for each in self.estimates],
-            "value [SI]": [each.value for each in self.estimates],
-            "standard error [SI]": [each.standard_error for each in self.estimates],
+            "parameter": [estimate.path for estimate in self.estimates],
+            "value [SI]": [estimate.value for estimate in self.estimates],
+            "standard error [SI]": [estimate.standard_error for estimate in self.estimates],
         }
         tables = (
             self._error_table(),
@@ -216,10 +216,14 @@ class ArmFit(Reported):
         return [*([text] if count < ENOUGH else []), *worse]
 
     def _error_table(self) -> Table:
-        found = {**self.by_baseline, "model": self.errors, "model, from commands": self.commanded}
+        predictions = {
+            **self.by_baseline,
+            "model": self.errors,
+            "model, from commands": self.commanded,
+        }
         if self.gain is not None:
-            found |= {"physics alone": self.gain.physics, "hybrid law": self.gain.hybrid}
-        rows = {name: rms(errors) for name, errors in found.items() if errors is not None}
+            predictions |= {"physics alone": self.gain.physics, "hybrid law": self.gain.hybrid}
+        rows = {name: rms(errors) for name, errors in predictions.items() if errors is not None}
         columns: dict[str, Any] = {"prediction by": list(rows)}
         for j in range(self.errors.shape[2]):
             columns[f"joint {j + 1}"] = TableColumn(
