@@ -111,11 +111,11 @@ class TimedRecord(NamedTuple):
 
 def _interpolated(at: Array, time: Array, columns: Array) -> Array:
     """Columns (R, K) at other times (N, K); 0 where a column has no value."""
-    found = np.zeros((at.size, columns.shape[1]))
+    values = np.zeros((at.size, columns.shape[1]))
     for k, known in enumerate(np.isfinite(columns).T):
         if known.any():
-            found[:, k] = np.interp(at, time[known], columns[known, k])
-    return found
+            values[:, k] = np.interp(at, time[known], columns[known, k])
+    return values
 
 
 def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
@@ -127,28 +127,28 @@ def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
     rest; its first DEPTH rows are the measured ones. A record of fewer rows than two such fits need
     has persistence alone.
     """
-    longest = max((float(np.ptp(each.time)) for each in records), default=0.0)
+    longest = max((float(np.ptp(record.time)) for record in records), default=0.0)
     sampled = max(
-        (float(np.median(np.diff(each.time))) for each in records if each.time.size > 1),
+        (float(np.median(np.diff(record.time))) for record in records if record.time.size > 1),
         default=0.0,
     )
-    grids = [each.on_grid(max(sampled, longest / GRID_ROWS)) for each in records]
-    sizes = [(each.outputs.shape[1], each.inputs.shape[1]) for each in records]
-    found = []
+    grids = [record.on_grid(max(sampled, longest / GRID_ROWS)) for record in records]
+    sizes = [(record.outputs.shape[1], record.inputs.shape[1]) for record in records]
+    record_errors = []
     for i, record in enumerate(records):
         first = record.outputs[
             np.argmax(record.compared, axis=0), np.arange(record.outputs.shape[1])
         ]
         errors = {PERSISTENCE: _rms(record, np.broadcast_to(first, record.outputs.shape))}
-        alike = [each for k, each in enumerate(grids) if k != i and sizes[k] == sizes[i]]
-        others = [each for each in alike if len(each.time) > DEPTH + 1]
-        if (predicted := _predicted(grids[i], others)) is not None:
+        alike = [grid for k, grid in enumerate(grids) if k != i and sizes[k] == sizes[i]]
+        training = [grid for grid in alike if len(grid.time) > DEPTH + 1]
+        if (predicted := _predicted(grids[i], training)) is not None:
             errors[ARX] = _rms(record, _interpolated(record.time, grids[i].time, predicted))
-        found.append(errors)
-    return found
+        record_errors.append(errors)
+    return record_errors
 
 
-def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None:
+def _predicted(grid: TimedRecord, training: Sequence[TimedRecord]) -> Array | None:
     """The outputs of the ARX model at the grid of a record (R, J); None where there are too few
     rows.
     """
@@ -156,17 +156,17 @@ def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None
     halves = [
         TimedRecord(*(part[rows] for part in grid)) for rows in (slice(middle), slice(middle, None))
     ]
-    if others:
-        return _run(grid, others) if len(grid.time) > DEPTH + 1 else None
+    if training:
+        return _run(grid, training) if len(grid.time) > DEPTH + 1 else None
     if middle <= DEPTH + 1:
         return None
     return np.concatenate([_run(halves[0], halves[1:]), _run(halves[1], halves[:1])])
 
 
 def _run(grid: TimedRecord, known: Sequence[TimedRecord]) -> Array:
-    measured = np.concatenate([each.outputs for each in known])
+    measured = np.concatenate([record.outputs for record in known])
     margin = LIMIT_MARGIN * np.ptp(measured, axis=0)
-    runs = [(each.outputs, each.inputs) for each in known]
+    runs = [(record.outputs, record.inputs) for record in known]
     model = fit_arx(runs, measured.min(axis=0) - margin, measured.max(axis=0) + margin)
     return np.concatenate(
         [grid.outputs[:DEPTH], model.free_run(grid.outputs[None, :DEPTH], grid.inputs[None])[0]]

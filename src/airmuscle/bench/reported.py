@@ -34,13 +34,13 @@ class Reported(NotebookDisplay):
             (shown_columns(table, brief=True) for table in chapter.tables if table.brief_rows), []
         )
         table = [
-            tuple(each.heading for each in columns),
-            *zip(*(each.texts for each in columns), strict=True),
+            tuple(column.heading for column in columns),
+            *zip(*(column.texts for column in columns), strict=True),
         ]
         lines = [
-            f"{each.name}: {' '.join(filter(None, (*value_cells(each), each.remark)))}"
-            for each in chapter.values
-            if each.brief
+            f"{value.name}: {' '.join(filter(None, (*value_cells(value), value.remark)))}"
+            for value in chapter.values
+            if value.brief
         ]
         plot = chapter.plots[0].figure if chapter.plots else None
         notes = (*chapter.paragraphs, *(["; ".join(lines)] if lines else []), *chapter.notes)
@@ -53,4 +53,6 @@ def unit_column(names: Sequence[str]) -> TableColumn:
     """
     known = [quantity_of(name) for name in names]
     shown = [display_scale(name)[1].removesuffix("-") for name in names]
-    return TableColumn(["" if each is None else each.unit for each in known], shown=shown)
+    return TableColumn(
+        ["" if quantity is None else quantity.unit for quantity in known], shown=shown
+    )

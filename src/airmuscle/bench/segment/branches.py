@@ -103,9 +103,9 @@ def find_branches(
     branches = []
     for part, values, threshold in zip(parts, smooth, thresholds, strict=True):
         pressure = values if column == "pressure" else recording["pressure"][part.rows]
-        for each, direction in _monotonic_intervals(values, threshold):
-            ends = float(pressure[each.start]), float(pressure[each.stop - 1])
-            interval = Interval(part.start + each.start, part.start + each.stop)
+        for stretch, direction in _monotonic_intervals(values, threshold):
+            ends = float(pressure[stretch.start]), float(pressure[stretch.stop - 1])
+            interval = Interval(part.start + stretch.start, part.start + stretch.stop)
             branches.append(
                 Branch(interval, -direction if column == "length" else direction, *ends, column)
             )

@@ -192,14 +192,17 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
     if "pressure" not in recording or "force" not in recording:
         return
     if moved is None:
-        held = {"length": "73.2 mm"}
+        example = {"length": "73.2 mm"}
         text = (
             "no length or contraction was recorded, so the kind of the run is open and no"
             " characteristic can be "
         )
         hints = (
             Hint(
-                "To state the held length of an isometric run", "constants", held, "ColumnMapping"
+                "To state the held length of an isometric run",
+                "constants",
+                example,
+                "ColumnMapping",
             ),
             Hint(
                 "To state its place in the names of the files",

@@ -118,9 +118,11 @@ class Inspection(Reported):
         if (
             self.outliers
         ):  # also in axes without outliers, because the legend is that of the first axis
-            found = [outlier.row for outlier in self.outliers if outlier.column == name]
+            outlier_rows = [outlier.row for outlier in self.outliers if outlier.column == name]
             style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
-            axis.plot(abscissa[found], values[found], label="suspected outlier", **style)
+            axis.plot(
+                abscissa[outlier_rows], values[outlier_rows], label="suspected outlier", **style
+            )
         sensor = self.sensors.get(name) if values.size else None
         for limit in (sensor.lower_limit * factor, sensor.upper_limit * factor) if sensor else ():
             if np.isfinite(limit):
@@ -171,8 +173,11 @@ class Inspection(Reported):
                     self.plot,
                 ),
             ),
-            problems=tuple(each.text for each in self.findings if each.serious),
-            notes=(*recording.notes, *(each.text for each in self.findings if not each.serious)),
+            problems=tuple(finding.text for finding in self.findings if finding.serious),
+            notes=(
+                *recording.notes,
+                *(finding.text for finding in self.findings if not finding.serious),
+            ),
         )
 
 
@@ -183,8 +188,8 @@ def inspection_chapters(inspections: Sequence[Inspection]) -> list[Chapter]:
     if len(inspections) == 1:
         return [inspections[0].chapter()]
     parts = [
-        dataclasses.replace(each.chapter().among(suffix=f"-{i}"), brief=False)
-        for i, each in enumerate(inspections, 1)
+        dataclasses.replace(inspection.chapter().among(suffix=f"-{i}"), brief=False)
+        for i, inspection in enumerate(inspections, 1)
     ]
     return [_overview(inspections), *parts]
 
@@ -230,8 +235,8 @@ def _units(name: str, value: Any) -> tuple[str, str]:
 
 def _rows(parts: Sequence[Any]) -> dict[str, list[int]]:
     """The columns of a table with the first and the last row of each part, counted from 1."""
-    first = [each.interval.start + 1 for each in parts]
-    last = [each.interval.stop for each in parts]
+    first = [part.interval.start + 1 for part in parts]
+    last = [part.interval.stop for part in parts]
     return {"first row": first, "last row": last}
 
 
@@ -252,8 +257,12 @@ def _column_table(inspection: Inspection) -> Table:
         "unit in file": [
             unit if (unit := recording.units.get(name, "")) != "1" else "" for name in names
         ],
-        "min": TableColumn([float(each.min()) if each.size else None for each in values], BY_ROW),
-        "max": TableColumn([float(each.max()) if each.size else None for each in values], BY_ROW),
+        "min": TableColumn(
+            [float(readings.min()) if readings.size else None for readings in values], BY_ROW
+        ),
+        "max": TableColumn(
+            [float(readings.max()) if readings.size else None for readings in values], BY_ROW
+        ),
         "unit": unit_column(names),
         "resolution": TableColumn(
             [(s and s.resolution) or None for s in sensors], BY_ROW, digits=3
@@ -288,11 +297,11 @@ def _run_table(runs: Sequence[Run]) -> Table:
 def _branch_table(inspection: Inspection) -> Table | None:
     branches = inspection.branches
     columns: dict[str, Any] = {
-        "branch": [each.name for each in branches],
-        "column": TableColumn([each.column for each in branches], brief=False),
+        "branch": [branch.name for branch in branches],
+        "column": TableColumn([branch.column for branch in branches], brief=False),
         **_rows(branches),
         "pressure": TableColumn(
-            [(each.start_pressure, each.end_pressure) for each in branches], "Pa", "kPa"
+            [(branch.start_pressure, branch.end_pressure) for branch in branches], "Pa", "kPa"
         ),
     }
     title = "Branches" if inspection.sampling else "Branches, if the rows are in order of time"
@@ -307,23 +316,25 @@ def _plateau_table(inspection: Inspection) -> Table | None:
     for name in plateaus[0].values:
         unit = unit_column([name]).values[0]
         shown = display_scale(name)[1].removesuffix("-")
-        columns[name] = TableColumn([each.values.get(name) for each in plateaus], unit, shown)
-        errors = [each.standard_errors.get(name) for each in plateaus]
+        columns[name] = TableColumn([plateau.values.get(name) for plateau in plateaus], unit, shown)
+        errors = [plateau.standard_errors.get(name) for plateau in plateaus]
         columns[f"standard error of {name}"] = TableColumn(errors, unit, shown, digits=2)
     return Table("plateaus", "Plateaus", columns)
 
 
 def _outlier_table(inspection: Inspection) -> Table | None:
-    found = inspection.outliers
+    outliers = inspection.outliers
     columns: dict[str, Any] = {
-        "column": [each.column for each in found],
-        "row": [each.row + 1 for each in found],
-        "value": TableColumn([each.value for each in found], BY_ROW),
-        "expected": TableColumn([each.expected for each in found], BY_ROW),
-        "unit": unit_column([each.column for each in found]),
-        "deviations": TableColumn([each.deviations for each in found], digits=3, brief=False),
+        "column": [outlier.column for outlier in outliers],
+        "row": [outlier.row + 1 for outlier in outliers],
+        "value": TableColumn([outlier.value for outlier in outliers], BY_ROW),
+        "expected": TableColumn([outlier.expected for outlier in outliers], BY_ROW),
+        "unit": unit_column([outlier.column for outlier in outliers]),
+        "deviations": TableColumn(
+            [outlier.deviations for outlier in outliers], digits=3, brief=False
+        ),
     }
-    return Table("outliers", "Suspected outliers", columns, brief=MAX_LISTED) if found else None
+    return Table("outliers", "Suspected outliers", columns, brief=MAX_LISTED) if outliers else None
 
 
 def _overview(inspections: Sequence[Inspection]) -> Chapter:
@@ -331,24 +342,27 @@ def _overview(inspections: Sequence[Inspection]) -> Chapter:
     concerns.
     """
     constants: dict[str, dict[str, None]] = {}
-    for each in inspections:
-        for name, value in each.recording.constants.items():
+    for inspection in inspections:
+        for name, value in inspection.recording.constants.items():
             unit, shown = _units(name, value)
             text = quantity_text(value, unit, shown) if unit else str(value)
             constants.setdefault(name, {})[text] = None
     values = []
     for name, texts in constants.items():
-        some = [*list(texts)[:MAX_LISTED], *(["..."] if len(texts) > MAX_LISTED else [])]
-        values.append(NamedValue(name.replace("_", " "), "; ".join(some)))
-    names = [", ".join(name for name in each.recording if name != "time") for each in inspections]
-    rates = [each.sampling and each.sampling.rate for each in inspections]
+        listed_texts = [*list(texts)[:MAX_LISTED], *(["..."] if len(texts) > MAX_LISTED else [])]
+        values.append(NamedValue(name.replace("_", " "), "; ".join(listed_texts)))
+    names = [
+        ", ".join(name for name in inspection.recording if name != "time")
+        for inspection in inspections
+    ]
+    rates = [inspection.sampling and inspection.sampling.rate for inspection in inspections]
     columns: dict[str, Any] = {
-        "file": [each.recording.origin for each in inspections],
-        "rows": [len(each.recording) for each in inspections],
+        "file": [inspection.recording.origin for inspection in inspections],
+        "rows": [len(inspection.recording) for inspection in inspections],
         "rows per second": TableColumn(rates, short="per second"),
-        "outliers": [len(each.outliers) for each in inspections],
+        "outliers": [len(inspection.outliers) for inspection in inspections],
         "quantities": TableColumn(names, brief=False),
-        "runs": [_describe_runs(each.runs) for each in inspections],
+        "runs": [_describe_runs(inspection.runs) for inspection in inspections],
     }
     return Chapter(
         name="overview",
@@ -357,12 +371,16 @@ def _overview(inspections: Sequence[Inspection]) -> Chapter:
         values=tuple(values),
         tables=(Table("files", "Recordings", columns, brief=MAX_FILES),),
         problems=_common(
-            [[f.text for f in each.findings if f.serious] for each in inspections], inspections
+            [[f.text for f in inspection.findings if f.serious] for inspection in inspections],
+            inspections,
         ),
         notes=_common(
             [
-                [*each.recording.notes, *(f.text for f in each.findings if not f.serious)]
-                for each in inspections
+                [
+                    *inspection.recording.notes,
+                    *(f.text for f in inspection.findings if not f.serious),
+                ]
+                for inspection in inspections
             ],
             inspections,
         ),
@@ -389,20 +407,22 @@ def _common(texts: Sequence[Sequence[str]], inspections: Sequence[Inspection]) -
     """Each text once, with the files that it concerns; texts that differ in numbers alone are
     one.
     """
-    found: dict[str, list[tuple[str, str]]] = {}
-    for each, own in zip(inspections, texts, strict=True):
-        for text in dict.fromkeys(own):
-            found.setdefault(re.sub(r"\d[\d.]*", "#", text), []).append(
-                (text, each.recording.origin)
+    occurrences: dict[str, list[tuple[str, str]]] = {}
+    for inspection, file_texts in zip(inspections, texts, strict=True):
+        for text in dict.fromkeys(file_texts):
+            occurrences.setdefault(re.sub(r"\d[\d.]*", "#", text), []).append(
+                (text, inspection.recording.origin)
             )
     lines = []
-    for (text, origin), *others in found.values():
-        same = len({other for other, _ in others} | {text}) == 1
-        rest = f" and {len(others)} more" if others else ""
-        which = f"{origin}{rest}" if same else f"{origin}; others with other numbers: {len(others)}"
+    for (text, origin), *further in occurrences.values():
+        same = len({further_text for further_text, _ in further} | {text}) == 1
+        rest = f" and {len(further)} more" if further else ""
+        which = (
+            f"{origin}{rest}" if same else f"{origin}; others with other numbers: {len(further)}"
+        )
         lines.append(
             text
-            if same and len(others) + 1 == len(inspections)
+            if same and len(further) + 1 == len(inspections)
             else HintedText(text, f" ({which})")
         )
     return tuple(lines)

@@ -41,7 +41,7 @@ def remembered(analyse: Analysis) -> Analysis:
         known, key = results.setdefault(several[0], {}), (*map(id, several), *texts)
         stored = known.get(key)
         if stored is None or any(
-            ref() is not each for ref, each in zip(stored[0], several, strict=True)
+            ref() is not recording for ref, recording in zip(stored[0], several, strict=True)
         ):
             stored = known[key] = tuple(map(weakref.ref, several)), analyse(recordings, *texts)
         return stored[1]

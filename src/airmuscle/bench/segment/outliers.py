@@ -55,7 +55,9 @@ class Outlier:
 
     def __str__(self) -> str:
         factor, unit = display_scale(self.column)
-        reading, expected = (f"{each * factor:.4g} {unit}" for each in (self.value, self.expected))
+        reading, expected = (
+            f"{value * factor:.4g} {unit}" for value in (self.value, self.expected)
+        )
         return f"{self.column} in row {self.row + 1} ({reading}, neighbours {expected})"
 
 
@@ -73,7 +75,9 @@ def find_outliers(
         if n in recording.columns
     }
     return tuple(
-        each for n, sensor in known.items() for each in _column_outliers(n, recording[n], sensor)
+        outlier
+        for n, sensor in known.items()
+        for outlier in _column_outliers(n, recording[n], sensor)
     )
 
 
@@ -81,10 +85,10 @@ def without_outliers(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings of one test rig without the rows of suspected outliers; a note on each
     recording lists them.
     """
-    found = find_bench_outliers(recordings)
+    bench_outliers = find_bench_outliers(recordings)
     return tuple(
         leave_out(recording, outliers)
-        for recording, outliers in zip(recordings, found, strict=True)
+        for recording, outliers in zip(recordings, bench_outliers, strict=True)
     )
 
 
@@ -98,9 +102,9 @@ def find_bench_outliers(recordings: Sequence[Recording]) -> tuple[tuple[Outlier,
 
 def kept_rows(recording: Recording, outliers: Sequence[Outlier]) -> npt.NDArray[np.bool_]:
     """The rows that contain none of the outliers, shape (N,)."""
-    kept = np.ones(len(recording), dtype=bool)
-    kept[[outlier.row for outlier in outliers]] = False
-    return kept
+    is_regular = np.ones(len(recording), dtype=bool)
+    is_regular[[outlier.row for outlier in outliers]] = False
+    return is_regular
 
 
 def leave_out(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
@@ -112,14 +116,14 @@ def leave_out(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
         return dataclasses.replace(recording, notes=(*recording.notes, RowNote(note)))
     if not outliers:
         return recording
-    kept = kept_rows(recording, outliers)
-    count = int(np.count_nonzero(~kept))
+    is_regular = kept_rows(recording, outliers)
+    count = int(np.count_nonzero(~is_regular))
     more = f"; and {len(outliers) - MAX_LISTED} more" if len(outliers) > MAX_LISTED else ""
     note = (
-        f"{recording.origin}: rows left out as suspected outliers: {count} of {len(kept)}: "
+        f"{recording.origin}: rows left out as suspected outliers: {count} of {len(is_regular)}: "
         f"{'; '.join(map(str, outliers[:MAX_LISTED]))}{more}."
     )
-    return dataclasses.replace(recording.rows(kept), notes=(*recording.notes, RowNote(note)))
+    return dataclasses.replace(recording.rows(is_regular), notes=(*recording.notes, RowNote(note)))
 
 
 def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:

@@ -143,8 +143,8 @@ def find_plateaus(
         )  # so that an outlier does not end a plateau
         intervals = [
             part
-            for each in intervals
-            for part in _steady_parts(values, band, sensors[name].jitter, each, min_rows)
+            for candidate in intervals
+            for part in _steady_parts(values, band, sensors[name].jitter, candidate, min_rows)
         ]
     plateaus = []
     for interval in intervals:
@@ -174,7 +174,9 @@ def _steady_parts(
         )
         count = DRIFT_PARTS if len(part) >= 5 * DRIFT_PARTS else 3
         medians = [
-            float(np.median(each)) for each in np.array_split(values[part.rows], count) if each.size
+            float(np.median(section))
+            for section in np.array_split(values[part.rows], count)
+            if section.size
         ]
         drift = max(medians, default=0.0) - min(medians, default=0.0)
         if len(part) >= min_rows and not drift > max(MAX_DRIFT * band, jitter):

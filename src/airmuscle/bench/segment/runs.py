@@ -96,17 +96,19 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     for name in columns.values():
         least = constant_band(name, recording[name])
         bands[name] = max(least, 8.0 * sensors[name].std if name in sensors else 0.0)
-    whole = _classify(recording, Interval(0, len(recording)), columns, bands)
-    if whole.kind != FREE:
-        return (whole,)
+    single_run = _classify(recording, Interval(0, len(recording)), columns, bands)
+    if single_run.kind != FREE:
+        return (single_run,)
     # without a measured motion, a constant force does not tell the kind: a slack muscle at a held
     # length has it as well
-    told = [kind for kind in columns if kind != ISOTONIC or ISOMETRIC in columns]
+    decisive_kinds = [kind for kind in columns if kind != ISOTONIC or ISOMETRIC in columns]
     candidates = [
-        runs for kind in told if (runs := _runs_at_levels(recording, kind, columns[kind], bands))
+        runs
+        for kind in decisive_kinds
+        if (runs := _runs_at_levels(recording, kind, columns[kind], bands))
     ]
     return max(
-        candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,)
+        candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(single_run,)
     )
 
 
@@ -122,7 +124,8 @@ def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ..
         if len(edges) == int(levels.max()) + 2:
             intervals = [Interval(a, b) for a, b in itertools.pairwise(edges)]
             return tuple(
-                _constant_run(recording, each, kind, name, (swept, "force")) for each in intervals
+                _constant_run(recording, interval, kind, name, (swept, "force"))
+                for interval in intervals
             )
     return (Run(Interval(0, levels.size), FREE, None, None, ("pressure", points.moved)),)
 
@@ -164,9 +167,9 @@ def _runs_at_levels(
     intervals = list(level_intervals(recording[name], bands[name]))
     for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
         ranges = {
-            other: SWEEP_FRACTION * float(np.ptp(recording[other]))
-            for other in bands
-            if other != name
+            column: SWEEP_FRACTION * float(np.ptp(recording[column]))
+            for column in bands
+            if column != name
         }
         swept = tuple(
             n
@@ -215,7 +218,8 @@ def _join_ripple(
     i = 0
     band = RIPPLE_BAND * float(np.max(np.abs(pressure)))
     ranges = [
-        (float(pressure[each.rows].min()), float(pressure[each.rows].max())) for each in intervals
+        (float(pressure[interval.rows].min()), float(pressure[interval.rows].max()))
+        for interval in intervals
     ]
     steps = np.sign(np.diff(pressure, prepend=pressure[:1]))
     reversals = np.cumsum(

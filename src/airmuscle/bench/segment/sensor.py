@@ -177,8 +177,8 @@ def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str
     Resolution and noise are medians over the recordings that have rows. Static points
     (`find_static_points`) show the resolution only.
     """
-    given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
-    several = [recording for recording in given if len(recording)]
+    sequence = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    several = [recording for recording in sequence if len(recording)]
     names = dict.fromkeys(
         n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED
     )
