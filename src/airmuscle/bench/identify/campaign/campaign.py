@@ -197,9 +197,11 @@ def _separating_records(stage: FillStage) -> list[NextExperiment]:
     valve and wall.
     """
     planned = []
-    for each in stage.fit.identifiability.undetermined:
-        names = ", ".join(name for name, _ in each.shares)
-        planned.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
+    for combination in stage.fit.identifiability.undetermined:
+        names = ", ".join(name for name, _ in combination.shares)
+        planned.append(
+            NextExperiment(_sentence(combination.remedy), f"fills: {names} are not determined")
+        )
     try:
         ranking = rank_records(stage.fit)
     except AirmuscleError:
@@ -208,7 +210,7 @@ def _separating_records(stage: FillStage) -> list[NextExperiment]:
     first, second = ranking.pair
     if ranking.now.worst < POORLY_DETERMINED or best.gain < MIN_GAIN:
         return planned
-    now, after = (100.0 * each.worst for each in (ranking.now, best.precision))
+    now, after = (100.0 * precision.worst for precision in (ranking.now, best.precision))
     purpose = (
         f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then"
         f" {after:.2g} %"

@@ -100,7 +100,7 @@ def stage_chapters(stage: object, entry: MuscleDescription | None = None) -> lis
             if isinstance(stage, FillStage)
             else ("release-", "Release")
         )
-        return [each.among(name) for each in dynamic_chapters(stage.fit, title)]
+        return [part.among(name) for part in dynamic_chapters(stage.fit, title)]
     return []
 
 

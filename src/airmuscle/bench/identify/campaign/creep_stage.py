@@ -84,25 +84,25 @@ class HeldRows:
     held: Array
 
     @classmethod
-    def after(cls, whole: Recording, end_of_motion: float) -> "HeldRows":
+    def after(cls, recording: Recording, end_of_motion: float) -> "HeldRows":
         """The rows after a dead time from the end of the motion [s] on. Raises IdentificationError
         without any.
         """
-        later = whole["time"] > end_of_motion + DEADTIME * (1.0 + EDGE)
+        later = recording["time"] > end_of_motion + DEADTIME * (1.0 + EDGE)
         if not later.any():
             raise IdentificationError(
-                f"{whole.origin}: the hold ends {whole['time'][-1] - end_of_motion:.2g} s after the"
-                f" motion, within the {DEADTIME:g} s in which load cell and frame settle; hold"
-                " longer."
+                f"{recording.origin}: the hold ends {recording['time'][-1] - end_of_motion:.2g} s"
+                f" after the motion, within the {DEADTIME:g} s in which load cell and frame"
+                " settle; hold longer."
             )
         start = int(np.argmax(later))
-        kept = start + thinned_rows(len(whole) - start, FIT_ROWS)
-        path = displacement(whole)
-        kept = kept[np.isfinite(whole["force"][kept])]
+        rows = start + thinned_rows(len(recording) - start, FIT_ROWS)
+        path = displacement(recording)
+        rows = rows[np.isfinite(recording["force"][rows])]
         path = np.where(
             np.arange(path.size) < start, path, np.median(path[start:])
         )  # no motion by the noise
-        return cls(whole.rows(kept), whole["time"], path, kept)
+        return cls(recording.rows(rows), recording["time"], path, rows)
 
     def stretches(self, times: Array) -> Array:
         """Stretch [m] of the spring of each element at the held rows, shape (N, E)."""
@@ -190,9 +190,9 @@ def _common_times(holds: Sequence[HeldRows], initial: Sequence[float]) -> Array:
 
 def _matrices(holds: Sequence[HeldRows], times: Array) -> list[Array]:
     """Columns of each hold: minus the stretches, then the initial force of each hold."""
-    own = np.eye(len(holds))
+    unit = np.eye(len(holds))
     return [
-        np.hstack([-hold.stretches(times), np.tile(own[i], (hold.held.size, 1))])
+        np.hstack([-hold.stretches(times), np.tile(unit[i], (hold.held.size, 1))])
         for i, hold in enumerate(holds)
     ]
 
@@ -212,7 +212,7 @@ def _standard_errors(
     """
     base = np.vstack(_matrices(holds, times))
     changed = np.where(np.eye(times.size) > 0, times * (1.0 + 1e-4), times)
-    steps = [np.vstack(_matrices(holds, each)) - base for each in changed]
+    steps = [np.vstack(_matrices(holds, shifted)) - base for shifted in changed]
     slopes = [step @ coefficients / (1e-4 * time) for step, time in zip(steps, times, strict=True)]
     jacobian = np.hstack([base, np.column_stack(slopes)])
     variance = float(residuals @ residuals) / max(residuals.size - jacobian.shape[1], 1)
@@ -249,10 +249,12 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     """
     sentences = []
     reasons = list[str]()
-    held = list[HeldRows]()
+    holds = list[HeldRows]()
     loaded = list[tuple[float, str, CreepElements]]()
     for recording in recordings:
-        hold = max(find_holds(recording), key=lambda each: len(each.interval), default=None)
+        hold = max(
+            find_holds(recording), key=lambda candidate: len(candidate.interval), default=None
+        )
         sentences.append(_sentence(recording, hold))
         if hold is None:
             continue
@@ -261,17 +263,17 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
                 needed = "the resting length and the time; the contraction alone gives no stiffness"
                 raise IdentificationError(f"{recording.origin}: creep elements need {needed}.")
             if hold.quantity == "force":
-                held.append(_held_rows(recording, hold))
+                holds.append(_held_rows(recording, hold))
             else:
                 loaded.append(_elements_under_load(recording, hold, law))
         except AirmuscleError as error:
             reasons.append(error.message)
-    stage = fit_held_rows(held) if held else None
+    stage = fit_held_rows(holds) if holds else None
     if isinstance(stage, CreepStage) and stage.elements.stiffnesses:
         return HeldCreep(tuple(sentences), stage.elements, stage.verdict, stage.standard_errors)
-    usable = [each for each in loaded if each[2].stiffnesses]
+    usable = [loaded_hold for loaded_hold in loaded if loaded_hold[2].stiffnesses]
     if usable:
-        _, origin, elements = max(usable, key=lambda each: each[0])
+        _, origin, elements = max(usable, key=lambda loaded_hold: loaded_hold[0])
         verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
         return HeldCreep(
             tuple(sentences), elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan)

@@ -66,10 +66,10 @@ def vessel_plant(record: CampaignRecord) -> Plant:
     volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
     vessel = Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2)
     valve = Valve(ASSUMED_CONDUCTANCE, 0.35)
-    held = Isometric(held_contraction(record))
+    mechanism = Isometric(held_contraction(record))
     circuit = FillDischarge(Supply(top + 5e3), valve, valve)
     ambient = dynamic.stated_ambient(record.recording)
-    return Plant(Muscle.ideal(vessel), circuit, held, EnergyBalance(1.0), ambient)
+    return Plant(Muscle.ideal(vessel), circuit, mechanism, EnergyBalance(1.0), ambient)
 
 
 def plant_of(plant: object) -> Plant:
@@ -101,9 +101,9 @@ def rescaled(plant: Plant, scale: float) -> Plant:
 def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
     """The plant with this volume [m3], at the held length and in the ambient air of a record."""
     muscle = Muscle.ideal(Vessel(volume, plant.muscles[0].geometry.resting_length))
-    held = Isometric(held_contraction(record))
+    mechanism = Isometric(held_contraction(record))
     ambient = dynamic.stated_ambient(record.recording)
-    return dataclasses.replace(plant, muscle=muscle, mechanism=held, ambient=ambient)
+    return dataclasses.replace(plant, muscle=muscle, mechanism=mechanism, ambient=ambient)
 
 
 def tube_guess(plant: Plant) -> Tube:
@@ -325,7 +325,7 @@ def fit_pressure(
     records: Sequence[CampaignRecord],
     experiments: Sequence[dynamic.Experiment],
     free: Sequence[str | tuple[str, ...]],
-    own: tuple[str, ...] = (),
+    record_unknowns: tuple[str, ...] = (),
 ) -> dynamic.DynamicFit:
     """A fit with the heat transfer, and own instants of the valve commands, because the detected
     ones are inexact: by a quarter of the shortest step, and two rows at least."""
@@ -337,7 +337,7 @@ def fit_pressure(
         experiments,
         free=(HEAT_TRANSFER, *free),
         observed={sensor_of(first): pressure_deviation(records)},
-        per_record=(*own, dynamic.StartTime(margin), dynamic.CommandInstants(margin)),
+        per_record=(*record_unknowns, dynamic.StartTime(margin), dynamic.CommandInstants(margin)),
         bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
         starts=TUBE_STARTS if TUBE_VOLUME in free else 1,
     )
@@ -360,7 +360,8 @@ def fill_baselines(fit: dynamic.DynamicFit) -> tuple[dict[str, float], ...]:
         )
         records.append(TimedRecord(model.times, model.measured, commands, model.valid))
     return tuple(
-        {name: float(rms[0]) for name, rms in each.items()} for each in baseline_errors(records)
+        {name: float(rms[0]) for name, rms in record_errors.items()}
+        for record_errors in baseline_errors(records)
     )
 
 
@@ -371,8 +372,8 @@ def describe_skills(errors: Sequence[float], baselines: Sequence[Mapping[str, fl
     parts = [
         f"{name} {min(known) / 1e3:.3g} to {max(known) / 1e3:.3g} kPa"
         for name in (PERSISTENCE, ARX)
-        if (known := [each[name] for each in baselines if name in each])
+        if (known := [baseline[name] for baseline in baselines if name in baseline])
     ]
     pairs = zip(errors, baselines, strict=True) if baselines else ()
-    skills = [value for rms, each in pairs if (value := skill(rms, each)) is not None]
+    skills = [value for rms, baseline in pairs if (value := skill(rms, baseline)) is not None]
     return f" ({', '.join(parts)}; skill {min(skills):.2g} to {max(skills):.2g})" if skills else ""

@@ -127,7 +127,7 @@ class FillStage(ShortRepr):
         noise = fills.pressure_deviation(self.records)
         change = max(abs(step.change) for record in self.records for step in record.steps)
         worst, rms = max(
-            zip(self.records, fills.record_rms(self.fit), strict=True), key=lambda each: each[1]
+            zip(self.records, fills.record_rms(self.fit), strict=True), key=lambda pair: pair[1]
         )
         if rms <= max(MAX_NOISE_RATIO * noise, MIN_MISFIT * change):
             return ""
@@ -143,7 +143,7 @@ class FillStage(ShortRepr):
     def verdict(self) -> str:
         """Cross-prediction, volume and residuals, as sentences."""
         rms, cross = (
-            [each / 1e3 for each in errors]
+            [error / 1e3 for error in errors]
             for errors in (fills.record_rms(self.fit), self.cross_rms)
         )
         predicted = (
@@ -189,19 +189,25 @@ def fit_fill_stage(
             record for record in records if any(step.change > 0 for step in record.steps)
         ] or list(records)
         relative = _fit_relative(rising)
-        held = np.array([fills.held_contraction(record) for record in rising])
-        own = [each for each in relative.estimates if each.name.startswith(VOLUME)]
-        volumes = np.array([each.value for each in own])
-        errors = np.array([each.stderr for each in own])
+        contractions = np.array([fills.held_contraction(record) for record in rising])
+        volume_estimates = [
+            volume_estimate
+            for volume_estimate in relative.estimates
+            if volume_estimate.name.startswith(VOLUME)
+        ]
+        volumes = np.array([volume_estimate.value for volume_estimate in volume_estimates])
+        errors = np.array([volume_estimate.stderr for volume_estimate in volume_estimates])
         progress(0.5)
         if geometry is not None:  # the factor that makes the relative volumes its own
-            known = np.array([float(geometry.volume(contraction)) for contraction in held])
+            known = np.array([float(geometry.volume(contraction)) for contraction in contractions])
             scale = float(known @ volumes / (volumes @ volumes))
         else:
-            estimate = None if change is None else relate_volumes(volumes, errors, held, change)
+            estimate = (
+                None if change is None else relate_volumes(volumes, errors, contractions, change)
+            )
             if estimate is None or change is None:
                 ratio = "the ratio of conductance and volume only"
-                ends = [100 * held.min(), 100 * held.max()]
+                ends = [100 * contractions.min(), 100 * contractions.max()]
                 reason = f"the fills determine {ratio}, and no static law gives the volume"
                 if change is not None:
                     at = f"at contractions of {ends[0]:.3g} to {ends[1]:.3g} %"
@@ -242,10 +248,12 @@ def _experiments(
     """All records with the volumes of a geometry, from the valves of the scaled relative fit and
     its instants.
     """
-    found = fills.rescaled(fills.plant_of(relative.plant()), scale)
+    scaled_plant = fills.rescaled(fills.plant_of(relative.plant()), scale)
     plants = [
-        fills.at_record(found, each, float(geometry.volume(fills.held_contraction(each))))
-        for each in records
+        fills.at_record(
+            scaled_plant, record, float(geometry.volume(fills.held_contraction(record)))
+        )
+        for record in records
     ]
     detected = list(map(fills.detected_experiment, records, plants))
     return [
@@ -270,10 +278,10 @@ def _fit_jointly(
     common_ratio = ""
 
     def fitted(experiments: Sequence[Experiment], chosen: Sequence[int] = everything) -> DynamicFit:
-        own = fills.ValveUnknowns.of(
+        unknowns = fills.ValveUnknowns.of(
             [records[i] for i in chosen], experiments[0].plant, common_ratio
         )
-        free = [*own.shared, *own.paths(fills.CONDUCTANCE)]
+        free = [*unknowns.shared, *unknowns.paths(fills.CONDUCTANCE)]
         return fills.fit_pressure(records, [experiments[i] for i in chosen], free)
 
     fit, experiments = _with_supply(records, experiments, fitted)
@@ -287,13 +295,13 @@ def _fit_jointly(
         return fitted(experiments, chosen)
 
     predictions = cross_predict(fit, fit_to_others)
-    fit = fit.with_scatter_of_records([each.common for each in predictions])
+    fit = fit.with_scatter_of_records([prediction.common for prediction in predictions])
     contractions = np.array([fills.held_contraction(record) for record in records])
     described = [(fills.describe_supply, valves.sinks), (fills.describe_tube, valves.tube)]
     supposed = [describe(fit) for describe, is_used in described if is_used]
     supposed += [*valves.supposed, *describe_ambient([record.recording for record in records])]
-    cross = tuple(rms for each in predictions for rms in each.rms.values())
-    others = fills.fill_baselines(fit) if len(cross) == len(records) else ()
+    cross = tuple(rms for prediction in predictions for rms in prediction.rms.values())
+    baselines = fills.fill_baselines(fit) if len(cross) == len(records) else ()
     parts = (
         tuple(records),
         tuple(experiments),
@@ -301,7 +309,7 @@ def _fit_jointly(
         estimate,
         contractions,
         cross,
-        others,
+        baselines,
         tuple(supposed),
     )
     return FillStage(fit, *parts)
@@ -319,16 +327,18 @@ def _with_supply(
     limit = MAX_FOLLOWED * fills.pressure_deviation(records)
     if not valves.fill or valves.sinks or valves.tube or max(fills.record_rms(constant)) <= limit:
         return constant, experiments
-    found = [fills.with_instants(each, constant, i) for i, each in enumerate(experiments)]
+    refined = [
+        fills.with_instants(experiment, constant, i) for i, experiment in enumerate(experiments)
+    ]
     for change, begun, volume in (
-        (_with_volume, found, "supply.volume"),
+        (_with_volume, refined, "supply.volume"),
         (_with_tube, experiments, "tube.volume"),
     ):
         try:
             fit, changed = change(begun, fitted)
         except AirmuscleError:  # the simulation fails on the way
             continue
-        estimate = next(each for each in fit.estimates if each.name.endswith(volume))
+        estimate = next(candidate for candidate in fit.estimates if candidate.name.endswith(volume))
         determined = not estimate.on_bound and estimate.stderr <= MAX_VOLUME_ERROR * estimate.value
         muscle = fills.volume_at_rest(fills.plant_of(fit.plant()))
         possible = change is _with_volume or estimate.value <= MAX_TUBE_VOLUME * muscle
@@ -352,7 +362,7 @@ def _with_tube(
     plant = fills.plant_of(experiments[0].plant)
 
     def divided(changed: Plant) -> list[Experiment]:
-        return [fills.with_circuit(each, changed.circuits[0]) for each in experiments]
+        return [fills.with_circuit(experiment, changed.circuits[0]) for experiment in experiments]
 
     guess = dataclasses.replace(
         plant, circuit=WithTubes(fills.valves_of(plant.circuit), fills.tube_guess(plant))

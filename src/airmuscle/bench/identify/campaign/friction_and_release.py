@@ -112,7 +112,16 @@ def fit_release_stage(
         experiments = [_experiment(record, damped, mass) for record, mass in masses.items()]
         sensors = [record.inspection.sensors for record in masses]
         deviations = {
-            name: max([least, *(each[column].std for each in sensors if column in each)])
+            name: max(
+                [
+                    least,
+                    *(
+                        record_sensors[column].std
+                        for record_sensors in sensors
+                        if column in record_sensors
+                    ),
+                ]
+            )
             for name, column, least in MIN_DEVIATIONS
         }
         first = experiments[0].plant
@@ -145,20 +154,22 @@ def _mass(record: CampaignRecord) -> float | None:
 
 
 def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experiment:
-    whole = record.recording
+    measured = record.recording
     mechanism = WithLatch(HangingMass(mass))
-    ambient = stated_ambient(whole)
+    ambient = stated_ambient(measured)
     plant = Plant(muscle, ClosedChamber(), mechanism, gas=Polytropic(1.2), ambient=ambient)
-    motion = find_motion(whole)
-    path = displacement(whole)
+    motion = find_motion(measured)
+    path = displacement(measured)
     assert motion is not None
-    count = max(int((whole["time"] < motion.start).sum()), 3)
-    pressure, position = (float(np.median(column[:count])) for column in (whole["pressure"], path))
+    count = max(int((measured["time"] < motion.start).sum()), 3)
+    pressure, position = (
+        float(np.median(column[:count])) for column in (measured["pressure"], path)
+    )
     conditions = InitialConditions.at_coordinates(plant, pressure, position=position, speed=0.0)
-    recording = thin(whole.with_columns(position=path), FIT_ROWS)
+    recording = thin(measured.with_columns(position=path), FIT_ROWS)
     command = Schedule({"latched": ((0.0, 0.0),)})
     return Experiment(
-        recording, command, conditions, max(motion.start - 0.005, float(whole["time"][0])), plant
+        recording, command, conditions, max(motion.start - 0.005, float(measured["time"][0])), plant
     )
 
 
@@ -227,9 +238,9 @@ def fit_friction_stage(
         )
         return LeftOutStage("hysteresis", reason, remedy)
     ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
-    kept = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
+    selected = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
     fits = DistributedCalls(executor, _fit_loop, None).results(
-        kept, lambda done: progress(0.5 * done / len(kept))
+        selected, lambda done: progress(0.5 * done / len(selected))
     )
     laws = itertools.count(1)
     joint = hysteresis.fit_jointly(
@@ -243,7 +254,7 @@ def fit_friction_stage(
         best = only
         runs = (only.series,)
     friction = NoFriction() if best is None else hysteresis.identified_friction(best.friction, runs)
-    return FrictionStage(friction, tuple(fits), joint, len(loops) - len(kept))
+    return FrictionStage(friction, tuple(fits), joint, len(loops) - len(selected))
 
 
 def _fit_loop(_: None, loop: hysteresis.HysteresisLoop) -> hysteresis.LoopFit:
@@ -260,15 +271,19 @@ def _find_loops(
         if record.kind is RecordKind.ISOBARIC and record.resting_length is not None:
             recording = with_force(record.recording, creep_force(creep, record.recording))
             recording = recording.rows(path_rows(recording))
-            own = usable.setdefault(record.resting_length, [])
+            specimen_runs = usable.setdefault(record.resting_length, [])
             try:
                 hysteresis.find_loops([recording], all_rows=True)
             except AirmuscleError as error:
                 failed.append(error.message)
             else:
-                own.append(recording)
-    lengths = [own for own in usable.values() if own]
-    return [loop for own in lengths for loop in hysteresis.find_loops(own, all_rows=True)], failed
+                specimen_runs.append(recording)
+    lengths = [specimen_runs for specimen_runs in usable.values() if specimen_runs]
+    return [
+        loop
+        for specimen_runs in lengths
+        for loop in hysteresis.find_loops(specimen_runs, all_rows=True)
+    ], failed
 
 
 def friction_along(friction: Friction, recording: Recording) -> Array:
@@ -329,11 +344,11 @@ def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> l
     """
     return [
         (
-            with_force(each, creep_force(elements, each))
-            if elements.stiffnesses and has_path(each)
-            else each
+            with_force(recording, creep_force(elements, recording))
+            if elements.stiffnesses and has_path(recording)
+            else recording
         )
-        for each in recordings
+        for recording in recordings
     ]
 
 

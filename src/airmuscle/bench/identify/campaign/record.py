@@ -203,8 +203,10 @@ def _classify(inspection: Inspection) -> CampaignRecord:
                 )
             rest = float(recording["time"][-1]) - motion.end
             pressure = recording["pressure"]
-            held = _span(pressure) <= RELATIVE_BAND * max(float(np.max(np.abs(pressure))), 1.0)
-            if held and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
+            is_constant = _span(pressure) <= RELATIVE_BAND * max(
+                float(np.max(np.abs(pressure))), 1.0
+            )
+            if is_constant and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
                 reason = (
                     f"motion within {motion.duration:.3g} s, then held for {rest:.4g} s at constant"
                     " pressure"
@@ -287,10 +289,10 @@ def check_one_rig(records: Sequence[CampaignRecord]) -> None:
     for record in records:
         if record.kind is not RecordKind.UNUSED and record.resting_length is not None:
             by_length.setdefault(round(record.resting_length, 6), []).append(record)
-    for length, own in by_length.items():
+    for length, of_length in by_length.items():
         specimens = {
             str(r.recording.constants["specimen"])
-            for r in own
+            for r in of_length
             if "specimen" in r.recording.constants
         }
         if len(specimens) > 1:
@@ -299,7 +301,7 @@ def check_one_rig(records: Sequence[CampaignRecord]) -> None:
                 f"the records of {1e3 * length:.4g} mm are of several specimens: {names}."
                 f" {OWN_FOLDER}."
             )
-        isobaric = [record for record in own if record.kind is RecordKind.ISOBARIC]
+        isobaric = [record for record in of_length if record.kind is RecordKind.ISOBARIC]
         _check_scale(isobaric)
         _check_forces([record.recording for record in isobaric])
 
@@ -309,7 +311,11 @@ def _check_scale(records: Sequence[CampaignRecord]) -> None:
     explains.
     """
     levels = [(record.recording, record.level[1]) for record in records if record.level is not None]
-    scales = [(float(np.max(each["force"])) / level, each) for each, level in levels if level > 0]
+    scales = [
+        (float(np.max(recording["force"])) / level, recording)
+        for recording, level in levels
+        if level > 0
+    ]
     positive = sorted((pair for pair in scales if pair[0] > 0), key=lambda pair: pair[0])
     if positive and positive[-1][0] > MAX_SCALE * positive[0][0]:
         low, first = positive[0]
@@ -334,11 +340,11 @@ def _check_forces(recordings: Sequence[Recording]) -> None:
     """Raise IdentificationError where forces at equal pressure and contraction differ by a
     factor.
     """
-    for each in match_rows(recordings).runs:
-        names = [block.recording.origin for block in (each.first, each.second)]
-        first, second = (float(np.mean(force)) for force in each.forces)
+    for match in match_rows(recordings).runs:
+        names = [block.recording.origin for block in (match.first, match.second)]
+        first, second = (float(np.mean(force)) for force in match.forces)
         if max(first, second) > MAX_RATIO * min(first, second):
-            pressure = float(np.median(each.first.recording["pressure"][each.first.rows]))
+            pressure = float(np.median(match.first.recording["pressure"][match.first.rows]))
             raise IdentificationError(
                 f"{' and '.join(names)} contradict each other: at {pressure / 1e3:.3g} kPa and the"
                 f" same contractions their forces are {first:.4g} and {second:.4g} N. They are of"

@@ -138,14 +138,14 @@ class Campaign(Reported):
     def geometry(self, resting_length: float | None = None) -> Geometry | None:
         """The given geometry or that of the fills, for a resting length [m] with a volume in
         proportion; None without one."""
-        own = self.fills.geometry if isinstance(self.fills, FillStage) else self.given_geometry
-        if own is None:
+        measured = self.fills.geometry if isinstance(self.fills, FillStage) else self.given_geometry
+        if measured is None:
             return None
         length = resting_length or self.resting_length
-        if length is None or abs(length - own.resting_length) < 1e-6:
-            return own
+        if length is None or abs(length - measured.resting_length) < 1e-6:
+            return measured
         change = self.static.volume_change(length) if isinstance(self.static, StaticStage) else None
-        at_rest = float(own.volume(0.0)) * length / own.resting_length
+        at_rest = float(measured.volume(0.0)) * length / measured.resting_length
         return None if change is None else change.geometry(at_rest)
 
     def muscle(self, resting_length: float | None = None) -> Muscle | None:
@@ -283,8 +283,8 @@ def stage_result(stage: StageResult) -> str:
 def _next_tables(experiments: Sequence[NextExperiment]) -> Iterator[Table]:
     """The table of the next experiments, and that of the first plan of static runs."""
     columns = {
-        "measure": [each.measure for each in experiments],
-        "because of": TableColumn([each.purpose for each in experiments], brief=False),
+        "measure": [experiment.measure for experiment in experiments],
+        "because of": TableColumn([experiment.purpose for experiment in experiments], brief=False),
     }
     text = (
         "Missing stages first, then parameters that the records do not determine, then further"
@@ -293,7 +293,9 @@ def _next_tables(experiments: Sequence[NextExperiment]) -> Iterator[Table]:
     yield Table(
         "campaign-next", "What to measure next", columns, text, brief=MAX_NEXT, key="experiments"
     )
-    plan = next((each.plan for each in experiments if each.plan is not None), None)
+    plan = next(
+        (experiment.plan for experiment in experiments if experiment.plan is not None), None
+    )
     if plan is not None:
         runs = run_table(plan.runs, "campaign-plan", "D-optimal static runs to measure next")
         yield dataclasses.replace(runs, brief=0)

@@ -89,7 +89,7 @@ def calibrate(
     ):
         residuals, groups = _left_out_residuals(fit, points, _inner(levels))
         if groups:  # other lengths are further runs, too
-            least = max((other.half_width for other in bands), default=0.0)
+            least = max((band.half_width for band in bands), default=0.0)
             bands.append(_band(purpose, residuals, groups, least))
     if not bands:
         bands.append(
@@ -98,10 +98,10 @@ def calibrate(
     residuals, groups = _left_out_residuals(
         fit, points, isometric if None in isometric else (), share=1.0
     )
-    held = (
+    isometric_band = (
         _band("further isometric runs", residuals, groups, bands[0].half_width) if groups else None
     )
-    return tuple(bands), held
+    return tuple(bands), isometric_band
 
 
 def force_limit(points: Sequence[Recording]) -> float:
@@ -123,12 +123,12 @@ def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] |
     """
     labels: list[tuple[str, int] | None] = [None] * len(values)
     for name in {value[0] for value in values if value is not None}:
-        own = sorted(
+        ordered = sorted(
             (value[1], i)
             for i, value in enumerate(values)
             if value is not None and value[0] == name
         )
-        levels, places = zip(*own, strict=True)
+        levels, places = zip(*ordered, strict=True)
         gaps = np.diff(levels, prepend=levels[0]) > LEVEL_TOLERANCE * (
             np.max(np.abs(levels)) or 1.0
         )
@@ -155,14 +155,14 @@ def _left_out_residuals(
         leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free)
     )
     for label in dict.fromkeys(label for label in labels if label is not None):
-        training = [run for run, own in zip(points, labels, strict=True) if own != label]
-        others = [run for run, own in zip(points, labels, strict=True) if own == label]
+        training = [run for run, group in zip(points, labels, strict=True) if group != label]
+        left_out = [run for run, group in zip(points, labels, strict=True) if group == label]
         try:
             model = refit(fit.model, FitPoints.from_recordings(training), fixed=fixed)
         except AirmuscleError:
             continue  # the others do not determine the law, so that this group cannot judge it
-        inside = force_residuals(fit.model, others, max_force)
-        residuals.append(inside + share * (force_residuals(model, others, max_force) - inside))
+        inside = force_residuals(fit.model, left_out, max_force)
+        residuals.append(inside + share * (force_residuals(model, left_out, max_force) - inside))
         count += 1
     return np.concatenate(residuals), count
 
@@ -272,13 +272,17 @@ def fit_static_stage(
             used, points, strict=True
         ):  # static points are parts of one pressure each
             levels = static_levels(record)
-            own = (
+            level_rows = (
                 [rows]
                 if len(levels) == 1
                 else [freed_rows(level, friction, creep) for level in levels]
             )
-            parts |= {level: part for level, part in zip(levels, own, strict=True) if len(part)}
-        bands, held = calibrate(comparison.recommended.fit, list(parts.values()), list(parts))
+            parts |= {
+                level: part for level, part in zip(levels, level_rows, strict=True) if len(part)
+            }
+        bands, isometric_band = calibrate(
+            comparison.recommended.fit, list(parts.values()), list(parts)
+        )
     except AirmuscleError as error:
         return LeftOutStage(
             NAME, str(error.message), "measure at more levels of pressure and contraction"
@@ -287,7 +291,7 @@ def fit_static_stage(
     odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
     misfit = comparison.recommended.fit.misfit
     notes = (*check_data([record.recording for record in used]).notes, *misfit, *odd)
-    return StaticStage(comparison, points, bands, notes, held)
+    return StaticStage(comparison, points, bands, notes, isometric_band)
 
 
 def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:

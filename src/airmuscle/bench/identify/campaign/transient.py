@@ -113,11 +113,11 @@ def named(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     names = [recording.origin for recording in recordings]
     return tuple(
         (
-            each
-            if names.count(each.origin) == 1
-            else dataclasses.replace(each, origin=f"{each.origin} ({i + 1})")
+            recording
+            if names.count(recording.origin) == 1
+            else dataclasses.replace(recording, origin=f"{recording.origin} ({i + 1})")
         )
-        for i, each in enumerate(recordings)
+        for i, recording in enumerate(recordings)
     )
 
 
