@@ -105,7 +105,9 @@ class _Context:
         supplies = [leaf for leaf in leaves if leaf.path.endswith("supply.pressure")]
         for leaf, factor in itertools.product(supplies, SUPPLY_FACTORS):
             changed = factor * (leaf.value + ambient) - ambient
-            values = [changed if each.path == leaf.path else each.value for each in leaves]
+            values = [
+                changed if parameter.path == leaf.path else parameter.value for parameter in leaves
+            ]
             text = f"the same record from a supply of {changed / 1e3:.3g} kPa, which is measured"
             yield CandidateRecord(text, self._of(tree.with_parameters(self.plant, values)))
 
@@ -126,9 +128,9 @@ class _Context:
         high = float(tree.flatten(circuit.supply)[0])
         discharge = self._of(self.plant, Schedule({"discharge": ((0.0, 1.0),)}), high)
         flow = [
-            each.path
-            for each in tree.leaves(self.plant)
-            if each.path.startswith("circuit.discharge.")
+            leaf.path
+            for leaf in tree.leaves(self.plant)
+            if leaf.path.startswith("circuit.discharge.")
         ]
         unknown = tuple(
             path for path in flow if path.endswith(VALVE_PARAMETERS) and path not in self.identified

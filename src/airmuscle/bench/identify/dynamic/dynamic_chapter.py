@@ -43,10 +43,10 @@ def dynamic_chapters(
 def regulator_chapters(result: RegulatorFit, title: str) -> list[Chapter]:
     """Return the chapters of the fit of a pressure regulator, as those of a dynamic fit."""
     first = _estimates(result.fit, title, (), ())
-    own = result.chapter()
+    chapter = result.chapter()
     records = [_record(result.fit, i) for i in range(len(result.zeros))]
     return [
-        dataclasses.replace(first, tables=(*first.tables, own.tables[-1]), notes=own.notes),
+        dataclasses.replace(first, tables=(*first.tables, chapter.tables[-1]), notes=chapter.notes),
         *records,
     ]
 
@@ -64,11 +64,13 @@ def _estimates(
     correlations = Table("correlations", "Correlations", rows, shown=False)
     columns: dict[str, Any] = {
         "combination (relative changes)": [
-            ", ".join(f"{name} {share:+.2g}" for name, share in each.shares)
-            for each in undetermined
+            ", ".join(f"{name} {share:+.2g}" for name, share in combination.shares)
+            for combination in undetermined
         ],
-        "relative standard deviation": [each.relative_stderr for each in undetermined],
-        "experiment that determines it": [each.remedy for each in undetermined],
+        "relative standard deviation": [
+            combination.relative_stderr for combination in undetermined
+        ],
+        "experiment that determines it": [combination.remedy for combination in undetermined],
     }
     open_ends = Table(
         "not-determined", "Parameter combinations that the records do not determine", columns
@@ -93,11 +95,11 @@ def _estimates(
 
 
 def _cross_table(cross: Sequence[CrossPrediction]) -> Table:
-    pairs = [(each, name) for each in cross for name in each.rms]
-    errors = [each.rms[name] for each, name in pairs]
-    residuals = [each.fitted[name] for each, name in pairs]
+    pairs = [(prediction, name) for prediction in cross for name in prediction.rms]
+    errors = [prediction.rms[name] for prediction, name in pairs]
+    residuals = [prediction.fitted[name] for prediction, name in pairs]
     columns: dict[str, Any] = {
-        "record": [each.record for each, _ in pairs],
+        "record": [prediction.record for prediction, _ in pairs],
         "quantity": [name for _, name in pairs],
         "rms error, predicted by the others": TableColumn(errors, BY_ROW, short="rms error"),
         "rms residual of the joint fit": TableColumn(residuals, BY_ROW, short="joint fit"),
@@ -114,14 +116,14 @@ def _optima_table(fit: DynamicFit) -> Table:
     shown = fit.optima[:MAX_OPTIMA] if len(fit.optima) > 1 else ()
     lowest = max(fit.costs[0], 1e-300)
     columns: dict[str, Any] = {
-        "searches": [each.searches for each in shown],
+        "searches": [optimum.searches for optimum in shown],
         "rms residual relative to the lowest": [
-            float(np.sqrt(each.cost / lowest)) for each in shown
+            float(np.sqrt(optimum.cost / lowest)) for optimum in shown
         ],
     }
     for i, estimate in enumerate(fit.estimates):
         columns[estimate.name] = TableColumn(
-            [float(each.values[i]) for each in shown], estimate.unit
+            [float(optimum.values[i]) for optimum in shown], estimate.unit
         )
     return Table("optima", "Optima of the searches", columns)
 

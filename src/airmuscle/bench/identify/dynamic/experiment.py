@@ -221,15 +221,17 @@ def _record_unknowns(
     """A start time, an initial value, or the instants of a command after its first one. Raises
     ParameterError.
     """
-    found: list[tuple[str, Nuisance, float, str, str]]  # name, target, value, unit and symbol
+    described: list[tuple[str, Nuisance, float, str, str]]  # name, target, value, unit and symbol
     if isinstance(target, StartTime):
-        found = [("start time", target, experiment.start_time, "s", "t_0")]
+        described = [("start time", target, experiment.start_time, "s", "t_0")]
     elif isinstance(target, InitialValue):
         known = experiment.initial_conditions.known
         where = f"the initial conditions of record {record + 1}"
         check_known(f"{where} have no known value", target.name, known, "known are")
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
-        found = [(f"initial {target.name}", target, known[target.name], unit, f"{target.name}_0")]
+        described = [
+            (f"initial {target.name}", target, known[target.name], unit, f"{target.name}_0")
+        ]
     elif isinstance(experiment.command, Schedule):
         instants = sorted(
             {instant for points in experiment.command.changes.values() for instant, _ in points}
@@ -237,7 +239,10 @@ def _record_unknowns(
         further = [
             (i, CommandInstant(instant, target.margin)) for i, instant in enumerate(instants[1:], 2)
         ]
-        found = [(f"command instant {i}", each, each.instant, "s", f"t_{i}") for i, each in further]
+        described = [
+            (f"command instant {i}", instant, instant.instant, "s", f"t_{i}")
+            for i, instant in further
+        ]
     else:
         raise ParameterError(
             f"the command of record {record + 1} is a {type(experiment.command).__name__}, which"
@@ -246,16 +251,16 @@ def _record_unknowns(
     return [
         Unknown(
             f"{name} of record {record + 1}",
-            each,
+            nuisance,
             record,
             value,
             value - target.margin,
             value + target.margin,
             unit,
             symbol,
-            "command instant" if isinstance(each, CommandInstant) else name,
+            "command instant" if isinstance(nuisance, CommandInstant) else name,
         )
-        for name, each, value, unit, symbol in found
+        for name, nuisance, value, unit, symbol in described
     ]
 
 
@@ -292,17 +297,17 @@ def stated_ambient(recording: Recording, default: Ambient | None = None) -> Ambi
 
 def check_ambient(plant: System, experiment: Experiment) -> None:
     """Raise ParameterError where a record states another ambient air than its plant has."""
-    own = getattr(experiment.plant or plant, "ambient", None)
-    if not isinstance(own, Ambient):
+    plant_air = getattr(experiment.plant or plant, "ambient", None)
+    if not isinstance(plant_air, Ambient):
         return
-    stated = stated_ambient(experiment.recording, own)
+    stated = stated_ambient(experiment.recording, plant_air)
     origin = experiment.recording.origin
-    if abs(stated.pressure - own.pressure) > PRESSURE_TOLERANCE * own.pressure:
+    if abs(stated.pressure - plant_air.pressure) > PRESSURE_TOLERANCE * plant_air.pressure:
         name = "pressure"
-        values = [f"{each.pressure / 1e3:.4g} kPa" for each in (stated, own)]
-    elif abs(stated.temperature - own.temperature) > TEMPERATURE_TOLERANCE:
+        values = [f"{air.pressure / 1e3:.4g} kPa" for air in (stated, plant_air)]
+    elif abs(stated.temperature - plant_air.temperature) > TEMPERATURE_TOLERANCE:
         name = "temperature"
-        values = [f"{each.temperature:.4g} K" for each in (stated, own)]
+        values = [f"{air.temperature:.4g} K" for air in (stated, plant_air)]
     else:
         return
     raise ParameterError(
@@ -316,10 +321,18 @@ def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
     """A note where the plant of an experiment has another ambient air than a plant; empty
     otherwise.
     """
-    own, other = (getattr(each, "ambient", None) for each in (plant, experiment.plant))
-    if not (isinstance(own, Ambient) and isinstance(other, Ambient)) or own == other:
+    plant_air, record_air = (
+        getattr(source, "ambient", None) for source in (plant, experiment.plant)
+    )
+    if (
+        not (isinstance(plant_air, Ambient) and isinstance(record_air, Ambient))
+        or plant_air == record_air
+    ):
         return []
-    texts = [f"{each.pressure / 1e3:.4g} kPa and {each.temperature:.4g} K" for each in (other, own)]
+    texts = [
+        f"{air.pressure / 1e3:.4g} kPa and {air.temperature:.4g} K"
+        for air in (record_air, plant_air)
+    ]
     return [
         f"the ambient air is that of the record, {texts[0]}; the plant was identified at {texts[1]}"
     ]
@@ -328,9 +341,9 @@ def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
 def describe_ambient(recordings: Sequence[Recording]) -> list[str]:
     """What is supposed of the ambient air of records that state no pressure, as sentences."""
     silent = [recording.origin for recording in recordings if "ambient" not in recording.constants]
-    some = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not state"
+    subject = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not state"
     text = (
-        f"{'No record states' if len(silent) == len(recordings) else some} the ambient pressure:"
+        f"{'No record states' if len(silent) == len(recordings) else subject} the ambient pressure:"
         f" {Ambient().pressure / 1e3:.4g} kPa are supposed; an error of 5 % of it changes a fitted"
         " heat transfer by about 20 %."
     )

@@ -143,7 +143,7 @@ def fit_tube(
             "fit_tube: the plant has no Tube between valves and muscle; write WithTubes(circuit,"
             " Tube(...))."
         )
-    found: list[tuple[float, DynamicFit]] = []
+    candidates: list[tuple[float, DynamicFit]] = []
     failure: AirmuscleError | None = None
     for count in segments:
         tube = dataclasses.replace(circuit.tube, segment_count=count)
@@ -160,11 +160,11 @@ def fit_tube(
             failure = error
             continue
         size = count_readings(fit.problem.record_models)
-        found.append((aicc(fit.residual_std**2, size, len(fit.estimates)), fit))
-    if not found:
+        candidates.append((aicc(fit.residual_std**2, size, len(fit.estimates)), fit))
+    if not candidates:
         raise failure or ParameterError("fit_tube: segments is empty; give at least one number.")
-    lowest = min(value for value, _ in found)
-    return next(fit for value, fit in found if value <= lowest + EQUIVALENT)
+    lowest = min(value for value, _ in candidates)
+    return next(fit for value, fit in candidates if value <= lowest + EQUIVALENT)
 
 
 def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tuple[Array, float]]:
@@ -328,9 +328,9 @@ def cross_predict(
             estimates = tuple(
                 dataclasses.replace(e, value=common.get(e.name, e.value)) for e in fit.estimates
             )
-            other = dataclasses.replace(fit, estimates=estimates)
+            predicted = dataclasses.replace(fit, estimates=estimates)
             rms, fitted = (
-                {name: each.rms(name, i) for name in model.names} for each in (other, fit)
+                {name: source.rms(name, i) for name in model.names} for source in (predicted, fit)
             )
         except (
             AirmuscleError
@@ -344,7 +344,7 @@ def describe_cross_predictions(predictions: Sequence[CrossPrediction]) -> str:
     """The meaning of the cross-predictions, as a sentence; empty without any."""
     if not predictions:
         return ""
-    worst = max(predictions, key=lambda each: each.ratio)
+    worst = max(predictions, key=lambda prediction: prediction.ratio)
     times = f"{worst.ratio:.3g} times the residual of the joint fit"
     if worst.ratio <= MAX_RATIO:
         return f"The records predict each other: the maximum rms error is {times}."

@@ -115,7 +115,7 @@ def _steady_conditions(
         [p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)]
         for k in range(len(pressures))
     ]
-    others = [plant.state_at(pressure=each, **motion) for each in increased]
+    varied_states = [plant.state_at(pressure=raised, **motion) for raised in increased]
     outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
     of_circuits = _circuit_states(plant)
     known = {
@@ -129,7 +129,7 @@ def _steady_conditions(
             f"{prefix}air_mass" for prefix in plant.prefixes
         ]:
             continue
-        if all(other[name] == value for other in others):
+        if all(varied[name] == value for varied in varied_states):
             if name in of_circuits:
                 settled.append(name)
             else:

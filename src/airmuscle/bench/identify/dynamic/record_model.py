@@ -194,15 +194,15 @@ class RecordModel:
         instant of the command begins there with the difference of the rates before and after it."""
         rows = list[Array]()
         steps = 0
-        held = grid.intervals[0].segments.values[0]
+        last_input = grid.intervals[0].segments.values[0]
         for interval in grid.intervals:
             if interval.column is not None:
-                own = self._guess.size
+                size = self._guess.size
                 before, after = (
-                    system.rates(state.tolist(), u)[:own]
-                    for u in (held, interval.segments.values[0])
+                    system.rates(state.tolist(), u)[:size]
+                    for u in (last_input, interval.segments.values[0])
                 )
-                state[own:].reshape(own, -1)[:, interval.column] += before - after
+                state[size:].reshape(size, -1)[:, interval.column] += before - after
             solution = bound.run(
                 interval.segments, interval.begin, state, interval.times, max_steps - steps
             )
@@ -215,7 +215,7 @@ class RecordModel:
                 )
             rows.append(solution.rows)
             state = solution.state
-            held = interval.segments.values[-1]
+            last_input = interval.segments.values[-1]
             steps = steps + solution.steps
         return rows[0] if len(rows) == 1 else np.concatenate(rows), steps
 

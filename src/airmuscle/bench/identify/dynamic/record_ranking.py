@@ -80,10 +80,10 @@ class RecordRanking(Reported):
         best = self.ranking[0]
         before, after = (
             [
-                f"{each.correlation:.2f}",
-                " and ".join(f"{100.0 * error:.2g} %" for error in each.standard_errors),
+                f"{precision.correlation:.2f}",
+                " and ".join(f"{100.0 * error:.2g} %" for error in precision.standard_errors),
             ]
-            for each in (self.now, best.precision)
+            for precision in (self.now, best.precision)
         )
         now = f"have a correlation of {before[0]} and relative standard errors of {before[1]}."
         then = f"None of the {len(self.ranking)} compared records would separate them."
@@ -98,14 +98,16 @@ class RecordRanking(Reported):
         """The description of the ranking: verdict, and gain, correlation and standard errors with
         each record.
         """
-        precisions = [self.now, *(each.precision for each in self.ranking)]
+        precisions = [self.now, *(ranked.precision for ranked in self.ranking)]
         columns: dict[str, Any] = {
-            "record in addition": ["none", *(each.description for each in self.ranking)],
-            "gain": TableColumn([1.0, *(each.gain for each in self.ranking)], digits=3),
-            "correlation": TableColumn([each.correlation for each in precisions], digits=3),
+            "record in addition": ["none", *(ranked.description for ranked in self.ranking)],
+            "gain": TableColumn([1.0, *(ranked.gain for ranked in self.ranking)], digits=3),
+            "correlation": TableColumn(
+                [precision.correlation for precision in precisions], digits=3
+            ),
         }
         for i, name in enumerate(self.pair):
-            errors = [each.standard_errors[i] for each in precisions]
+            errors = [precision.standard_errors[i] for precision in precisions]
             columns[f"standard error of {name}"] = TableColumn(
                 errors, "1", "%", digits=3, short=f"error of {i + 1}"
             )
@@ -143,16 +145,16 @@ def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> Record
     failed = list[str]()
     for candidate in candidate_records(fit):
         try:
-            own = _candidate_information(fit, candidate, common)
+            added = _candidate_information(fit, candidate, common)
         except AirmuscleError as error:
             failed.append(f"{candidate.description}: {error.message}")
             continue
-        after = _precision(information + own, names, chosen)
+        after = _precision(information + added, names, chosen)
         ranked.append(RankedRecord(candidate.description, after, now.worst / after.worst))
     if not ranked:
         raise IdentificationError(f"no candidate record can be simulated: {'; '.join(failed)}")
     return RecordRanking(
-        chosen, now, tuple(sorted(ranked, key=lambda each: -each.gain)), tuple(failed)
+        chosen, now, tuple(sorted(ranked, key=lambda record: -record.gain)), tuple(failed)
     )
 
 
@@ -169,20 +171,20 @@ def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
     ]
     factors = np.array(magnitudes) / fit.problem.scales
     matrix = jacobian * factors / max(fit.residual_std, 1e-12)
-    others = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]
-    return _without(matrix[:, list(common)], matrix[:, others]) + np.eye(len(common)) / PRIOR**2
+    nuisance = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]
+    return _without(matrix[:, list(common)], matrix[:, nuisance]) + np.eye(len(common)) / PRIOR**2
 
 
 def _without(matrix: Array, nuisance: Array, prior: Array | float = PRIOR) -> Array:
     """The information of the columns of a matrix, with nuisance unknowns of prior deviations
     estimated as well.
     """
-    own = matrix.T @ matrix
+    information = matrix.T @ matrix
     cross = matrix.T @ nuisance
     if not nuisance.shape[1]:
-        return np.asarray(own)
+        return np.asarray(information)
     weight = nuisance.T @ nuisance + np.diag(1.0 / np.broadcast_to(prior, nuisance.shape[1]) ** 2)
-    return np.asarray(own - cross @ np.linalg.solve(weight, cross.T))
+    return np.asarray(information - cross @ np.linalg.solve(weight, cross.T))
 
 
 def _candidate_information(
@@ -195,24 +197,26 @@ def _candidate_information(
     part = candidate.replaced
     assert plant is not None
     known = {leaf.path for leaf in tree.leaves(plant) if not (part and leaf.path.startswith(part))}
-    own = [i for i, u in enumerate(fit.unknowns) if u.paths and u.record == 0]
-    kept = [
-        i for i in (*common, *own) if fit.unknowns[i].paths and set(fit.unknowns[i].paths) <= known
+    record_unknowns = [i for i, u in enumerate(fit.unknowns) if u.paths and u.record == 0]
+    known_unknowns = [
+        i
+        for i in (*common, *record_unknowns)
+        if fit.unknowns[i].paths and set(fit.unknowns[i].paths) <= known
     ]
-    unknowns = [dataclasses.replace(fit.unknowns[i], record=None) for i in kept]
+    unknowns = [dataclasses.replace(fit.unknowns[i], record=None) for i in known_unknowns]
     named = {path for unknown in unknowns for path in unknown.paths}
     further = [path for path in candidate.changed if path not in named]
     unknowns += make_unknowns(plant, [candidate.experiment], further, (), {}) if further else ()
     matrix = _candidate_sensitivities(fit, candidate, unknowns)
     shared = [
         k
-        for k, i in enumerate(kept)
+        for k, i in enumerate(known_unknowns)
         if i in common and not set(unknowns[k].paths) & set(candidate.changed)
     ]
     nuisance = [k for k in range(len(unknowns) + 1) if k not in shared]
     prior = np.where(np.array(nuisance) == len(unknowns), START_MARGIN, PRIOR)
     information = np.zeros((len(common), len(common)))
-    rows = [common.index(kept[k]) for k in shared]
+    rows = [common.index(known_unknowns[k]) for k in shared]
     information[np.ix_(rows, rows)] = _without(matrix[:, shared], matrix[:, nuisance], prior)
     return information
 

@@ -116,7 +116,7 @@ class RegulatorFit(Reported):
         chapter = self.fit.chapter()
         zeros = TableColumn(self.zeros, "Pa", "kPa", digits=3)
         title = "Settled pressure minus command, taken as the zero of the sensor"
-        names = [each.experiment.recording.origin for each in self.fit.problem.record_models]
+        names = [model.experiment.recording.origin for model in self.fit.problem.record_models]
         table = Table("zeros", title, {"record": names, "zero": zeros}, brief=len(names))
         notes = (*(f"too little excited: {remark}" for remark in self.remarks), *chapter.notes)
         return dataclasses.replace(
@@ -161,9 +161,9 @@ def fit_regulator(
             f" {f'unknown parameter {unknown[0]!r}' if unknown else 'no recording is given'}; give"
             f" recordings with setpoint and pressure, and parameters among {', '.join(COMMANDS)}."
         )
-    for each in recordings:
-        _check_excitation(each, noise)
-    zeros = tuple(_settled_difference(each) for each in recordings)
+    for recording in recordings:
+        _check_excitation(recording, noise)
+    zeros = tuple(_settled_difference(recording) for recording in recordings)
     circuit = initial or _initial_regulator(recordings, supply_pressure, volume)
     plant = Plant(Muscle.ideal(Vessel(volume)), circuit, Isometric(0.0), Isothermal())
     paths = tuple(f"circuit.{name}" for name in free)
@@ -188,7 +188,7 @@ def fit_regulator(
         raise IdentificationError(
             "fit_regulator: no initial guess can be simulated. Give an initial regulator."
         )
-    return min(fits, key=lambda each: each.fit.costs[0])
+    return min(fits, key=lambda candidate: candidate.fit.costs[0])
 
 
 def _fit(
@@ -199,7 +199,10 @@ def _fit(
     plant: Plant,
     zeros: tuple[float, ...],
 ) -> RegulatorFit:
-    records = [_experiment(plant, each, zero) for each, zero in zip(recordings, zeros, strict=True)]
+    records = [
+        _experiment(plant, recording, zero)
+        for recording, zero in zip(recordings, zeros, strict=True)
+    ]
     limits = {
         path: LIMITS[name] for path in paths if (name := path.removeprefix("circuit.")) in LIMITS
     }

@@ -112,11 +112,11 @@ def describe_optima(
     reached; `margins` are those of `distinct_optima`."""
     best = optima[0]
     notes = list[str]()
-    for other in optima[1:]:
-        increase = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0
+    for optimum in optima[1:]:
+        increase = float(np.sqrt(optimum.cost / max(best.cost, 1e-300))) - 1.0
         differences = []
         for e, value, magnitude in zip(
-            estimates, other.values, _magnitudes(estimates, margins), strict=True
+            estimates, optimum.values, _magnitudes(estimates, margins), strict=True
         ):
             change = abs(value - e.value)
             contained = MIN_STANDARD_ERRORS * e.stderr if np.isfinite(e.stderr) else 0.0
@@ -125,7 +125,7 @@ def describe_optima(
                 differences.append((change / magnitude, text))
         if increase <= SIMILAR_RMS and differences:
             notes.append(
-                f"the problem has several optima: {counted(other.searches, 'search')} of"
+                f"the problem has several optima: {counted(optimum.searches, 'search')} of"
                 f" {costs.size} ended where the rms residual is only {100 * increase:.1f} %"
                 f" greater, with {_greatest(differences)}; the standard errors describe one optimum"
                 " and do not contain this difference"
@@ -234,20 +234,20 @@ def scatter_of_records(
     in turn, by the jackknife over three records or more, where these exceed those of the rows by
     far; and a sentence that says so.
     """
-    found = list(estimates)
+    scattered = list(estimates)
     ratios = dict[str, float]()
-    for i, each in enumerate(estimates if len(common) >= MIN_RECORDS else ()):
-        values = [one[each.name] for one in common if each.name in one]
+    for i, estimate in enumerate(estimates if len(common) >= MIN_RECORDS else ()):
+        values = [fit_values[estimate.name] for fit_values in common if estimate.name in fit_values]
         scatter = (
             float(np.std(values)) * np.sqrt(len(values) - 1) if len(values) == len(common) else 0.0
         )
-        if scatter > MAX_SCATTER * each.stderr:
-            ratios[each.name] = scatter / each.stderr
-            found[i] = dataclasses.replace(each, stderr=scatter)
+        if scatter > MAX_SCATTER * estimate.stderr:
+            ratios[estimate.name] = scatter / estimate.stderr
+            scattered[i] = dataclasses.replace(estimate, stderr=scatter)
     note = (
         f"the standard errors of {', '.join(ratios)} are those of the scatter between {len(common)}"
         f" records, up to {max(ratios.values(), default=0.0):.2g} times those of the rows:"
         " something that is not recorded differs between them, such as the temperature of the"
         " room, the supply or a zero"
     )
-    return tuple(found), [note] if ratios else []
+    return tuple(scattered), [note] if ratios else []

@@ -250,9 +250,9 @@ class DynamicFit(Reported):
             *(NamedValue(name, count, brief=False) for name, count in counts.items()),
         )
         rows = [
-            (i, each.experiment.recording.origin, name)
-            for i, each in enumerate(self.problem.record_models)
-            for name in each.names
+            (i, model.experiment.recording.origin, name)
+            for i, model in enumerate(self.problem.record_models)
+            for name in model.names
         ]
         columns: dict[str, Any] = {
             "record": [origin for _, origin, _ in rows],
@@ -323,17 +323,17 @@ def locate_pressure_sensor(*, in_muscle: DynamicFit, in_line: DynamicFit) -> Sen
     tenfold would imitate a line. Raises IdentificationError where a fit is not of one pressure in
     one record, or the rows differ."""
     models = [fit.problem.record_models for fit in (in_muscle, in_line)]
-    if any(len(each) != 1 or len(each[0].names) != 1 for each in models):
+    if any(len(record_models) != 1 or len(record_models[0].names) != 1 for record_models in models):
         raise IdentificationError(
             "locate_pressure_sensor compares two fits of one record with one observed pressure."
         )
     (first,), (second,) = models
     rows = first.measured[:, 0]
-    others = second.measured[:, 0]
-    if not np.array_equal(rows, others, equal_nan=True):
-        found = "but these have different rows"
+    line_rows = second.measured[:, 0]
+    if not np.array_equal(rows, line_rows, equal_nan=True):
+        difference = "but these have different rows"
         raise IdentificationError(
-            f"locate_pressure_sensor compares two fits of the same record, {found}."
+            f"locate_pressure_sensor compares two fits of the same record, {difference}."
         )
     rise = float(np.nanmax(rows) - np.nanmin(rows))
     return SensorLocation(in_muscle.rms(first.names[0]), in_line.rms(second.names[0]), rise)

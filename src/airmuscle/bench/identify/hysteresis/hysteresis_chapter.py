@@ -25,8 +25,8 @@ def hysteresis_chapters(
     """
     chapters = [_overview(loop_fits)] if len(loop_fits) > 1 else []
     chapters += [joint_friction_chapter(joint, loops_not_joined(loop_fits))] if joint else []
-    for i, each in enumerate(loop_fits, 1):
-        chapter = each.chapter().among(suffix="" if len(loop_fits) == 1 else f"-{i}")
+    for i, loop_fit in enumerate(loop_fits, 1):
+        chapter = loop_fit.chapter().among(suffix="" if len(loop_fits) == 1 else f"-{i}")
         chapters.append(dataclasses.replace(chapter, brief=len(loop_fits) <= SEPARATE_LOOPS))
     return chapters
 
@@ -35,26 +35,28 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
     """Return the chapter with one row for each loop: its preferred law, or that of the lowest
     AICc.
     """
-    best = [each.recommended or next(iter(each.fits), None) for each in loop_fits]
+    best = [loop_fit.recommended or next(iter(loop_fit.fits), None) for loop_fit in loop_fits]
     columns: dict[str, Any] = {
-        "run": [each.loop.recording.origin for each in loop_fits],
-        "kind": [each.loop.description for each in loop_fits],
-        "rows": [int(each.loop.fitted_rows.sum()) for each in loop_fits],
-        "law": [each and each.name for each in best],
+        "run": [loop_fit.loop.recording.origin for loop_fit in loop_fits],
+        "kind": [loop_fit.loop.description for loop_fit in loop_fits],
+        "rows": [int(loop_fit.loop.fitted_rows.sum()) for loop_fit in loop_fits],
+        "law": [fit and fit.name for fit in best],
         "rms error without friction": TableColumn(
-            [each and each.rmse_without_friction for each in best],
+            [fit and fit.rmse_without_friction for fit in best],
             "N",
             digits=3,
             short="without friction",
         ),
-        "rms error": TableColumn([each and each.rmse for each in best], "N", digits=3),
-        "justified": [each.recommended is not None for each in loop_fits],
-        "usable in a plant": TableColumn([each.usable_in_plant for each in loop_fits], brief=False),
+        "rms error": TableColumn([fit and fit.rmse for fit in best], "N", digits=3),
+        "justified": [loop_fit.recommended is not None for loop_fit in loop_fits],
+        "usable in a plant": TableColumn(
+            [loop_fit.usable_in_plant for loop_fit in loop_fits], brief=False
+        ),
     }
     failed: dict[tuple[str, str], list[str]] = {}
-    for each in loop_fits if len(loop_fits) > SEPARATE_LOOPS else ():
-        for law in each.failed.items():
-            failed.setdefault(law, []).append(each.loop.recording.origin)
+    for loop_fit in loop_fits if len(loop_fits) > SEPARATE_LOOPS else ():
+        for law in loop_fit.failed.items():
+            failed.setdefault(law, []).append(loop_fit.loop.recording.origin)
     runs = {
         law: origins[0] if len(origins) == 1 else f"{len(origins)} runs"
         for law, origins in failed.items()
@@ -62,7 +64,7 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
     notes = tuple(
         f"{name} was not fitted to {which}: {reason}" for (name, reason), which in runs.items()
     )
-    justified = sum(each.recommended is not None for each in loop_fits)
+    justified = sum(loop_fit.recommended is not None for loop_fit in loop_fits)
     summary = f"{len(loop_fits)} loops; the data justify a friction law for {justified} of them."
     tables = (Table("loops", "Best law of each loop", columns, brief=12),)
     return Chapter("loops", "Hysteresis loops", summary, tables=tables, notes=notes)
@@ -80,7 +82,7 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
         "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
     }
     laws = "Friction laws fitted to all runs together, best first"
-    own = shown.chapter()
+    chapter = shown.chapter()
     runs = shown.agreement
     by_run: dict[str, Any] = {
         "run": [run.origin for run in runs],
@@ -96,9 +98,9 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
     of_runs = Table(
         "joint-runs", title, by_run, brief=[i for i, run in enumerate(runs) if run.disagrees]
     )
-    tables = (compared_laws("joint-laws", laws, fits, columns), of_runs, *friction_tables(own))
+    tables = (compared_laws("joint-laws", laws, fits, columns), of_runs, *friction_tables(chapter))
     return dataclasses.replace(
-        own,
+        chapter,
         title="Friction of all runs",
         summary=(f"{none}{shown.verdict}",),
         tables=tables,

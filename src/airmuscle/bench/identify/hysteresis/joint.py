@@ -74,11 +74,11 @@ def agreement_of_run(
     rows = own.series.fitted_rows
     curve = run.design_matrix[rows]
     forces = [
-        each[rows]
-        for each in (run.friction_force(joint), run.friction_force(own.friction), run.target)
+        force[rows]
+        for force in (run.friction_force(joint), run.friction_force(own.friction), run.target)
     ]
     parts = [
-        curve @ np.linalg.lstsq(curve, each, rcond=None)[0] for each in forces
+        curve @ np.linalg.lstsq(curve, force, rcond=None)[0] for force in forces
     ]  # that the static curve takes up
     joint_force, own_force, target = (
         force - part for force, part in zip(forces, parts, strict=True)
@@ -125,7 +125,7 @@ class JointFit(FrictionFit):
     @property
     def reservations(self) -> tuple[str, ...]:
         different = "; in ".join(str(run) for run in self.agreement if run.disagrees)
-        found = (
+        conditions = (
             (
                 different,
                 (
@@ -138,7 +138,7 @@ class JointFit(FrictionFit):
                 "It does not lower the error on the second runs.",
             ),
         )
-        reasons = [reason for holds, reason in found if holds]
+        reasons = [reason for holds, reason in conditions if holds]
         return (
             *reasons,
             *limit_reservations(self.friction, self.limits, self.weak_combinations, MILLIMETRES),
@@ -192,12 +192,13 @@ class JointFit(FrictionFit):
         two standard errors, and the joint fit. `ax` is an Axes and is returned; without it a new
         figure is returned. Raises ParameterError for another `ax`."""
         fields = ("pressure", "amplitude", "amplitude_stderr", "joint_amplitude")
-        pressure, own, error, joint = (
+        pressure, alone, error, joint = (
             np.array([getattr(run, name) for run in self.agreement]) for name in fields
         )
         grid = np.linspace(0.0, 1.05 * pressure.max(), 100)
         at_runs, factors = (
-            [float(self.friction.pressure_factor(p)) for p in each] for each in (pressure, grid)
+            [float(self.friction.pressure_factor(p)) for p in pressures]
+            for pressures in (pressure, grid)
         )
         acting = np.array(at_runs) > 0
         at_one = float(np.mean(joint[acting] / np.array(at_runs)[acting])) if acting.any() else 0.0
@@ -212,7 +213,7 @@ class JointFit(FrictionFit):
             "capsize": 3,
             "label": "each run alone, 2 standard errors",
         }
-        axes.errorbar(pressure / 1e3, own, 2.0 * error, **dots)
+        axes.errorbar(pressure / 1e3, alone, 2.0 * error, **dots)
         labels = {
             "xlabel": "gauge pressure [kPa]",
             "ylabel": "friction, half its range [N]",
@@ -286,13 +287,13 @@ def fit_jointly(
     progress  called with a text for each law
     workers   number of processes, as in `compare`: a law is a task
     """
-    usable = tuple(each for each in loop_fits if not _reason_against(each))
+    usable = tuple(loop_fit for loop_fit in loop_fits if not _reason_against(loop_fit))
     if len(usable) < 2:
         return ()
     by_law: dict[type[Friction], list[HysteresisFit]] = {}
-    for fit in (fit for each in usable for fit in each.fits):
+    for fit in (fit for loop_fit in usable for fit in loop_fit.fits):
         by_law.setdefault(type(fit.friction), []).append(fit)
-    tasks = [own for own in by_law.values() if len(own) == len(usable)]
+    tasks = [law_fits for law_fits in by_law.values() if len(law_fits) == len(usable)]
     fits: dict[int, JointFit] = {}
     with process_pool(workers) as executor:
         for i, joint in DistributedCalls(executor, _fit_law, usable).completed(tasks):
@@ -314,42 +315,46 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
     return IdentifiedFriction(friction, float(low - margin), float(high + margin), **range_of_speed)
 
 
-def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFit:
+def _fit_law(usable: Sequence[LoopFit], law_fits: Sequence[HysteresisFit]) -> JointFit:
     """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better
     of the two. The search of the scale starts from the run at the highest pressure, and a line
     through the amplitudes of all runs.
     """
-    runs = [fit.series for fit in own]
+    runs = [fit.series for fit in law_fits]
     scale_p_value = float("nan")
     known = [
         None if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows]))
         for run in runs
     ]
-    pressures = np.array([float("-inf") if each is None else each for each in known])
+    pressures = np.array(
+        [float("-inf") if mean_pressure is None else mean_pressure for mean_pressure in known]
+    )
     # -inf where a run has no pressure
     reference = int(np.argmax(pressures))
     lowest = float(pressures.min())
-    friction, weak = search_parameters(own[len(own) // 2].friction, runs)
+    friction, weak = search_parameters(law_fits[len(law_fits) // 2].friction, runs)
     if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
-        amplitudes = [force_amplitude(fit.series, fit.friction) for fit in own]
+        amplitudes = [force_amplitude(fit.series, fit.friction) for fit in law_fits]
         slope, offset = np.polyfit(pressures, amplitudes, 1)
         rounded = float(f"{pressures[reference]:.3g}")
         at_reference = offset + slope * rounded
         ratio = float(np.clip(offset / at_reference if at_reference > 0 else 1.0, 0.01, 5.0))
         scaled = search_parameters(
-            PressureScaledFriction(own[reference].friction, ratio, rounded), runs
+            PressureScaledFriction(law_fits[reference].friction, ratio, rounded), runs
         )
-        small, large = (Misfit.of(each, runs) for each in (friction, scaled[0]))
+        small, large = (Misfit.of(candidate, runs) for candidate in (friction, scaled[0]))
         scale_p_value = large.p_value(small)
         if scale_p_value < SIGNIFICANCE_LEVEL and large.reduction_of_aicc(small) > 0:
             friction, weak = scaled
     repeats = [
-        each.loop.series(*each.loop.repeat) for each in usable if each.loop.repeat is not None
+        loop_fit.loop.series(*loop_fit.loop.repeat)
+        for loop_fit in usable
+        if loop_fit.loop.repeat is not None
     ]
-    parts = zip(own, usable, pressures.tolist(), strict=True)
+    parts = zip(law_fits, usable, pressures.tolist(), strict=True)
     agreement = [
-        agreement_of_run(friction, fit, each.loop.description, pressure)
-        for fit, each, pressure in parts
+        agreement_of_run(friction, fit, loop_fit.loop.description, pressure)
+        for fit, loop_fit, pressure in parts
     ]
     return JointFit(
         **evidence(friction, runs, repeats),

@@ -215,9 +215,9 @@ def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> Da
         one_way = np.flatnonzero(steps[crossings[1:] - 1] == steps[crossings[:-1] - 1])
         first = crossings[one_way]
         last = crossings[one_way + 1]
-        kept = rows[last] & (time[last] > time[first])
-        first = first[kept]
-        last = last[kept]
+        usable = rows[last] & (time[last] > time[first])
+        first = first[usable]
+        last = last[usable]
         if first.size:
             low, high = np.quantile(
                 np.abs(path[last] - path[first]) / (time[last] - time[first]), SPEED_QUANTILES
@@ -243,10 +243,10 @@ def resolved_stiffness(path: Array, hysteresis: Array) -> float:
 
 def combine_limits(limits: tuple[DataLimits, ...]) -> DataLimits:
     """The limits of several runs together."""
-    low = np.min([each.low_speed for each in limits])
-    high = np.max([each.high_speed for each in limits])
-    force = max(each.force for each in limits)
-    stiffness = max(each.stiffness for each in limits)
+    low = np.min([run_limits.low_speed for run_limits in limits])
+    high = np.max([run_limits.high_speed for run_limits in limits])
+    force = max(run_limits.force for run_limits in limits)
+    stiffness = max(run_limits.stiffness for run_limits in limits)
     return DataLimits(force, float(low), float(high), stiffness)
 
 
@@ -268,7 +268,7 @@ def undetermined_parameters(
     """Paths of the parameters that the data do not determine: on a bound, or in a poorly determined
     combination.
     """
-    names = [name for each in weak for name, _ in each.shares]
+    names = [name for combination in weak for name, _ in combination.shares]
     return tuple(dict.fromkeys([*parameters_on_bounds(friction, limits), *names]))
 
 

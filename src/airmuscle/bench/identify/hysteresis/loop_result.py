@@ -152,15 +152,15 @@ class LoopFit(Reported):
         tables = [_law_table(self)]
         references = tuple[Reference, ...]()
         if shown is not None:
-            own = shown.chapter()
+            chapter = shown.chapter()
             caption = (
                 f"{shown.name} with the fitted parameters: initial loading, outer loop and two"
                 " minor loops."
             )
             minor = functools.partial(plot_loops, shown.friction, loop.friction_path.axis)
-            plots += [*own.plots, Plot("minor-loops", caption, minor)]
-            tables += friction_tables(own)
-            references = own.references
+            plots += [*chapter.plots, Plot("minor-loops", caption, minor)]
+            tables += friction_tables(chapter)
+            references = chapter.references
         rows = [(f.name, leaf) for f in self.fits for leaf in leaves(f.friction)]
         columns: dict[str, Any] = {
             "law": [law for law, _ in rows],
@@ -241,7 +241,9 @@ def _law_table(loop_fit: LoopFit) -> Table:
     return compared_laws("laws", "Friction laws, best first", fits, columns)
 
 
-def compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict[str, Any]) -> Table:
+def compared_laws(
+    name: str, title: str, fits: Sequence[FrictionFit], further_columns: dict[str, Any]
+) -> Table:
     """Return the errors and the tests of friction laws, with columns of their own."""
     columns: dict[str, Any] = {
         "law": [f.name for f in fits],
@@ -249,7 +251,7 @@ def compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict[
             [f.rmse_without_friction for f in fits], "N", digits=3, brief=False
         ),
         "rms error": TableColumn([f.rmse for f in fits], "N", digits=3),
-        **own,
+        **further_columns,
         "reduction of AICc": [
             f.aicc_reduction if np.isfinite(f.aicc_reduction) else None for f in fits
         ],

@@ -56,7 +56,7 @@ def find_loops(
         for origin in empty
     ]
     for recording, run in (
-        each for given in recordings if len(given) for each in _separate_runs(given, sensors)
+        pair for source in recordings if len(source) for pair in _separate_runs(source, sensors)
     ):
         try:
             loop = _make_loop(recording, run, sensors, law, degree, all_rows)
@@ -64,7 +64,7 @@ def find_loops(
             failed.append(error)
             continue
         muscle = [resting_length_of(recording), recording.constants.get("specimen")]
-        at_level = [i for i, other in enumerate(loops) if _is_same_level(other.run, run)]
+        at_level = [i for i, earlier in enumerate(loops) if _is_same_level(earlier.run, run)]
         same = next((i for i in at_level if muscles[i] == muscle), None)
         if same is None:
             muscles.append(muscle)
@@ -165,17 +165,17 @@ def _make_loop(
     return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
 
 
-def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
+def _is_same_level(run: segment.Run, reference: segment.Run) -> bool:
     """Whether two runs have the same constant quantity and level, within the tolerance of one
     run.
     """
-    same_kind = one.kind is other.kind and one.constant_column == other.constant_column
-    if not same_kind or one.constant_value is None or other.constant_value is None:
+    same_kind = run.kind is reference.kind and run.constant_column == reference.constant_column
+    if not same_kind or run.constant_value is None or reference.constant_value is None:
         return False
-    size = max(abs(one.constant_value), abs(other.constant_value))
+    size = max(abs(run.constant_value), abs(reference.constant_value))
     bands = {"contraction": CONTRACTION_BAND, "length": CONTRACTION_BAND * size}
-    band = bands.get(one.constant_column or "", RELATIVE_BAND * size)
-    return abs(one.constant_value - other.constant_value) <= band
+    band = bands.get(run.constant_column or "", RELATIVE_BAND * size)
+    return abs(run.constant_value - reference.constant_value) <= band
 
 
 def initial_friction_laws(
@@ -193,7 +193,7 @@ def initial_friction_laws(
         if isinstance(cls := getattr(laws, name), type) and issubclass(cls, Friction)
     ]
     started = {cls: cls.guess(scales) for cls in (*known, *others)}
-    for cls in (each for each in others if started[each] is None):
+    for cls in (law_type for law_type in others if started[law_type] is None):
         raise IdentificationError(
             f"{cls.__name__} is not started from data; define its guess(scales)."
         )

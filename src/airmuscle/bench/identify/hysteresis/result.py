@@ -47,8 +47,8 @@ class Misfit(NamedTuple):
     def of(cls, friction: Friction | None, runs: Sequence[LoopSeries]) -> "Misfit":
         """The misfit of runs that have one friction and a static curve each."""
         parts = [run.fitted_residuals(friction) for run in runs]
-        own = 0 if friction is None else free_parameters(friction)
-        count = own + sum(int(run.design_matrix.shape[1]) for run in runs)
+        friction_count = 0 if friction is None else free_parameters(friction)
+        count = friction_count + sum(int(run.design_matrix.shape[1]) for run in runs)
         return cls(
             mean_square(parts), float(sum(map(model_evidence.effective_sample_size, parts))), count
         )
@@ -59,8 +59,8 @@ class Misfit(NamedTuple):
         """
         models = (smaller, self)
         criteria = (
-            model_evidence.aicc(each.mean_square, self.sample_size, each.parameters)
-            for each in models
+            model_evidence.aicc(model.mean_square, self.sample_size, model.parameters)
+            for model in models
         )
         return model_evidence.reduction_of_aicc(*criteria)
 
@@ -165,9 +165,10 @@ def evidence(
     friction: Friction, runs: Sequence[LoopSeries], repeats: Sequence[LoopSeries]
 ) -> dict[str, Any]:
     """The numbers of a `FrictionFit` of runs, and of second runs, by field."""
-    fitted, plain = (Misfit.of(each, runs) for each in (friction, None))
+    fitted, plain = (Misfit.of(candidate, runs) for candidate in (friction, None))
     again = [
-        mean_square([run.fitted_residuals(each) for run in repeats]) for each in (friction, None)
+        mean_square([run.fitted_residuals(candidate) for run in repeats])
+        for candidate in (friction, None)
     ]
     return {
         "friction": friction,
@@ -243,12 +244,12 @@ class HysteresisFit(FrictionFit):
         """
         direction = self.series.direction[self.series.fitted_rows]
         transient = self.series.transient_rows
-        few, many = sorted(int(np.count_nonzero(direction == sign)) for sign in (1, -1))
-        found = (
+        fewer, many = sorted(int(np.count_nonzero(direction == sign)) for sign in (1, -1))
+        conditions = (
             (
-                few < MIN_BRANCH_RATIO * many,
+                fewer < MIN_BRANCH_RATIO * many,
                 (
-                    f"One branch has very few rows ({few} against {many}); measure the loop more"
+                    f"One branch has very few rows ({fewer} against {many}); measure the loop more"
                     " slowly."
                 ),
             ),
@@ -264,7 +265,7 @@ class HysteresisFit(FrictionFit):
                 ),
             ),
         )
-        return tuple(reason for holds, reason in found if holds)
+        return tuple(reason for holds, reason in conditions if holds)
 
     @property
     def verdict(self) -> str:
@@ -354,13 +355,13 @@ def assess_fit(
     the static curve.
     """
     (coefficients, residuals), (static, plain) = (
-        run.fitted_curve(each) for each in (friction, None)
+        run.fitted_curve(candidate) for candidate in (friction, None)
     )
     repeatability = float("nan")
-    first = [each[run.fitted_rows] for each in (run.path, plain, run.direction)]
+    first = [column[run.fitted_rows] for column in (run.path, plain, run.direction)]
     if repeat is not None:
         values = repeat.target - repeat.design_matrix @ static
-        second = [each[repeat.fitted_rows] for each in (repeat.path, values, repeat.direction)]
+        second = [column[repeat.fitted_rows] for column in (repeat.path, values, repeat.direction)]
         repeatability = repeat_difference(*first, *second).rms / np.sqrt(2)
     path, _, direction = first
     gap = branch_gap(*first).rms

@@ -235,7 +235,7 @@ def _fit_stiffnesses(
         (run, friction.element_deflections(run.path) * np.reshape(factor, (-1, 1)))
         for run, factor in pairs
     ]
-    terms = np.vstack([each[run.fitted_rows] for run, each in deflections])
+    terms = np.vstack([deflection[run.fitted_rows] for run, deflection in deflections])
     norms = np.linalg.norm(terms, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
     curves = block_diag(*(run.design_matrix[run.fitted_rows] for run in runs))

@@ -222,7 +222,7 @@ class ShapeConstrainedFit(Reported):
             ),
             tables=(violation_table(violations, "shape-loose", title),) if violations else (),
             plots=(Plot("shaped", "Solid: constrained. Dashed: unconstrained.", figure),),
-            notes=tuple(f"unconstrained: {each}" for each in violations),
+            notes=tuple(f"unconstrained: {violation}" for violation in violations),
         )
 
 

@@ -145,21 +145,27 @@ def shape_violations_of_fit(fit: Fit) -> tuple[MonotonicityViolation, ...]:
     varies = all(low < high for low, high in fit.data_ranges.values())
     if not isinstance(law, ForceLaw) or not law.traceable or not varies:
         return ()
-    found = find_shape_violations(law, fit.validity_range)
-    return tuple(each for each in found if each.area_fraction >= LEAST_SHARE)
+    violations = find_shape_violations(law, fit.validity_range)
+    return tuple(violation for violation in violations if violation.area_fraction >= LEAST_SHARE)
 
 
 def violation_table(violations: Sequence[MonotonicityViolation], name: str, title: str) -> Table:
     """Return a table of the regions in which a force is not monotonic, largest first."""
     columns: dict[str, Any] = {
-        "constraint": [each.rule.description for each in violations],
-        "pressure": TableColumn([each.pressure for each in violations], "Pa", "kPa"),
-        "contraction": TableColumn([each.second_argument for each in violations], "1", "%"),
-        "fraction of the validity range": TableColumn(
-            [each.area_fraction for each in violations], "1", "%"
+        "constraint": [violation.rule.description for violation in violations],
+        "pressure": TableColumn([violation.pressure for violation in violations], "Pa", "kPa"),
+        "contraction": TableColumn(
+            [violation.second_argument for violation in violations], "1", "%"
         ),
-        "worst at pressure": TableColumn([each.worst_point[0] for each in violations], "Pa", "kPa"),
-        "worst at contraction": TableColumn([each.worst_point[1] for each in violations], "1", "%"),
+        "fraction of the validity range": TableColumn(
+            [violation.area_fraction for violation in violations], "1", "%"
+        ),
+        "worst at pressure": TableColumn(
+            [violation.worst_point[0] for violation in violations], "Pa", "kPa"
+        ),
+        "worst at contraction": TableColumn(
+            [violation.worst_point[1] for violation in violations], "1", "%"
+        ),
     }
     return Table(
         name, title, columns, "`airmuscle fit --shape` fits a surface without such regions."
