@@ -38,7 +38,11 @@ STARTS = {
             "from airmuscle.outlets.cli import app\napp(['evaluate', 'chou-hannaford',"
             " '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)"
         ),
-        (HEAVY | {"llvmlite", "airmuscle.bench.identify"}) - {"typer", "rich"},
+        {
+            *(HEAVY - {"typer", "rich"}),
+            *("llvmlite", "airmuscle.bench.identify", "airmuscle.bench.readers.formats"),
+            "airmuscle.engine.compile.program",
+        },
     ),
     "airmuscle convert": (
         "from airmuscle.outlets.cli import app\napp(['convert', '--help'], standalone_mode=False)",

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from ...bench.readers import read_csv
+from ... import bench
 from ...control import estimation, laws
 from ...core import (
     Hint,
@@ -259,7 +259,9 @@ def read_parameter(value: Any, declared: Parameter, hint: Any, location: Locatio
             example = 'write a column of a file as { file = "data/map.csv", column = "force" }'
             raise ParameterError(f"{where} is {abridged(value)}; {example}.")
         with located_errors(where):
-            return tuple(float(v) for v in read_csv(where.folder / value["file"])[value["column"]])
+            return tuple(
+                float(v) for v in bench.read_csv(where.folder / value["file"])[value["column"]]
+            )
     if isinstance(value, list) != many:
         expected = "a list of numbers" if many else "one number"
         raise ParameterError(

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
-from ...bench.readers import read_csv
+from ... import bench
 from ...core import FileError, ParameterError, Reference, UnknownNameError, abridged
 from ...engine.loop.pwm_and_solenoid import Driver, SolenoidDriver
 from ...physics import ForceLaw, Muscle, Orifice, Plant
@@ -335,7 +335,7 @@ def load_data(name: str) -> Recording:
     its references.
     """
     path = DATA / f"{complete_name(str(name), list_data(), 'data set')}.csv"
-    recording: Recording = read_csv(path)
+    recording: Recording = bench.read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
     header = " ".join(
         line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line

@@ -13,8 +13,8 @@ import numpy as np
 from ...core import Array, GeometryLimitError, ParameterError, Value, Values, model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from ...engine.compile.program import compile_system
-from ..equilibrium.equilibrium import complete_inputs, find_equilibrium_of_each, nearest_equilibrium
+from ...engine import compile as compilation
+from .. import equilibrium
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
@@ -116,14 +116,14 @@ class Plant(PlantDisplay, StaticPlant):
 
     def default_state(self) -> dict[str, float]:
         """The state of `find_equilibrium` at gauge pressure 0 and inputs 0."""
-        return nearest_equilibrium(self, pressure=0.0)
+        return equilibrium.nearest_equilibrium(self, pressure=0.0)
 
     def default_states(self, parameters: Array) -> Array:
         """The same (N, n) for plants of this structure with parameters (N, P); NaN where there is
         none. Raises ParameterError where an input cannot be 0."""
-        inputs = np.array(list(complete_inputs(self, None).values()), dtype=float)
-        return find_equilibrium_of_each(
-            compile_system(self), parameters, (0.0,) * len(self.muscles), inputs
+        inputs = np.array(list(equilibrium.complete_inputs(self, None).values()), dtype=float)
+        return equilibrium.find_equilibrium_of_each(
+            compilation.compile_system(self), parameters, (0.0,) * len(self.muscles), inputs
         )
 
     def affects_default_state(self, path: str) -> bool:
