@@ -164,7 +164,7 @@ def _described(hint: Any, levels: int) -> str:
     if kind is tuple:
         return (
             f"a tuple of {len(arguments)} values"
-            f" ({', '.join(described(each) for each in arguments)})"
+            f" ({', '.join(described(argument) for argument in arguments)})"
         )
     return "anything"
 
@@ -181,7 +181,7 @@ def counted(number: int, noun: str) -> str:
 
 def one_line(value: Any) -> str:
     """The text of a value for a message, on one line with at most 80 characters."""
-    return _shortened(lambda each: " ".join(str(each).split()), value)
+    return _shortened(lambda content: " ".join(str(content).split()), value)
 
 
 def _shortened(write: Callable[[Any], str], value: Any) -> str:
@@ -249,7 +249,10 @@ def check_whole(owner: str, name: str, value: Any, least: int) -> None:
 
 
 def check_arguments(
-    function: Callable[..., Any], given: Sequence[Any], named: Mapping[str, Any], failure: Exception
+    function: Callable[..., Any],
+    positional: Sequence[Any],
+    named: Mapping[str, Any],
+    failure: Exception,
 ) -> None:
     """Name the argument that is wrong where a call failed: it does not conform to its annotation,
     is empty, or no path.
@@ -260,7 +263,7 @@ def check_arguments(
     if isinstance(failure, AirmuscleError):
         return
     try:
-        bound = inspect.signature(function).bind(*given, **named)
+        bound = inspect.signature(function).bind(*positional, **named)
     except TypeError:
         return
     hints = type_hints(function)
@@ -268,10 +271,10 @@ def check_arguments(
     for name, value in bound.arguments.items():
         declared = bound.signature.parameters[name]
         hint = hints.get(name)
-        for each in value if declared.kind is declared.VAR_POSITIONAL else (value,):
-            if not _suits(each, hint):
+        for item in value if declared.kind is declared.VAR_POSITIONAL else (value,):
+            if not _suits(item, hint):
                 raise ParameterError(
-                    f"{owner}: {name} must be {describe(hint)}; it is {abridged(each)}."
+                    f"{owner}: {name} must be {describe(hint)}; it is {abridged(item)}."
                 ) from failure
         is_several = isinstance(value, Sequence | Mapping) and not isinstance(value, str)
         if is_several and not value and value is not declared.default:

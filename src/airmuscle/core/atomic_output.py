@@ -198,9 +198,9 @@ def exclusive_folders() -> Iterator[None]:
     try:
         yield
     finally:
-        held = _held
+        released = _held
         _held = outer
-        for descriptor, created in held.values():
+        for descriptor, created in released.values():
             os.close(descriptor)
             _remove_empty_folders(created)
 

@@ -187,7 +187,7 @@ def _has_depth(value: Any, depth: int) -> bool:
     """Whether a value is a number (depth 0), a list of numbers (1) or a list of such lists (2)."""
     if type(value) is float or not _is_list(value):
         return depth == 0
-    return depth > 0 and all(_has_depth(each, depth - 1) for each in value)
+    return depth > 0 and all(_has_depth(item, depth - 1) for item in value)
 
 
 def _is_list(value: Any) -> bool:

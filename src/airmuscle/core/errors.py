@@ -109,7 +109,7 @@ def _notation(value: Any) -> str:
         return "{" + ", ".join(f"{key!r}: {_notation(item)}" for key, item in value.items()) + "}"
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = [(field, getattr(value, field.name)) for field in dataclasses.fields(value)]
-        given = [
+        differing = [
             (
                 _notation(item)
                 if field.default is dataclasses.MISSING
@@ -118,7 +118,7 @@ def _notation(value: Any) -> str:
             for field, item in fields
             if item != field.default
         ]
-        return f"{type(value).__name__}({', '.join(given)})"
+        return f"{type(value).__name__}({', '.join(differing)})"
     return repr(value)
 
 
@@ -284,8 +284,8 @@ def alternatives(name: str, known: Iterable[str], introduction: str = "there are
     """
     names = list(known)
     stems: dict[str, list[str]] = {}
-    for each in names:
-        stems.setdefault(re.sub(r"\[\d+\]", "[]", each), []).append(each)
+    for path in names:
+        stems.setdefault(re.sub(r"\[\d+\]", "[]", path), []).append(path)
     shown = [
         group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()
     ]
@@ -316,6 +316,6 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     """
     names = list(known)
     matches = difflib.get_close_matches(str(name), names, n=1) or [
-        each for each in names if each.endswith(f".{name}")
+        path for path in names if path.endswith(f".{name}")
     ]
     return f" Did you mean '{matches[0]}'?" if matches else ""

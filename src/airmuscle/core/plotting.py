@@ -183,11 +183,11 @@ def given_axes(ax: Any, count: int, what: str) -> list[Any]:
 
     `what` is named in messages. Raises ParameterError for anything else.
     """
-    given = ax.ravel() if isinstance(ax, np.ndarray) else ax
+    candidates = ax.ravel() if isinstance(ax, np.ndarray) else ax
     axes = (
-        list(given)
-        if isinstance(given, np.ndarray | Sequence) and not isinstance(given, str | bytes)
-        else [given]
+        list(candidates)
+        if isinstance(candidates, np.ndarray | Sequence) and not isinstance(candidates, str | bytes)
+        else [candidates]
     )
     if not all(hasattr(item, "plot") and hasattr(item, "set_xlabel") for item in axes):
         raise ParameterError(

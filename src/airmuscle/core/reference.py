@@ -47,8 +47,8 @@ def published(key: str, note: str = "") -> Reference:
     """The reference of a key in `references.json`, the bibliography of the program; `note` replaces
     its note.
     """
-    found = Reference(key, **_bibliography()[key])
-    return dataclasses.replace(found, note=note or found.note)
+    entry = Reference(key, **_bibliography()[key])
+    return dataclasses.replace(entry, note=note or entry.note)
 
 
 CHOSEN = "chosen"

@@ -89,15 +89,15 @@ def _described(value: Any) -> str:
         return repr(value)
     texts = []
     for field in dataclasses.fields(value):
-        each = getattr(value, field.name)
+        item = getattr(value, field.name)
         default = field.default
         is_default = (
-            type(each) is type(default)
-            and not isinstance(each, np.ndarray)
-            and bool(each == default)
+            type(item) is type(default)
+            and not isinstance(item, np.ndarray)
+            and bool(item == default)
         )
         if field.repr and not is_default:
-            texts.append(f"{field.name}={_described(each)}")
+            texts.append(f"{field.name}={_described(item)}")
     return f"{type(value).__name__}({', '.join(texts)})"
 
 
@@ -106,8 +106,8 @@ def _structure(model: Any) -> str:
     values = [getattr(model, field.name) for field in dataclasses.fields(model)]
     parts = [
         item
-        for each in values
-        for item in (each if isinstance(each, tuple) else (each,))
+        for value in values
+        for item in (value if isinstance(value, tuple) else (value,))
         if is_model(item)
     ]
     return type(model).__name__ + (f"({', '.join(map(_structure, parts))})" if parts else "")

@@ -17,12 +17,12 @@ def attach_stub(package, file):  # type: ignore[no-untyped-def]
     Python. Nothing else is imported: until `__main__.main` runs, an interruption cannot be handled.
     """
     parts = _text(f"{file}i").split("# isort: split")
-    found = [
+    imports = [
         [words for words in map(str.split, part.splitlines()) if words[:1] == ["from"]]
         for part in parts
     ]
-    modules = {words[3]: words[1] for part in found for words in part}
-    public = sorted(words[3] for words in found[0])
+    modules = {words[3]: words[1] for part in imports for words in part}
+    public = sorted(words[3] for words in imports[0])
 
     def get(name):  # type: ignore[no-untyped-def]
         if name not in modules:
@@ -62,12 +62,12 @@ def _naming_arguments(function, room):  # type: ignore[no-untyped-def]
     """The function under the name of its room, by which it is pickled."""
 
     @importlib.import_module("functools").wraps(function)
-    def call(*given, **named):  # type: ignore[no-untyped-def]
+    def call(*positional, **named):  # type: ignore[no-untyped-def]
         try:
-            return function(*given, **named)
+            return function(*positional, **named)
         except Exception as failure:
             importlib.import_module(".annotation", __package__).check_arguments(
-                function, given, named, failure
+                function, positional, named, failure
             )
             raise
 

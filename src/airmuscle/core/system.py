@@ -65,7 +65,7 @@ def with_prefix(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
 
 def united(*names: tuple[str, ...]) -> tuple[str, ...]:
     """Return all names, each once, in their order."""
-    return tuple(dict.fromkeys(name for each in names for name in each))
+    return tuple(dict.fromkeys(name for group in names for name in group))
 
 
 class System(abc.ABC):
@@ -202,11 +202,11 @@ class SensitivitySystem(System):
         """Observed values, the derivatives of each, and their time derivatives."""
 
 
-def check_system(what: str, given: object) -> None:
+def check_system(what: str, candidate: object) -> None:
     """Raise ParameterError for anything that is not a System, such as a muscle or a class."""
-    if not isinstance(given, System):
+    if not isinstance(candidate, System):
         raise ParameterError(
-            f"{what}: {one_line(given)} is no plant; give Plant(muscle, circuit, mechanism)."
+            f"{what}: {one_line(candidate)} is no plant; give Plant(muscle, circuit, mechanism)."
         )
 
 

@@ -241,7 +241,7 @@ def fingerprint(*objects: Any) -> str:
     changes it.
     """
     text = json.dumps(
-        [_to_json(each) for each in objects], ensure_ascii=False, separators=(",", ":")
+        [_to_json(item) for item in objects], ensure_ascii=False, separators=(",", ":")
     )
     return hashlib.sha256(text.encode()).hexdigest()
 

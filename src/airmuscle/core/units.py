@@ -225,9 +225,12 @@ def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
         if _LARGE_EXPONENT.search(unit):
             raise ValueError(unit)
         registry = _registry()
-        given, wanted = (registry.Quantity(1.0, _to_pint_syntax(text)) for text in (unit, target))
-        zero, one, two = (
-            registry.Quantity(v, given.units).to(wanted.units).magnitude for v in (0.0, 1.0, 2.0)
+        source, destination = (
+            registry.Quantity(1.0, _to_pint_syntax(text)) for text in (unit, target)
+        )
+        at_zero, at_one, at_two = (
+            registry.Quantity(v, source.units).to(destination.units).magnitude
+            for v in (0.0, 1.0, 2.0)
         )
     except pint.DimensionalityError:
         raise UnitError(
@@ -239,29 +242,30 @@ def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
             f"{where}'{unit}' is not a known unit. Write it like 'mm', 'kPa', 'bara', 'N', '%' or"
             " 'm3/(s Pa)'."
         ) from None
-    if not math.isclose(two - one, one - zero):
+    if not math.isclose(at_two - at_one, at_one - at_zero):
         raise UnitError(f"{where}unit '{unit}' is logarithmic; write {_describe_target(target)}.")
     return UnitConversion(
-        float(one - zero) * _angle_factor(given.units, wanted.units, unit, target, where),
-        float(zero),
+        float(at_one - at_zero)
+        * _angle_factor(source.units, destination.units, unit, target, where),
+        float(at_zero),
     )
 
 
-def _angle_factor(given: Any, wanted: Any, unit: str, target: str, where: str) -> float:
+def _angle_factor(source: Any, destination: Any, unit: str, target: str, where: str) -> float:
     """1 for units that count angles and bits alike, which are ratios to pint, and for a torque per
     angle without the angle, N m s; 2 pi between frequency and angular speed. Raises UnitError for
     an angle in place of a ratio.
     """
-    counted = _counted(given)
-    expected = _counted(wanted)
-    cycles = sum(power for name, power in given._units.items() if name.endswith("hertz"))
+    counted = _counted(source)
+    expected = _counted(destination)
+    cycles = sum(power for name, power in source._units.items() if name.endswith("hertz"))
     if cycles == -1 and not counted and expected == {"radian": -1}:  # per cycle per second
         return 1.0 / (2.0 * math.pi)
     if counted == expected or (not counted and expected == {"radian": -1}):
         return 1.0
     if counted == {"radian": 1} and target == "Hz":
         return 1.0 / (2.0 * math.pi)
-    if expected == {"radian": 1} and any(name.endswith("hertz") for name in given._units):
+    if expected == {"radian": 1} and any(name.endswith("hertz") for name in source._units):
         return 2.0 * math.pi
     reason = "it measures another quantity." if counted else "it states no angle."
     frequency = " Write rad/s, deg/s, or a frequency in Hz or rpm." if target == "rad/s" else ""

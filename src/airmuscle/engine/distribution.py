@@ -102,11 +102,11 @@ class DistributedCalls:
         """The results in the order of the tasks; `done` is called with the number of those that are
         completed.
         """
-        found: list[Any] = [None] * len(tasks)
+        results_of_tasks: list[Any] = [None] * len(tasks)
         for count, (i, result) in enumerate(self.completed(tasks), 1):
-            found[i] = result
+            results_of_tasks[i] = result
             done(count)
-        return found
+        return results_of_tasks
 
 
 def stored_result(name: str, content: Any, compute: Callable[[], T]) -> T:

@@ -241,9 +241,9 @@ def _class(name: str) -> Any:
     module, _, path = name.partition(":")
     if module.partition(".")[0] != PROGRAM:
         raise ValueError(f"{name} is not of this program")
-    found: Any = importlib.import_module(module)
+    item: Any = importlib.import_module(module)
     for part in path.split("."):
-        found = getattr(found, part)
-    if not isinstance(found, type):
+        item = getattr(item, part)
+    if not isinstance(item, type):
         raise ValueError(f"{name} is no class")
-    return found
+    return item

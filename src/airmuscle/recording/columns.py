@@ -169,7 +169,7 @@ def displacement_columns(
         return dict(columns), []
     sign = -1.0 if source == "elongation" else 1.0
     shortening = sign * (columns[source] - (zero or 0.0))
-    kept = {
+    remaining = {
         name: values for name, values in columns.items() if name not in ("shortening", "elongation")
     }
     origin = (
@@ -178,13 +178,13 @@ def displacement_columns(
         else f"the reading at the resting length, {1e3 * zero:.4g} mm"
     )
     length = constants.get("resting_length")
-    if "contraction" in kept or "length" in kept or not isinstance(length, float | int):
-        return {**kept, "shortening": shortening}, [f"The {source} counts from {origin}."]
+    if "contraction" in remaining or "length" in remaining or not isinstance(length, float | int):
+        return {**remaining, "shortening": shortening}, [f"The {source} counts from {origin}."]
     note = (
         f"The {source} counts from {origin}, and is converted to a contraction with the resting"
         " length."
     )
-    return {**kept, "contraction": shortening / length}, [note]
+    return {**remaining, "contraction": shortening / length}, [note]
 
 
 def proposal(heading: str) -> str:

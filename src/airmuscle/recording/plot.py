@@ -141,23 +141,41 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
     """The curves of a panel; columns of one part have one colour and differ in their variant."""
     curves: list[Curve] = []
     variants: list[str] = []
-    roles = {}
-    for name in names:  # that of the prefix, or of the set point of a pressure regulator
-        prefix, _, _, tail = _parts_of(name)
-        roles[name] = ROLES.get(prefix, "") or (
-            _PRESSURE_SETPOINTS.get(tail, "") if quantity == "pressure" else ""
-        )
-    for name, role in sorted(roles.items(), key=lambda item: item[1] != ""):
-        _, base, part, tail = _parts_of(name)
-        own = role or (tail != quantity and quantity == "opening")
-        variants += [tail] if not role and tail not in variants else []
-        rest = part if tail == quantity or role in _PRESSURE_SETPOINTS.values() else base
-        if not part and own:
-            rest = tail if quantity == "opening" else ""
+    roles = {name: _role(quantity, name) for name in names}
+    # curves without a role first: their order determines the variants
+    for name in sorted(names, key=lambda name: roles[name] != ""):
+        role = roles[name]
+        _, _, part, tail = _parts_of(name)
+        if not role and tail not in variants:
+            variants.append(tail)
         variant = variants.index(tail) if tail in variants else 0
-        label = " ".join(filter(None, (role, rest))).replace("_", " ") or tail.replace("_", " ")
-        curves.append(Curve(name, label or name, part, role, variant))
+        curves.append(Curve(name, _label(quantity, name, role), part, role, variant))
     return tuple(curves)
+
+
+def _role(quantity: str, name: str) -> str:
+    """The role that the prefix states, or that of the set point of a pressure regulator."""
+    prefix, _, _, tail = _parts_of(name)
+    role = ROLES.get(prefix, "")
+    if not role and quantity == "pressure":
+        return _PRESSURE_SETPOINTS.get(tail, "")
+    return role
+
+
+def _label(quantity: str, name: str, role: str) -> str:
+    """The label of a curve: role and part, or what else distinguishes the column."""
+    _, base, part, tail = _parts_of(name)
+    is_opening = quantity == "opening"
+    is_distinguished = role or (tail != quantity and is_opening)
+    if not part and is_distinguished:
+        rest = tail if is_opening else ""
+    elif tail == quantity or role in _PRESSURE_SETPOINTS.values():
+        rest = part
+    else:
+        rest = base
+    words = [word for word in (role, rest) if word]
+    label = " ".join(words) or tail
+    return label.replace("_", " ") or name
 
 
 def plot_columns(

@@ -107,7 +107,9 @@ class Recording(NotebookDisplay):
         if values is not None:
             return values
         remedy: str = ""
-        moved = next((each for each in ("length", "shortening") if each in self.columns), "")
+        moved = next(
+            (quantity for quantity in ("length", "shortening") if quantity in self.columns), ""
+        )
         if name == "contraction" and moved:
             remedy = f" Specify the resting length to convert the {moved} to a contraction."
         elif name == "contraction" and "position" in self.columns:
@@ -247,19 +249,30 @@ def recording_card(recording: Any, units: Mapping[str, str]) -> Card:
     rows: list[tuple[str, ...]] = [("column", "unit", "first", "minimum", "maximum", "last")]
     for name, values in recording.columns.items():
         factor, unit = display_scale(name)
-        finite = values[np.isfinite(values)] * factor
-        finite[np.abs(finite) < ROUNDING * np.max(np.abs(finite), initial=0.0)] = 0.0
-        shown = (finite[0], finite.min(), finite.max(), finite[-1]) if finite.size else ()
-        rows.append((name, unit or units.get(name, ""), *(f"{value:.4g}" for value in shown)))
+        texts = _characteristic_values(values, factor)
+        rows.append((name, unit or units.get(name, ""), *texts))
 
     def draw() -> Any:
-        every = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
+        step = -(-len(recording) // MAX_POINTS)
+        every = slice(None, None, max(1, step))
         columns = {name: values[every] for name, values in recording.columns.items()}
         time = columns.pop("time", None)
         return plot_columns(columns, time, recording.origin, units=units, limit=MAX_PANELS)
 
-    title = f"{recording.origin}: {len(recording)} rows of {len(recording.columns)} columns"
-    return Card(title, rows, draw if len(recording) else None, recording.notes)
+    count = len(recording)
+    title = f"{recording.origin}: {count} rows of {len(recording.columns)} columns"
+    return Card(title, rows, draw if count else None, recording.notes)
+
+
+def _characteristic_values(values: Array, factor: float) -> list[str]:
+    """First, smallest, largest and last of the finite values times a factor."""
+    finite = values[np.isfinite(values)] * factor
+    if not finite.size:
+        return []
+    sizes = np.abs(finite)
+    finite[sizes < ROUNDING * np.max(sizes)] = 0.0
+    numbers = (finite[0], finite.min(), finite.max(), finite[-1])
+    return [f"{number:.4g}" for number in numbers]
 
 
 class RowNote(str):
@@ -274,7 +287,10 @@ def row_notes(recordings: Iterable[Recording]) -> list[str]:
     """The notes of the recordings on rows that were left out or filled, each once."""
     return list(
         dict.fromkeys(
-            note for each in recordings for note in each.notes if isinstance(note, RowNote)
+            note
+            for recording in recordings
+            for note in recording.notes
+            if isinstance(note, RowNote)
         )
     )
 
@@ -286,5 +302,5 @@ def list_rows(label: str, rows: Sequence[Any] | Any, most: int) -> str:
     shown = [str(row) for row in rows[:most]]
     if len(rows) > most:
         shown.append(f"{len(rows) - most} more")
-    *others, last = shown
-    return f"{label}s {', '.join(others)} and {last}"
+    *leading, last = shown
+    return f"{label}s {', '.join(leading)} and {last}"

@@ -83,10 +83,10 @@ class Table(ShortRepr):
 
     def __post_init__(self) -> None:
         made = {
-            key: each if isinstance(each, TableColumn) else TableColumn(each)
-            for key, each in self.columns.items()
+            key: column if isinstance(column, TableColumn) else TableColumn(column)
+            for key, column in self.columns.items()
         }
-        lengths = {key: len(each.values) for key, each in made.items()}
+        lengths = {key: len(column.values) for key, column in made.items()}
         if len(set(lengths.values())) > 1:
             raise ValueError(
                 f"table {self.name}: all columns must have the same length, not {lengths}."
@@ -204,8 +204,8 @@ class Chapter(ShortRepr):
         """
         named: dict[str, Any] = {
             kind: tuple(
-                dataclasses.replace(each, name=f"{prefix}{each.name}{suffix}")
-                for each in getattr(self, kind)
+                dataclasses.replace(item, name=f"{prefix}{item.name}{suffix}")
+                for item in getattr(self, kind)
             )
             for kind in ("tables", "plots")
         }

@@ -185,10 +185,15 @@ class ClaimRow:
 
     def claim(self, case: str, *arguments: Any) -> Claim:
         """Return the claim in one case, evaluated for these arguments."""
-        found = self.reproduce(*arguments) if self.reproduce else arguments or None
-        value, reason = found if isinstance(found, tuple) else (found, "")
+        result = self.reproduce(*arguments) if self.reproduce else arguments or None
+        value, reason = result if isinstance(result, tuple) else (result, "")
         note = f"{self.blank.note} {reason}".strip()
-        return dataclasses.replace(self.blank, reproduced=value, note=note, case=case)
+        return dataclasses.replace(
+            self.blank,
+            reproduced=value,
+            note=note,
+            case=case,
+        )
 
     def claims(self, *subject: Any) -> tuple[Claim, ...]:
         """Return the claims of all cases; the function is given the subject before the arguments of
@@ -289,6 +294,9 @@ def format_verdicts(count: int, verdict: str) -> str:
 def count_readings(statement: Statement) -> str:
     """The number of cases of a statement with each verdict: `7 readings: 4 hold, 3 differ`."""
     verdicts = [case.verdict for case in statement.cases]
-    counts = {verdict: verdicts.count(verdict) for verdict in MARKS if verdict in verdicts}
-    texts = [format_verdicts(n, verdict) for verdict, n in counts.items()]
+    texts = []
+    for verdict in MARKS:
+        count = verdicts.count(verdict)
+        if count:
+            texts.append(format_verdicts(count, verdict))
     return f"{len(verdicts)} readings: {', '.join(texts)}"

@@ -40,7 +40,7 @@ def _chapter(chapter: Chapter) -> dict[str, Any]:
         "summary": list(map(to_plain, chapter.paragraphs)),
         "problems": list(chapter.problems),
         "notes": list(map(to_plain, chapter.notes)),
-        **{_key(each.name): each.value for each in chapter.values},
+        **{_key(named.name): named.value for named in chapter.values},
         **{_key(table.key): _rows(table) for table in tables},
         "settings": [
             {"quantity": what, "value": value, "source": source}
@@ -48,7 +48,7 @@ def _chapter(chapter: Chapter) -> dict[str, Any]:
         ],
         "references": list(map(str, chapter.references)),
         "units": {
-            **{_key(each.name): each.unit for each in chapter.values if each.unit},
+            **{_key(named.name): named.unit for named in chapter.values if named.unit},
             **{
                 f"{_key(table.key)}.{_key(name)}": column.unit
                 for table in tables
@@ -64,7 +64,7 @@ def _rows(table: Table) -> list[dict[str, Any]]:
     columns = table.columns.values()
     return [
         dict(zip(keys, row, strict=True))
-        for row in zip(*(each.values for each in columns), strict=True)
+        for row in zip(*(column.values for column in columns), strict=True)
     ]
 
 
@@ -95,18 +95,20 @@ def in_words(chapter: Chapter, words: Callable[[str], str]) -> Chapter:
     def cell(value: Any) -> Any:
         return words(value) if isinstance(value, str) else value
 
-    def table(each: Table) -> Table:
+    def table(worded_table: Table) -> Table:
         worded = {
             name: dataclasses.replace(c, values=list(map(cell, c.values)))
-            for name, c in each.columns.items()
+            for name, c in worded_table.columns.items()
         }
-        return dataclasses.replace(each, columns=worded)
+        return dataclasses.replace(worded_table, columns=worded)
 
     return dataclasses.replace(
         chapter,
         summary=tuple(map(words, chapter.paragraphs)),
         tables=tuple(map(table, chapter.tables)),
-        values=tuple(dataclasses.replace(each, value=cell(each.value)) for each in chapter.values),
+        values=tuple(
+            dataclasses.replace(named, value=cell(named.value)) for named in chapter.values
+        ),
         problems=tuple(map(words, chapter.problems)),
         notes=tuple(map(words, chapter.notes)),
     )
@@ -131,12 +133,12 @@ def table_sheet(table: Table) -> dict[str, Any]:
     of texts.
     """
     columns = shown_columns(table)
-    cells = [[to_plain(each.cell_text(cell)) for cell in each.cells] for each in columns]
+    cells = [[to_plain(column.cell_text(cell)) for cell in column.cells] for column in columns]
     return {
         "title": to_plain(table.title),
         "note": to_plain(table.note),
         "headings": [
-            {"text": to_plain(each.heading), "number": each.is_numeric} for each in columns
+            {"text": to_plain(column.heading), "number": column.is_numeric} for column in columns
         ],
         "rows": [list(row) for row in zip(*cells, strict=True)],
     }
@@ -149,7 +151,7 @@ def csv_text(table: Table) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     columns = shown_columns(table, chosen=False)
-    writer.writerow([to_plain(each.heading) for each in columns])
+    writer.writerow([to_plain(column.heading) for column in columns])
     text = functools.cache(lambda cell: printable(to_plain(cell)))  # of many runs the same
 
     def cell(value: Any) -> Any:  # both ends of a range with `to` between them
@@ -161,5 +163,5 @@ def csv_text(table: Table) -> str:
             return " to ".join(map(str, dict.fromkeys(value)))
         return int(value) if isinstance(value, bool) else value
 
-    writer.writerows(zip(*(map(cell, each.cells) for each in columns), strict=True))
+    writer.writerows(zip(*(map(cell, column.cells) for column in columns), strict=True))
     return file.getvalue()

@@ -42,7 +42,7 @@ def format_number(value: Any, digits: int = DIGITS) -> str:
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
     if isinstance(value, tuple):
-        return " to ".join(dict.fromkeys(format_number(each, digits) for each in value))
+        return " to ".join(dict.fromkeys(format_number(end, digits) for end in value))
     if isinstance(value, str) or not isinstance(value, Real):
         return str(value)
     if isinstance(value, Integral):
@@ -205,7 +205,7 @@ def _symbol_latex(match: re.Match[str]) -> str:
         return r"q_\text{m}"
     if index is None:
         return latex
-    parts = [each if _INDICES.fullmatch(each) else rf"\text{{{each}}}" for each in index.split("_")]
+    parts = [part if _INDICES.fullmatch(part) else rf"\text{{{part}}}" for part in index.split("_")]
     return (
         f"{latex}_{parts[0]}"
         if len(parts) == 1 and parts[0] != index

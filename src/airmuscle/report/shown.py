@@ -69,30 +69,55 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
     A meaning that is that of the row above, as of the coefficients of a polynomial, is shown once.
     """
     rows = table.brief_rows if brief else list(range(len(table)))
-    units = table.columns.get(UNIT, TableColumn(()))
-    labels = units.shown or units.values
-    scales = [scale_of("", units.values[i], labels[i], chosen=chosen) for i in rows if len(units)]
+    scales = _scales_of_rows(table, rows, chosen=chosen)
     shown = []
     for name, column in table.columns.items():
         if brief and not column.brief:
             continue
         cells = [column.values[i] for i in rows]
         heading = (brief and column.short) or name
-        factor = 1.0
         if column.unit == BY_ROW:
-            cells = [_times(cell, scale) for cell, (scale, _) in zip(cells, scales, strict=True)]
+            pairs = zip(cells, scales, strict=True)
+            cells = [_times(cell, factor) for cell, (factor, _) in pairs]
         elif name == UNIT:
             cells = ["" if unit == "1" else unit for _, unit in scales]
-        elif column.unit:
-            factor, unit = scale_of(name, column.unit, str(column.shown), chosen=chosen)
-            heading = heading if unit == "" or (unit == "1" and chosen) else f"{heading} [{unit}]"
-        elif chosen:
-            factor, heading = heading_scale(heading)
-        cells = [_times(cell, factor) for cell in cells]
+        else:
+            factor, heading = _scaled_heading(name, heading, column, chosen=chosen)
+            cells = [_times(cell, factor) for cell in cells]
         if chosen and heading == MEANING:
-            cells[1:] = ["" if cell == above else cell for above, cell in itertools.pairwise(cells)]
+            cells = _without_repetition(cells)
         shown.append(ShownColumn(heading, cells, column))
     return shown
+
+
+def _scales_of_rows(table: Table, rows: Sequence[int], *, chosen: bool) -> list[tuple[float, str]]:
+    """Factor from SI and unit of each row, of a table that states units by row; otherwise none."""
+    units = table.columns.get(UNIT, TableColumn(()))
+    if not len(units):
+        return []
+    labels = units.shown or units.values
+    scales = []
+    for row in rows:
+        scale = scale_of("", units.values[row], labels[row], chosen=chosen)
+        scales.append(scale)
+    return scales
+
+
+def _scaled_heading(
+    name: str, heading: str, column: TableColumn, *, chosen: bool
+) -> tuple[float, str]:
+    """Factor from the stored cells to those that are shown, and the heading with its unit."""
+    if column.unit:
+        factor, unit = scale_of(name, column.unit, str(column.shown), chosen=chosen)
+        is_plain = unit == "" or (unit == "1" and chosen)
+        return factor, heading if is_plain else f"{heading} [{unit}]"
+    return heading_scale(heading) if chosen else (1.0, heading)
+
+
+def _without_repetition(cells: Sequence[Any]) -> list[Any]:
+    """The cells, empty where they are equal to the one above."""
+    later = ["" if cell == above else cell for above, cell in itertools.pairwise(cells)]
+    return [*cells[:1], *later]
 
 
 def scale_of(name: str, unit: str, shown: str = "", *, chosen: bool = True) -> tuple[float, str]:
@@ -132,17 +157,17 @@ def _times(value: Any, factor: float) -> Any:
     if factor == 1.0 or value is None or isinstance(value, bool):
         return value
     if isinstance(value, tuple):
-        return tuple(_times(each, factor) for each in value)
+        return tuple(_times(end, factor) for end in value)
     return scaled_numbers(value, factor) if isinstance(value, str) else value * factor
 
 
 def value_table(name: str, title: str, values: tuple[NamedValue, ...]) -> Table:
     """The named values of a chapter as a table."""
     columns: Mapping[str, Any] = {
-        "quantity": [each.name for each in values],
-        "value": [" ".join(filter(None, value_cells(each))) for each in values],
+        "quantity": [named.name for named in values],
+        "value": [" ".join(filter(None, value_cells(named))) for named in values],
     }
-    remarks = [each.remark for each in values]
+    remarks = [named.remark for named in values]
     return Table(name, title, {**columns, "remark": remarks} if any(remarks) else columns)
 
 
@@ -169,25 +194,36 @@ def leaf_table(
     long lists.
     """
     listed = list(rows)
+    paths = [path for path, _ in listed]
+    declared = [leaf.declared for _, leaf in listed]
     columns: dict[str, Any] = {
-        "parameter": [path for path, _ in listed],
-        "symbol": [leaf.declared.symbol for _, leaf in listed],
+        "parameter": paths,
+        "symbol": [field.symbol for field in declared],
         "value": TableColumn([leaf.value for _, leaf in listed], BY_ROW),
-        "unit": [leaf.declared.unit for _, leaf in listed],
-        "meaning": [leaf.declared.meaning for _, leaf in listed],
+        "unit": [field.unit for field in declared],
+        "meaning": [field.meaning for field in declared],
     }
     if bounds:
-        bounds_of = [leaf.declared.bounds for _, leaf in listed]
-        finite = [each if any(map(math.isfinite, each)) else None for each in bounds_of]
+        finite = [_finite_bounds(field.bounds) for field in declared]
         columns["bounds"] = TableColumn(finite, BY_ROW, digits=6)
-        columns["fitted"] = TableColumn([leaf.declared.fitted for _, leaf in listed], brief=False)
-    stems = [path.partition("[")[0] for path, _ in listed]
-    ends = [
-        i
-        for i, stem in enumerate(stems)  # without the middle of long lists
-        if (count := stems.count(stem)) <= MAX_VALUES or i - stems.index(stem) in (0, 1, count - 1)
-    ]
-    return Table(name, title, columns, brief=ends if brief else 0)
+        columns["fitted"] = TableColumn([field.fitted for field in declared], brief=False)
+    return Table(name, title, columns, brief=_ends_of_lists(paths) if brief else 0)
+
+
+def _finite_bounds(bounds: tuple[float, float]) -> tuple[float, float] | None:
+    return bounds if any(map(math.isfinite, bounds)) else None
+
+
+def _ends_of_lists(paths: Sequence[str]) -> list[int]:
+    """The rows of all parameters, without the middle of long lists."""
+    stems = [path.partition("[")[0] for path in paths]
+    rows = []
+    for row, stem in enumerate(stems):
+        count = stems.count(stem)
+        place_in_list = row - stems.index(stem)
+        if count <= MAX_VALUES or place_in_list in (0, 1, count - 1):
+            rows.append(row)
+    return rows
 
 
 def estimate_table(estimates: Sequence[Any], name: str, title: str, *, brief: int = 0) -> Table:
@@ -196,18 +232,18 @@ def estimate_table(estimates: Sequence[Any], name: str, title: str, *, brief: in
 
     Each estimate has `name`, `label`, `value`, `stderr`, `unit`, `meaning` and `on_bound`.
     """
-    bound = ["on bound" if each.on_bound else "" for each in estimates]
+    bound = ["on bound" if estimate.on_bound else "" for estimate in estimates]
     errors = [
-        None if each.on_bound or not math.isfinite(each.stderr) else each.stderr
-        for each in estimates
+        None if estimate.on_bound or not math.isfinite(estimate.stderr) else estimate.stderr
+        for estimate in estimates
     ]
     columns = {
-        "parameter": [each.name for each in estimates],
-        "symbol": [each.label for each in estimates],
-        "value": TableColumn([each.value for each in estimates], BY_ROW),
+        "parameter": [estimate.name for estimate in estimates],
+        "symbol": [estimate.label for estimate in estimates],
+        "value": TableColumn([estimate.value for estimate in estimates], BY_ROW),
         "standard error": TableColumn(errors, BY_ROW, digits=3),
-        "unit": [each.unit for each in estimates],
+        "unit": [estimate.unit for estimate in estimates],
         **({"remark": bound} if any(bound) else {}),
-        "meaning": TableColumn([each.meaning for each in estimates], brief=False),
+        "meaning": TableColumn([estimate.meaning for estimate in estimates], brief=False),
     }
     return Table(name, title, columns, brief=brief)

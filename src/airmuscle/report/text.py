@@ -29,7 +29,7 @@ def as_text(chapters: Sequence[Chapter], width: int, rest: str = "the report") -
     """
     texts = list[str]()
     stated = tuple[str, ...]()
-    for chapter in (each for each in chapters if each.brief):
+    for chapter in (candidate for candidate in chapters if candidate.brief):
         result = chapter.paragraphs[:1]
         texts.append("\n".join(_lines(chapter, () if result == stated else result, width, rest)))
         stated = result
@@ -39,8 +39,10 @@ def as_text(chapters: Sequence[Chapter], width: int, rest: str = "the report") -
 def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> Iterator[str]:
     yield to_plain(chapter.title)
     yield from map(to_plain, result)
-    values = [each for each in chapter.values if each.brief]
-    cells = [(each.name, " ".join(filter(None, value_cells(each))), each.remark) for each in values]
+    values = [named for named in chapter.values if named.brief]
+    cells = [
+        (named.name, " ".join(filter(None, value_cells(named))), named.remark) for named in values
+    ]
     widths = [max(map(cell_width, column)) for column in zip(*cells, strict=True)]
     for name, value, remark in cells:
         yield f"{_padded(name, widths[0])}   {_padded(value, widths[1])}   {remark}".rstrip()
@@ -70,13 +72,13 @@ def table_lines(table: Table, width: int, rest: str) -> Iterator[str]:
     headings = [
         _UNIT.sub(
             lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"),
-            printable(to_plain(each.heading)),
+            printable(to_plain(column.heading)),
         )
-        for each in columns
+        for column in columns
     ]
-    cells = [[printable(to_plain(text)) for text in each.texts] for each in columns]
+    cells = [[printable(to_plain(text)) for text in column.texts] for column in columns]
     widths, gap = _widths(headings, cells, width)
-    right = [each.is_numeric for each in columns]
+    right = [column.is_numeric for column in columns]
     yield from _row(headings, widths, right, gap)
     yield "─" * min(width, sum(widths) + gap * (len(widths) - 1))
     last = -1

@@ -64,15 +64,8 @@ def write_into(
     """Write the report's files into a folder made by `atomic_folder`, next to other files of the
     same command.
     """
-    for kind in ("plots", "tables"):  # of two of the same name one would overwrite the other
-        names = [item.name for chapter in chapters for item in getattr(chapter, kind)]
-        invalid = sorted(
-            {name for name in names if names.count(name) > 1 or Path(name).name != name}
-        )
-        if invalid:
-            raise ValueError(
-                f"{kind}: names must be unique and valid file names; check {', '.join(invalid)}."
-            )
+    _check_file_names("plots", [plot.name for chapter in chapters for plot in chapter.plots])
+    _check_file_names("tables", [table.name for chapter in chapters for table in chapter.tables])
     try:
         for chapter in chapters:
             for plot in chapter.plots:
@@ -94,6 +87,16 @@ def write_into(
         raise FileError(
             f"{staging.parent}: the report cannot be written: {error.strerror or error}."
         ) from error
+
+
+def _check_file_names(kind: str, names: Sequence[str]) -> None:
+    """Of two of the same name one would overwrite the other."""
+    invalid = {name for name in names if names.count(name) > 1 or Path(name).name != name}
+    if invalid:
+        raise ValueError(
+            f"{kind}: names must be unique and valid file names;"
+            f" check {', '.join(sorted(invalid))}."
+        )
 
 
 def rendered_figure(plot: Plot) -> dict[str, bytes]:
@@ -156,7 +159,7 @@ def _template() -> Any:
         readings=claiming.count_readings,
         verdicts=claiming.format_verdicts,
         shown=shown_columns,
-        rows=lambda shown: list(zip(*(each.cells for each in shown), strict=True)),
+        rows=lambda shown: list(zip(*(column.cells for column in shown), strict=True)),
         sentence=lambda text: (
             f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}"
         ),
@@ -205,11 +208,11 @@ def versions() -> dict[str, str]:
     """Return the versions of airmuscle, Python and the numerical packages; `not installed` for a
     missing one.
     """
-    found = dict.fromkeys(("airmuscle", "Python", *_PACKAGES), "not installed")
+    installed = dict.fromkeys(("airmuscle", "Python", *_PACKAGES), "not installed")
     for package in ("airmuscle", *_PACKAGES):
         with contextlib.suppress(metadata.PackageNotFoundError):
-            found[package] = metadata.version(package)
-    return found | {
+            installed[package] = metadata.version(package)
+    return installed | {
         "Python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}",
     }

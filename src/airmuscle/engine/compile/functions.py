@@ -135,8 +135,8 @@ class Printer:
     ) -> dict[tuple[int, int], str]:
         """Append code to a function with arguments `names`; the names of its results, which are not
         stored, by output and index."""
-        code, held = self.set_apart(code, names)
-        return emission.computed(block, code, names, held)
+        code, precomputed = self.set_apart(code, names)
+        return emission.computed(block, code, names, precomputed)
 
     def end(
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock
@@ -158,8 +158,8 @@ class Printer:
                 block
             )  # it prints the quantities, too: those that have values already have their names
             trial.lines, trial.known, trial.read, trial.loaded = [], dict(block.known), set(), {}
-            code, held, items = self._quantity_code
-            values = emission.Emission(trial, list(self.quantities[0]), held, {})
+            code, precomputed, items = self._quantity_code
+            values = emission.Emission(trial, list(self.quantities[0]), precomputed, {})
             values.run(items)
             computed = set(block.known.values())
             results = ((values.value_of(operand), index) for _, index, operand in code.outputs)
@@ -176,10 +176,10 @@ class Printer:
         instructions.
         """
         arguments, values = self.quantities  # type: ignore[misc]
-        code, held = self.set_apart(
+        code, precomputed = self.set_apart(
             instructions(list(arguments.values()), [values]), list(arguments)
         )
-        return code, held, emission.with_gates(code, list(arguments), held)
+        return code, precomputed, emission.with_gates(code, list(arguments), precomputed)
 
     @staticmethod
     def _argument(name: str) -> str:
@@ -191,17 +191,17 @@ class Printer:
         """
         if PARAMETERS not in names:
             return code, {}
-        code, once, handed = hoisted(code, names.index(PARAMETERS))
+        code, once, constants = hoisted(code, names.index(PARAMETERS))
         prepared = emission.Emission(self._prepare, names, {}, {})
-        held = {}
+        precomputed = {}
         prepared.run(once)
-        for operand in handed:
+        for operand in constants:
             value = prepared.value_of(operand)
             if value not in self._places:  # functions share equal values
                 self._places[value] = len(self._places)
                 self._prepare.store("c", self._places[value], value)
-            held[operand] = self._places[value]
-        return code, held
+            precomputed[operand] = self._places[value]
+        return code, precomputed
 
     def module(self) -> str:
         """`prepare` and all functions, as one text."""

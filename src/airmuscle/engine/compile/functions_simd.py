@@ -83,8 +83,8 @@ class _RowsBody(FunctionBody):
         """
         result = "poison"
         for row in range(ROWS.lanes):
-            given = [self.put(f"extractelement {ROWS.text} {a}, i32 {row}") for a in x]
-            arguments = ", ".join(f"{ROWS.element} {a}" for a in given)
+            elements = [self.put(f"extractelement {ROWS.text} {a}, i32 {row}") for a in x]
+            arguments = ", ".join(f"{ROWS.element} {a}" for a in elements)
             value = self.put(f"call {FLAGS} {ROWS.element} @{function}({arguments})")
             result = self.put(
                 f"insertelement {ROWS.text} {result}, {ROWS.element} {value}, i32 {row}"
@@ -113,8 +113,8 @@ def lanes_module(
     """
     printer = Printer(groups)
     point = t.point
-    code, held = printer.set_apart(instructions(list(point.values()), [t.f]), POINT)
-    step = _Step(t, code, held, groups)
+    code, precomputed = printer.set_apart(instructions(list(point.values()), [t.f]), POINT)
+    step = _Step(t, code, precomputed, groups)
     text = step.printed(a, b)
     printer.add("outputs", point, {"o": t.o})
     parts = vector_math.definitions({**printer.needed, **step.needed}, groups.number)
@@ -140,14 +140,14 @@ class _Step:
     """
 
     def __init__(
-        self, t: TracedSystem, code: Code, held: dict[Operand, int], groups: LaneGroups
+        self, t: TracedSystem, code: Code, precomputed: dict[Operand, int], groups: LaneGroups
     ) -> None:
         self.groups = groups
         self.states = len(t.x)
         self.inputs = len(t.u)
-        self.items = emission.with_gates(code, POINT, held)
+        self.items = emission.with_gates(code, POINT, precomputed)
         self.outputs = code.outputs
-        self.held = held
+        self.held = precomputed
         self.needed: dict[str, int] = {}
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
@@ -157,8 +157,8 @@ class _Step:
         parts = {f"stage{number}": OF_STAGE for number in range(len(rows))} | {"finish": OF_END}
         room = {SLOPES: len(rows) * self.states}
         by_group = self._cached_by_group(room[SLOPES])
-        whole = self.groups.sequence("step", list("xucwhy"), parts, room, by_group=by_group)
-        return "".join([*stages, self._finish("finish", b), whole])
+        sequence = self.groups.sequence("step", list("xucwhy"), parts, room, by_group=by_group)
+        return "".join([*stages, self._finish("finish", b), sequence])
 
     def _cached_by_group(self, slopes: int) -> bool:
         """Whether the first-level cache holds what the step reads and writes for one group, but not
@@ -172,9 +172,11 @@ class _Step:
         """The function of one stage, which computes its slopes."""
         block = self.groups.body()
         values = _Moved(block, row, self.states)
-        given: dict[Operand, str] = {("in", 0, i): values.state(i) for i in range(self.states)}
-        given |= {("in", 1, i): values.input(i) for i in range(self.inputs)}
-        at = emission.Emission(block, POINT, self.held, given)
+        values_of_inputs: dict[Operand, str] = {
+            ("in", 0, i): values.state(i) for i in range(self.states)
+        }
+        values_of_inputs |= {("in", 1, i): values.input(i) for i in range(self.inputs)}
+        at = emission.Emission(block, POINT, self.held, values_of_inputs)
         at.run(self.items)
         for _, i, operand in self.outputs:
             block.store(SLOPES, len(row) * self.states + i, at.value_of(operand))

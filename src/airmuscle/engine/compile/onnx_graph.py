@@ -89,10 +89,10 @@ class GraphBody(FunctionBlock):
                 less = self._expm1(number)
                 return self._half(less, node("Div", less, node("Add", less, self.constant(1.0))))
             case "asinh":
-                one = self.constant(1.0)
+                unity = self.constant(1.0)
                 size = node("Abs", number)
                 square = node("Mul", number, number)
-                root = node("Add", one, node("Sqrt", node("Add", one, square)))
+                root = node("Add", unity, node("Sqrt", node("Add", unity, square)))
                 return node(
                     "Mul",
                     node("Sign", number),
@@ -112,18 +112,18 @@ class GraphBody(FunctionBlock):
         x.
         """
         node = self.node
-        one = self.constant(1.0)
-        u = node("Add", one, x)
-        quotient = node("Div", node("Mul", node("Log", u), x), node("Sub", u, one))
-        return node("Where", node("Equal", u, one), x, quotient)
+        unity = self.constant(1.0)
+        u = node("Add", unity, x)
+        quotient = node("Div", node("Mul", node("Log", u), x), node("Sub", u, unity))
+        return node("Where", node("Equal", u, unity), x, quotient)
 
     def _expm1(self, x: str) -> str:
         """exp(x) - 1, accurate for small x, by (u - 1) x/log(u) with u = exp(x)."""
         node = self.node
-        one = self.constant(1.0)
+        unity = self.constant(1.0)
         u = node("Exp", x)
-        less = node("Sub", u, one)
+        less = node("Sub", u, unity)
         small = node(
-            "Where", node("Equal", u, one), x, node("Div", node("Mul", less, x), node("Log", u))
+            "Where", node("Equal", u, unity), x, node("Div", node("Mul", less, x), node("Log", u))
         )
         return node("Where", node("Equal", less, self.constant(-1.0)), less, small)

@@ -257,7 +257,10 @@ def _print_along(
     if moving is not None and t.inputs:
         further = moving.along(moving.results)
         parts = moving.compute(
-            printer, block, [p for each in further.changes for p in each.inputs.values()], arguments
+            printer,
+            block,
+            [p for change in further.changes for p in change.inputs.values()],
+            arguments,
         )
         w = t.input_rows(block, "w")
         for i, change in enumerate(further.changes):

@@ -27,7 +27,7 @@ class _Stage:
         along: DirectionalDerivative,
         printer: Printer,
         block: FunctionBody,
-        given: dict[Operand, str],
+        values: dict[Operand, str],
         v: Sequence[LlvmValue],
     ) -> None:
         self.rates = rates
@@ -35,8 +35,8 @@ class _Stage:
         self.block = block
         self.v = v
         wanted, slots = distinct([*rates.results, *along.parts])
-        code, held = printer.set_apart(rates.code(wanted), POINT)
-        self.at = emission.Emission(block, POINT, held, given)
+        code, precomputed = printer.set_apart(rates.code(wanted), POINT)
+        self.at = emission.Emission(block, POINT, precomputed, values)
         operands = code.results(0, len(wanted))
         self._operand_of = {
             nodes.identity(node): operands[slot]
@@ -48,7 +48,7 @@ class _Stage:
                 needed.update(line.arguments)
         self.first: list[Item] = []
         self.second: list[Item] = []
-        for item in emission.with_gates(code, POINT, held, frozenset(needed)):
+        for item in emission.with_gates(code, POINT, precomputed, frozenset(needed)):
             early = (item if isinstance(item, Instruction) else item.body[0]).result in needed
             (self.first if early else self.second).append(item)
 
@@ -117,16 +117,16 @@ def explicit_module(
     rows = [(), *a]
     before = None
     for number, row in enumerate(rows):
-        given = {
+        values = {
             ("in", POINT.index("x"), i): x.name
             for i, x in enumerate(_after(row, states, slopes, h))
         }
         for i in range(len(t.inner.u)):
             u = loaded(block, "u", i) + loaded(block, "w", i) * _times(h, sum(row))
-            given["in", POINT.index("u"), i] = u.name
+            values["in", POINT.index("u"), i] = u.name
         moving = zip(t.input_rows(block), t.input_rows(block, "w"), strict=True)
         stage = _Stage(
-            rates, along, printer, block, given, [v + w * _times(h, sum(row)) for v, w in moving]
+            rates, along, printer, block, values, [v + w * _times(h, sum(row)) for v, w in moving]
         )
         stage.print_rates(before)
         slopes.append(stage.slopes())

@@ -129,17 +129,19 @@ def rebuilt(part: Any, change: Callable[[Any], Any]) -> Any:
 
     `change` returns a part itself, or another one, which is changed again.
     """
-    if (other := change(part)) is not part:
-        return rebuilt(other, change)
+    if (replacement := change(part)) is not part:
+        return rebuilt(replacement, change)
     if isinstance(part, tuple):
         items = tuple(rebuilt(item, change) for item in part)
         return part if all(a is b for a, b in zip(items, part, strict=True)) else items
     if not isinstance(part, Controller) or not dataclasses.is_dataclass(part):
         return part
-    given = {
+    fields = {
         field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init
     }
-    changed = {name: new for name, old in given.items() if (new := rebuilt(old, change)) is not old}
+    changed = {
+        name: new for name, old in fields.items() if (new := rebuilt(old, change)) is not old
+    }
     return dataclasses.replace(part, **changed) if changed else part
 
 
@@ -173,7 +175,7 @@ Commanded = str | SplitRange
 def inputs_of(commanded: Commanded | tuple[Commanded, ...]) -> tuple[str, ...]:
     """The commanded inputs."""
     if isinstance(commanded, tuple):
-        return tuple(name for each in commanded for name in inputs_of(each))
+        return tuple(name for part in commanded for name in inputs_of(part))
     return (commanded,) if isinstance(commanded, str) else (commanded.positive, commanded.negative)
 
 

@@ -176,7 +176,7 @@ class ControlLoop(ShortRepr):
             **named_signal_units(self.controller),
             **{name: unit for name, unit in known.items() if unit},
         }
-        names = [name for each in self.signals.values() for name in each]
+        names = [name for names_of_signal in self.signals.values() for name in names_of_signal]
         return {
             column: known.get(name, "")
             for column, name in zip(self.column_names, names, strict=True)

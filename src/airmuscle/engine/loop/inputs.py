@@ -172,44 +172,44 @@ class InputSignal(abc.ABC):
         return None
 
 
-def check_input_signal(given: object) -> None:
+def check_input_signal(signal: object) -> None:
     """Raise ParameterError for anything that is not an InputSignal, such as a dictionary."""
-    if not isinstance(given, InputSignal):
+    if not isinstance(signal, InputSignal):
         remedy = ""
-        if isinstance(given, Mapping) and given:
+        if isinstance(signal, Mapping) and signal:
             remedy = (
-                f" Schedule({{{next(iter(given))!r}: ((0, 1.0),)}}) is an input of 1 from 0 s on."
+                f" Schedule({{{next(iter(signal))!r}: ((0, 1.0),)}}) is an input of 1 from 0 s on."
             )
         raise ParameterError(
-            f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another"
+            f"the input is {abridged(signal)}; give a Schedule, a SampledSignal or another"
             f" InputSignal.{remedy}"
         )
 
 
-def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:
+def check_input_names(names: Iterable[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
-    check_known(prefix, given, inputs)
+    check_known(prefix, names, inputs)
 
 
-def check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
+def check_mapping(kind: str, mapping: object, example: str = "((5, 1), (15, 0))") -> None:
     """Raise ParameterError for anything that does not name inputs."""
-    if not isinstance(given, Mapping):
+    if not isinstance(mapping, Mapping):
         raise ParameterError(
-            f"a {kind} is {abridged(given)}; name the inputs: {{'fill': {example}}}."
+            f"a {kind} is {abridged(mapping)}; name the inputs: {{'fill': {example}}}."
         )
 
 
 def as_pairs(
-    kind: str, noun: str, name: str, given: Sequence[tuple[float, float]]
+    kind: str, noun: str, name: str, pairs: Sequence[tuple[float, float]]
 ) -> list[tuple[float, float]]:
     """Pairs of time and value as finite numbers, the times rising. Raises ParameterError for
     anything else.
     """
     try:
-        points = [(as_float("a time", time), as_float("a value", value)) for time, value in given]
+        points = [(as_float("a time", time), as_float("a value", value)) for time, value in pairs]
     except (TypeError, ValueError, ParameterError):
         raise ParameterError(
-            f"the {kind} of '{name}' is {one_line(given)}; write pairs of time [s] and value, ((5,"
+            f"the {kind} of '{name}' is {one_line(pairs)}; write pairs of time [s] and value, ((5,"
             " 1), (15, 0))."
         ) from None
     if points and not np.isfinite(points).all():
@@ -317,11 +317,11 @@ class Periodic(InputSignal):
         starts[np.abs(starts - start) <= rounding] = (
             start  # 3 * 0.1 is more than 0.3: no segment of 1e-17 s
         )
-        whole = PiecewiseLinear(
+        repeated = PiecewiseLinear(
             np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size)
         )
         within = starts[(starts > start) & (starts < end)]
-        return whole.split_at(np.append(start, within), float(starts[0]))
+        return repeated.split_at(np.append(start, within), float(starts[0]))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -333,16 +333,19 @@ class CombinedSignal(InputSignal):
 
     @property
     def names(self) -> tuple[str, ...] | None:
-        other = self.other.names
-        return None if other is None else (*(self.inner.names or ()), *other)
+        names_of_other = self.other.names
+        return None if names_of_other is None else (*(self.inner.names or ()), *names_of_other)
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        inner, other = (
+        inner_segments, other_segments = (
             signal.segments(inputs, start, duration) for signal in (self.inner, self.other)
         )
-        own = self.inner.names or ()
-        columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
-        return merge_columns(columns, start) if columns else other
+        named = self.inner.names or ()
+        columns = [
+            (inner_segments if name in named else other_segments).column(i)
+            for i, name in enumerate(inputs)
+        ]
+        return merge_columns(columns, start) if columns else other_segments
 
 
 ZERO_INPUT = Schedule({})

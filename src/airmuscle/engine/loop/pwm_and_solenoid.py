@@ -214,8 +214,8 @@ class WithDrivers(ShortRepr, InputSignal):
     def chains(self) -> dict[str, tuple[Driver, ...]]:
         """The drivers of each input, in the order of the signal."""
         return {
-            name: given if isinstance(given, tuple) else (given,)
-            for name, given in self.drivers.items()
+            name: chain if isinstance(chain, tuple) else (chain,)
+            for name, chain in self.drivers.items()
         }
 
     def init(self, start: float) -> dict[str, tuple[Any, ...]]:

@@ -34,8 +34,8 @@ class SampledSignal(InputSignal):
 
     def __post_init__(self) -> None:
         check_mapping("sampled signal", self.points)
-        for name, given in self.points.items():
-            if not as_pairs("sampled signal", "times", name, given):
+        for name, points in self.points.items():
+            if not as_pairs("sampled signal", "times", name, points):
                 raise ParameterError(
                     f"the sampled signal of '{name}' has no points; write pairs of time [s] and"
                     " value."

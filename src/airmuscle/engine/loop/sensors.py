@@ -87,7 +87,7 @@ class ColumnSensor(SignalRelated):
         moved = [*waiting[1:], read]
         return waiting[0], {
             "lagged": lagged,
-            **{f"delayed{i}": each for i, each in enumerate(moved)},
+            **{f"delayed{i}": value_in_line for i, value_in_line in enumerate(moved)},
         }
 
 
@@ -207,17 +207,17 @@ class WithSensors(EnclosingLaw):
         """The measured columns behind their sensors, and the memory of sensors and generator."""
         started = memory["started"]
         fresh = seeded(self.seed)
-        kept = select_prefix("random.", memory)
+        stored = select_prefix("random.", memory)
         random: dict[str, Value] = {
-            name: ops.where(started > 0, kept[name], fresh[name]) for name in STATE
+            name: ops.where(started > 0, stored[name], fresh[name]) for name in STATE
         }
         columns = dict(measured)
         later = {"started": 1.0}
         for sensor in self.sensors:
             deviate, random = drawn_normal(random)
-            own = select_prefix(f"sensor.{sensor.column}.", memory)
+            sensor_memory = select_prefix(f"sensor.{sensor.column}.", memory)
             columns[sensor.column], after = sensor.measure(
-                own, columns[sensor.column], deviate, started, dt
+                sensor_memory, columns[sensor.column], deviate, started, dt
             )
             later |= with_prefix(f"sensor.{sensor.column}.", after)
         return columns, {**later, **with_prefix("random.", random)}

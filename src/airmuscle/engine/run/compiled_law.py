@@ -68,7 +68,7 @@ class LawSample:
         """The commands of a sample and the memory after it, as `ControlLaw.step`."""
         columns, setpoints, ranges = measurement
         limits = [ranges.get(name, UNLIMITED) for name in self._inputs]
-        given = array.array(
+        buffer = array.array(
             "d",
             (
                 *[columns[name] for name in self._measured],
@@ -80,11 +80,11 @@ class LawSample:
                 *self._parameters,
             ),
         )
-        given.frombytes(bytes(8 * (self._ends[8] - self._ends[6])))
-        start = given.buffer_info()[0]
+        buffer.frombytes(bytes(8 * (self._ends[8] - self._ends[6])))
+        start = buffer.buffer_info()[0]
         self._call(*[start + offset for offset in self._offsets])
-        commands = dict(zip(self._inputs, given[self._ends[6] : self._ends[7]], strict=True))
-        return commands, tuple(given[self._ends[7] :])
+        commands = dict(zip(self._inputs, buffer[self._ends[6] : self._ends[7]], strict=True))
+        return commands, tuple(buffer[self._ends[7] :])
 
 
 def parameters_of(law: ControlLaw) -> Array:

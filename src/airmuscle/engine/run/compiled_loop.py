@@ -101,7 +101,9 @@ class CompiledRun:
         self._parameters = loop.parameters.copy() if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
         self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
-        self._columns = next(i for i, each in enumerate(arguments) if each is self._drivers.columns)
+        self._columns = next(
+            i for i, argument in enumerate(arguments) if argument is self._drivers.columns
+        )
         self._kernel = kernel.sampled_loop.bind(*arguments)
         self._controller = None if loop.law is not None else CalledController(loop.prepared)
         self._begin(initial_state, control_state)
@@ -284,8 +286,8 @@ class CompiledRun:
     def _extend(self) -> None:
         """Longer buffers for the segments and rows of driven inputs."""
         buffers = [
-            np.concatenate([each, np.empty_like(each)])
-            for each in (*self._segments, self._times, self._rows)
+            np.concatenate([buffer, np.empty_like(buffer)])
+            for buffer in (*self._segments, self._times, self._rows)
         ]
         *self._segments, self._times, self._rows = buffers
         for i, array in enumerate(buffers, self._first_buffer):

@@ -97,11 +97,11 @@ class BoundIntegrator:
         """Take the values of the same integrator at a system of the same structure with other
         parameters.
         """
-        for own, other in zip(
+        for bound_value, new_value in zip(
             self._bound_values, (*binding.leading, *binding.trailing), strict=True
         ):
-            if isinstance(own, np.ndarray):
-                own[...] = other
+            if isinstance(bound_value, np.ndarray):
+                bound_value[...] = new_value
 
     def run(
         self,

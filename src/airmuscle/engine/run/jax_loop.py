@@ -67,8 +67,8 @@ def loop_in_jax(
     prepared = prepare_loop(problem, loop.init(0.0))
     start = {state.name: jnp.asarray(float(initial_state[state.name])) for state in plant.states}
     rows = tuple(
-        jnp.asarray(each)
-        for each in (
+        jnp.asarray(table)
+        for table in (
             prepared.setpoint_values,
             _constant_inputs(prepared),
             _step_lengths(prepared, step),
@@ -100,16 +100,19 @@ def _interval(plant: System, law: ControlLaw, prepared: SampledLoop, carry: Any,
     state, memory, applied = carry
     setpoints, beside, steps = row
     ranges = prepared.ranges
-    given = dict(zip(prepared.input_names, beside, strict=True))
-    columns = {**plant.outputs(state, {**given, **applied}), **state}
+    constant = dict(zip(prepared.input_names, beside, strict=True))
+    columns = {**plant.outputs(state, {**constant, **applied}), **state}
     measured = {name: columns[name] for name in law.measured_columns}
     measurement = Measurement(measured, dict(zip(law.setpoints, setpoints, strict=True)), ranges)
     commands, later = law.step(memory, measurement, prepared.loop.sample_time)
-    held = {name: ops.clip(_number(commands[name]), *ranges[name]) for name in law.inputs}
+    applied_now = {name: ops.clip(_number(commands[name]), *ranges[name]) for name in law.inputs}
     after, _ = jax.lax.scan(
-        lambda x, h: (runge_kutta4(plant, x, {**given, **held}, h), None), state, steps
+        lambda x, h: (runge_kutta4(plant, x, {**constant, **applied_now}, h), None), state, steps
     )
-    return (after, {name: _number(later[name]) for name in memory}, held), (state, held)
+    return (after, {name: _number(later[name]) for name in memory}, applied_now), (
+        state,
+        applied_now,
+    )
 
 
 def _number(value: Any) -> Any:

@@ -95,7 +95,7 @@ def differentiate_loop(
             " begin and end at instants that move with the parameters; this is not differentiated."
             " Give a loop without drivers."
         )
-    groups = [(each,) if isinstance(each, str) else tuple(each) for each in columns]
+    groups = [(group,) if isinstance(group, str) else tuple(group) for group in columns]
     of_law = tuple(
         tuple(p[len(CONTROLLER) :] for p in group if p.startswith(CONTROLLER)) for group in groups
     )

@@ -88,10 +88,10 @@ class Problem(ShortRepr):
                     f" than the run of {self.duration:g} s. Shorten the sample time, or simulate"
                     " longer."
                 )
-            others = self.input.driven_inputs.checked_segments(
+            driven = self.input.driven_inputs.checked_segments(
                 known.input_names, self.start_time, self.duration
             )
-            check_input_range(self.compiled, others, self.start_time)
+            check_input_range(self.compiled, driven, self.start_time)
         else:
             check_input_signal(self.input)
             check_input_range(self.compiled, self.segments, self.start_time)
@@ -138,10 +138,10 @@ class Problem(ShortRepr):
         to."""
         known = self.compiled.description.cache
         segments = self.segments
-        given = self.output_times
-        asked = given, self.start_time, self.duration
-        kept, last_asked, last_times = known.checked_input
-        if segments is not kept or not (given is None or type(given) in NUMBERS):
+        requested = self.output_times
+        asked = requested, self.start_time, self.duration
+        last_segments, last_asked, last_times = known.checked_input
+        if segments is not last_segments or not (requested is None or type(requested) in NUMBERS):
             return output_times(*asked, segments.ends)
         times: Array = last_times if asked == last_asked else output_times(*asked, segments.ends)
         if times is not last_times and times.size <= MAX_KEPT_ROWS:
@@ -270,19 +270,19 @@ def _raise_for_input(compiled: CompiledSystem, column: int, value: float, when: 
 
 
 def output_times(
-    given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array
+    requested: float | npt.ArrayLike | None, start: float, duration: float, instants: Array
 ) -> Array:
     """The times [s] of the rows of a run, rising, with the instants of the inputs among them.
 
     given  spacing [s] or times [s]; by default 1/1000 of the run, but at most 10 ms
     """
     end = start + duration
-    if given is None:
-        given = min(duration / 1000, MAX_OUTPUT_STEP)
-    if isinstance(given, float | int) or not np.ndim(given):
-        spacing = as_float("simulate: output_times", given)
+    if requested is None:
+        requested = min(duration / 1000, MAX_OUTPUT_STEP)
+    if isinstance(requested, float | int) or not np.ndim(requested):
+        spacing = as_float("simulate: output_times", requested)
         return merge_output_times(_grid(spacing, start, duration), instants, duration)
-    grid = _times(given)
+    grid = _times(requested)
     if grid.size and not (grid[0] >= start and grid[-1] <= end):
         raise ParameterError(f"simulate: output_times must lie within {start:g} to {end:g} s.")
     return merge_output_times(grid, instants, duration)
@@ -305,20 +305,20 @@ def _grid(spacing: float, start: float, duration: float) -> Array:
     return grid
 
 
-def _times(given: Any) -> Array:
+def _times(instants: Any) -> Array:
     """Times [s] in rising order, each once, from a list of them."""
     try:
-        times = np.array(given, dtype=float)
+        times = np.array(instants, dtype=float)
     except (TypeError, ValueError):
         times = np.empty((0, 0))
     if times.ndim != 1:
         raise ParameterError(
-            f"simulate: output_times is {one_line(given)}; give a spacing [s] or a list of times"
+            f"simulate: output_times is {one_line(instants)}; give a spacing [s] or a list of times"
             " [s]."
         )
     if np.isnan(times).any():
         raise ParameterError(
-            f"simulate: output_times is {one_line(given)}; a time is not a number (NaN)."
+            f"simulate: output_times is {one_line(instants)}; a time is not a number (NaN)."
         )
     times = np.sort(times)
     return times[np.diff(times, prepend=-np.inf) > 0]

@@ -154,11 +154,11 @@ def form_of(problem: Problem) -> Hashable | None:
     loop = problem.input
     assert isinstance(loop, ControlLoop)
     law = loop.controller
-    given = problem.output_times
+    requested = problem.output_times
     signals = type(loop.setpoint) is Schedule and type(loop.other_inputs) is Schedule
     if not signals or problem.control_state is not None or not isinstance(law, ControlLaw):
         return None
-    if not (given is None or type(given) in (float, int)):
+    if not (requested is None or type(requested) in (float, int)):
         return None
     form = (
         tree.structure(law),
@@ -168,7 +168,7 @@ def form_of(problem: Problem) -> Hashable | None:
         loop.sample_time,
         problem.start_time,
         problem.duration,
-        given,
+        requested,
         problem.integrator,
     )
     try:
@@ -262,16 +262,16 @@ def _hold(
     x = plain_numbers(state, known.state_limits)
     if x is None:
         return None
-    held = [0.0] * len(known.input_names)
+    held_inputs = [0.0] * len(known.input_names)
     for name, value in inputs.items():
         column, (low, high) = known.input_limits.get(name, _NO_INPUT)
         if type(value) not in NUMBERS or not low <= value <= high:
             return None
-        held[column] = value
+        held_inputs[column] = value
     pool = known.cache.holders
     bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
     bound.state[:] = x
-    bound.held[:] = held
+    bound.held[:] = held_inputs
     status = bound.proceed(dt)
     final: list[float] = bound.state.tolist()
     pool.give_back(integrator, bound)

@@ -100,12 +100,12 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     _check_state(state, loop, len(names))
     edges, sampled = _edges(loop.sample_time, state, start, problem.end_time)
     close = CLOSE * loop.sample_time
-    others = snapped(loop.other_inputs, names, edges, close)
+    uncommanded = snapped(loop.other_inputs, names, edges, close)
     starts = edges[:-1]
-    changes = others.ends[:-1]
+    changes = uncommanded.ends[:-1]
     if not (starts[np.minimum(starts.searchsorted(changes), starts.size - 1)] == changes).all():
         starts = np.unique(np.concatenate([starts, changes]))
-    inputs = others.split_at(starts, start).as_floats()
+    inputs = uncommanded.split_at(starts, start).as_floats()
     commanded = [names.index(name) for name in loop.controller.inputs]
     for column in commanded:
         inputs.values[:, column] = inputs.slopes[:, column] = 0.0
@@ -213,8 +213,12 @@ def snapped(
     ends = np.where(np.abs(nearest - ends) <= close, nearest, ends)
     if ends[0] > start and (ends[1:] > ends[:-1]).all():
         return PiecewiseLinear(ends, segments.values, segments.slopes)
-    kept = ends > np.concatenate([edges[:1], ends[:-1]])
-    return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
+    is_after_previous = ends > np.concatenate([edges[:1], ends[:-1]])
+    return PiecewiseLinear(
+        ends[is_after_previous],
+        segments.values[is_after_previous],
+        segments.slopes[is_after_previous],
+    )
 
 
 class CalledController:
@@ -323,7 +327,12 @@ class DriverTable:
             [d.settings for _, d in self._order if isinstance(d, PWM | SolenoidDriver)]
         )
         self.kept = _table(
-            [tuple(one) for name in chains for one in state.drivers[name] if not called]
+            [
+                tuple(driver_state)
+                for name in chains
+                for driver_state in state.drivers[name]
+                if not called
+            ]
         )
         self.states, self._first = self.kept.copy(), self.kept.copy()
         self.columns, self.scratch = np.empty((m, 3, capacity)), np.empty((2, 3, capacity))

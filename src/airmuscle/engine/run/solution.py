@@ -150,12 +150,12 @@ def possible_rows(
     raw = raw._replace(reached=row, time=float(times[row]), state=raw.rows[row], status=status)
     inputs = table.inputs[:row]
     outputs = table.outputs[:row]
-    kept = (
+    columns_of_rows = (
         np.hstack([raw.rows[:row], outputs])
         if row
         else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
     )
-    columns = kept[:, known.ranged_columns]
+    columns = columns_of_rows[:, known.ranged_columns]
     return raw, RowTable(
         inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row
     )
@@ -290,13 +290,13 @@ class Solution(NotebookDisplay):
         After a list of output times the default spacing is used. Raises ParameterError for a
         duration <= 0.
         """
-        given = self.problem.output_times
+        requested = self.problem.output_times
         return dataclasses.replace(
             self.problem,
             duration=duration,
             initial_state=self.final_state,
             start_time=self.final_time,
-            output_times=given if isinstance(given, float | int) else None,
+            output_times=requested if isinstance(requested, float | int) else None,
             control_state=self.control_state,
         )
 
@@ -329,7 +329,7 @@ class Solution(NotebookDisplay):
         )
         notes = [
             f"{text}, final time {self.final_time:.4g} s",
-            *(each.message for each in self.diagnostics),
+            *(diagnostic.message for diagnostic in self.diagnostics),
         ]
         return dataclasses.replace(card, title=f"Solution: {card.title}", notes=notes)
 

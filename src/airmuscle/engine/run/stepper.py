@@ -145,9 +145,9 @@ class Stepper:
                 f"Stepper: dt is {one_line(dt)} s; it must be positive and finite."
             )
         if hasattr(inputs, "keys"):
-            given = inputs
+            named_inputs = inputs
             inputs = self.inputs.tolist()
-            for name, value in given.items():  # the others keep their present values
+            for name, value in named_inputs.items():  # the others keep their present values
                 if name not in self.input_names:
                     check_known("Stepper: no input", name, self.input_names)
                 inputs[self.input_names.index(name)] = value

@@ -28,6 +28,12 @@ BAR = 1e5
 """Pressure unit of the physical form [Pa]."""
 
 _INDEX = re.compile(r"\[\d+\]$")
+_POLYNOMIAL_KINDS = (
+    expression.ADD,
+    expression.NEGATIVE,
+    expression.PRODUCT,
+    expression.QUOTIENT,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,19 +128,26 @@ def _trace(
 ) -> _Traced | None:
     new = Expressions()
     points = tuple(new.symbol(ARGUMENTS[name].name) for name in arguments)
-    own = {new.symbol(f"parameter {leaf.path}"): leaf for leaf in leaves(law)}
-    value = traced_expression(law, quantity, new, points, list(own))
+    parameters: dict[Term, Leaf] = {}
+    bounds: dict[Term, Bounds] = {}
+    for leaf in leaves(law):
+        symbol = new.symbol(f"parameter {leaf.path}")
+        number = float(leaf.value)
+        parameters[symbol] = leaf
+        bounds[symbol] = (number, number)
+    value = traced_expression(law, quantity, new, points, list(parameters))
     if value is None:
         return None
-    known = {node: ranges[name] for node, name in zip(points, arguments, strict=True)}
-    values = {node: (float(leaf.value), float(leaf.value)) for node, leaf in own.items()}
+    for point, name in zip(points, arguments, strict=True):
+        bounds[point] = ranges[name]
 
     def complete(old: Term, arguments: list[Term]) -> Term:
         if old.kind == "if":  # a branch that has one side only is a choice between it and zero
             return new.apply(expression.WHERE, *arguments, new.number(0.0))
         return new.apply(old.kind, *arguments) if arguments else old
 
-    return _Traced(new, points, own, fold(within(value, new, known | values), complete))
+    reached = within(value, new, bounds)
+    return _Traced(new, points, parameters, fold(reached, complete))
 
 
 def _with_monomials(traced: _Traced) -> tuple[Term, dict[Term, tuple[int, ...]]]:
@@ -142,43 +155,44 @@ def _with_monomials(traced: _Traced) -> tuple[Term, dict[Term, tuple[int, ...]]]
     coefficient.
     """
     powers: dict[Term, tuple[int, ...]] = {}
-    shared = _shared(traced.value)
-    parts = [
-        n
-        for n in in_order(traced.value)
-        if n in shared and len(depends_on(n, traced.arguments)) == 1
-    ]
-    parts.sort(
-        key=lambda n: traced.arguments.index(depends_on(n, traced.arguments)[0]), reverse=True
-    )
-    atoms = [*parts, *reversed(traced.arguments)]
+    atoms = _atoms(traced)
+
+    def coefficients(node: Term) -> dict[expression.Monomial, Term] | None:
+        if node.kind not in _POLYNOMIAL_KINDS:
+            return None
+        polynomial = expand(node, {*atoms, *traced.parameters})
+        if polynomial is None:
+            return None
+        return expression.coefficients_by_monomial(polynomial, traced.parameters)
 
     def rewritten(node: Term) -> Term:
         if node in atoms or not node.arguments:
             return node
-        if node.kind in (
-            expression.ADD,
-            expression.NEGATIVE,
-            expression.PRODUCT,
-            expression.QUOTIENT,
-        ):
-            polynomial = expand(node, {*atoms, *traced.parameters})
-            terms = (
-                None
-                if polynomial is None
-                else expression.coefficients_by_monomial(polynomial, traced.parameters)
-            )
-            if terms is not None:
-                used = [atom for atom in atoms if any(atom in dict(monomial) for monomial in terms)]
-                powers.update(
-                    {c: tuple(dict(m).get(atom, 0) for atom in used) for m, c in terms.items()}
-                )
-                return assemble(terms, used, traced.new)
-        return traced.new.apply(node.kind, *(rewritten(each) for each in node.arguments))
+        terms = coefficients(node)
+        if terms is None:
+            arguments = [rewritten(argument) for argument in node.arguments]
+            return traced.new.apply(node.kind, *arguments)
+        used = [atom for atom in atoms if any(atom in dict(monomial) for monomial in terms)]
+        for monomial, coefficient in terms.items():
+            power_of = dict(monomial)
+            powers[coefficient] = tuple(power_of.get(atom, 0) for atom in used)
+        return assemble(terms, used, traced.new)
 
-    return (
-        rewritten(traced.value) if _operations(traced.value) <= MAX_OPERATIONS else traced.value
-    ), powers
+    if _operations(traced.value) > MAX_OPERATIONS:
+        return traced.value, powers
+    return rewritten(traced.value), powers
+
+
+def _atoms(traced: _Traced) -> list[Term]:
+    """What the monomials are powers of: the shared parts of one argument, then the arguments."""
+    shared = _shared(traced.value)
+    place_of_argument: dict[Term, int] = {}
+    for node in in_order(traced.value):
+        of = depends_on(node, traced.arguments) if node in shared else ()
+        if len(of) == 1:
+            place_of_argument[node] = traced.arguments.index(of[0])
+    parts = sorted(place_of_argument, key=lambda part: place_of_argument[part], reverse=True)
+    return [*parts, *reversed(traced.arguments)]
 
 
 def _operations(root: Term) -> int:
@@ -187,14 +201,18 @@ def _operations(root: Term) -> int:
 
 def _shared(root: Term) -> set[Term]:
     """The parts of an expression that occur repeatedly and are not short."""
-    uses = Counter(each for node in in_order(root) for each in node.arguments)
+    nodes = list(in_order(root))
+    uses = Counter(argument for node in nodes for argument in node.arguments)
     shared: set[Term] = set()
     cost: dict[Term, int] = {}
-    for node in in_order(root):
-        own = bool(node.arguments) and node.kind != expression.NEGATIVE
-        cost[node] = own + sum(0 if each in shared else cost[each] for each in set(node.arguments))
+    for node in nodes:
+        is_operation = bool(node.arguments) and node.kind != expression.NEGATIVE
+        repeated = set(node.arguments) - shared
+        cost[node] = is_operation + sum(cost[argument] for argument in repeated)
+        if uses[node] < 2 or node.kind in expression.COMPARISONS:
+            continue
         enough = MIN_SHARED_OPERATIONS if uses[node] == 2 else MIN_SHARED_OPERATIONS - 1
-        if uses[node] > 1 and cost[node] >= enough and node.kind not in expression.COMPARISONS:
+        if cost[node] >= enough:
             shared.add(node)
     return shared
 
@@ -204,12 +222,12 @@ def _long_sums(root: Term) -> set[Term]:
     product.
     """
     inner = (
-        each for node in in_order(root) for each in node.arguments[node.kind == expression.ADD :]
+        part for node in in_order(root) for part in node.arguments[node.kind == expression.ADD :]
     )
     return {
-        each
-        for each in inner
-        if each.kind == expression.ADD and len(summands(each)) > MAX_INNER_TERMS
+        part
+        for part in inner
+        if part.kind == expression.ADD and len(summands(part)) > MAX_INNER_TERMS
     }
 
 
@@ -219,26 +237,43 @@ def _labels(traced: _Traced, powers: Mapping[Term, tuple[int, ...]]) -> dict[Ter
     """
     lists: dict[str, list[Term]] = {}
     for node, leaf in traced.parameters.items():
-        lists.setdefault(_INDEX.sub("", leaf.path), []).append(node)
+        path_of_list = _INDEX.sub("", leaf.path)
+        lists.setdefault(path_of_list, []).append(node)
     names: dict[Term, str] = {}
     for nodes in lists.values():
         leaf = traced.parameters[nodes[0]]
-        base = re.sub(r"\W+", "_", leaf.declared.symbol).strip("_") or "c"
-        if not _INDEX.search(leaf.path):
+        base = _as_identifier(leaf.declared.symbol).strip("_") or "c"
+        if _INDEX.search(leaf.path):
+            base = re.sub(r"_(ij|i|j|k)$", "", base)
+            for node, index in zip(nodes, _indices(nodes, powers), strict=True):
+                names[node] = f"{base}_{index}"
+        else:
             names[nodes[0]] = base
-            continue
-        indices = ["".join(map(str, powers.get(node, ()))) for node in nodes]
-        if "" in indices or len(set(indices)) < len(indices):
-            indices = [str(i) for i in range(len(nodes))]
-        base = re.sub(r"_(ij|i|j|k)$", "", base)
-        names |= {node: f"{base}_{index}" for node, index in zip(nodes, indices, strict=True)}
     counts = Counter(names.values())
-    taken = {symbol.name for symbol in ARGUMENTS.values()} | {PRESSURE_IN_BAR.name}
+    taken = {symbol.name for symbol in ARGUMENTS.values()}
+    taken.add(PRESSURE_IN_BAR.name)
     for node, leaf in traced.parameters.items():
-        if counts[names[node]] > 1 or names[node] in taken:
-            owner = re.sub(r"\W+", "_", _INDEX.sub("", leaf.path).rpartition(".")[0]) or "law"
-            names[node] = f"{names[node]}_{owner}"
+        name = names[node]
+        if counts[name] > 1 or name in taken:
+            path_of_owner, _, _ = _INDEX.sub("", leaf.path).rpartition(".")
+            owner = _as_identifier(path_of_owner) or "law"
+            names[node] = f"{name}_{owner}"
     return names
+
+
+def _as_identifier(text: str) -> str:
+    return re.sub(r"\W+", "_", text)
+
+
+def _indices(coefficients: Sequence[Term], powers: Mapping[Term, tuple[int, ...]]) -> list[str]:
+    """The powers of the monomial of each coefficient; its number where these are not unique."""
+    indices = []
+    for coefficient in coefficients:
+        digits = map(str, powers.get(coefficient, ()))
+        indices.append("".join(digits))
+    if "" in indices or len(set(indices)) < len(indices):
+        return [str(number) for number in range(len(coefficients))]
+    return indices
 
 
 def _named(
@@ -252,13 +287,9 @@ def _named(
     new = traced.new
 
     def renamed(node: Term, inner: list[Term]) -> Term:
-        return (
-            new.apply(node.kind, *inner)
-            if inner
-            else new.symbol(labels[node])
-            if node in labels
-            else node
-        )
+        if inner:
+            return new.apply(node.kind, *inner)
+        return new.symbol(labels[node]) if node in labels else node
 
     root = fold(value, renamed)
     shared = _shared(root) | _long_sums(root)
@@ -284,11 +315,11 @@ def _part_names(
     names: dict[Term, str] = {}
     used = {name.partition("_")[0] for name in taken}
     for node in parts:
-        own = tuple(symbol.name for symbol in depends_on(node, arguments))
+        names_of_arguments = tuple(symbol.name for symbol in depends_on(node, arguments))
         letters = (
             _SUM_NAMES
             if len(summands(node)) > MAX_INNER_TERMS
-            else _PART_NAMES.get(own, _MIXED_PART_NAMES)
+            else _PART_NAMES.get(names_of_arguments, _MIXED_PART_NAMES)
         )
         base = next((letter for letter in letters if letter not in used), letters[0])
         tried = itertools.chain([base], (f"{base}_{number}" for number in itertools.count(2)))
@@ -310,29 +341,29 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
             return new.number(float(traced.parameters[node].value))
         if node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
             return new.product(new.number(BAR), bar)
-        return (
-            new.node(node.kind, *inner) if inner else node
-        )  # products and quotients of numbers are not evaluated
+        # products and quotients of numbers are not evaluated
+        return new.node(node.kind, *inner) if inner else node
 
-    points = [bar if node.name == "p" else node for node in traced.arguments][::-1]
+    points = [bar if node.name == "p" else node for node in reversed(traced.arguments)]
     count = 0
 
     def rewritten(node: Term) -> Term:
         nonlocal count
-        polynomial = expand(node, points) if node.arguments else None
-        if polynomial is not None:
-            count += 1
-            return assemble({m: new.number(float(c)) for m, c in polynomial.items()}, points, new)
-        return (
-            new.apply(node.kind, *(rewritten(each) for each in node.arguments))
-            if node.arguments
-            else node
-        )
+        if not node.arguments:
+            return node
+        polynomial = expand(node, points)
+        if polynomial is None:
+            return new.apply(node.kind, *map(rewritten, node.arguments))
+        count += 1
+        terms = {monomial: new.number(float(c)) for monomial, c in polynomial.items()}
+        return assemble(terms, points, new)
 
     value = rewritten(fold(traced.value, in_numbers))
     if not count:
         return None
-    symbols = tuple(PRESSURE_IN_BAR if each.unit == "Pa" else each for each in arguments)
+    symbols = tuple(
+        PRESSURE_IN_BAR if argument.unit == "Pa" else argument for argument in arguments
+    )
     names = _part_names([n for n in in_order(value) if n in _long_sums(value)], points, ())
     return LawEquation(
         "Physical form: numbers, with the pressure in bar", result, symbols, (), value, names

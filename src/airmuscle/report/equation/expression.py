@@ -75,7 +75,9 @@ def in_order(root: Term) -> Iterator[Term]:
         elif node not in seen:
             seen.add(node)
             stack.append((node, True))
-            stack += [(each, False) for each in reversed(node.arguments) if each not in seen]
+            stack += [
+                (argument, False) for argument in reversed(node.arguments) if argument not in seen
+            ]
 
 
 def fold(root: Term, combine: Callable[[Term, list[Result]], Result]) -> Result:
@@ -84,7 +86,7 @@ def fold(root: Term, combine: Callable[[Term, list[Result]], Result]) -> Result:
     """
     results: dict[Term, Result] = {}
     for node in in_order(root):
-        results[node] = combine(node, [results[each] for each in node.arguments])
+        results[node] = combine(node, [results[argument] for argument in node.arguments])
     return results[root]
 
 
@@ -126,12 +128,17 @@ class Expressions:
         """The sum a + b; the selection of one of two summands is one node."""
         if is_number(a) and is_number(b):
             return self.number(a.value + b.value)
-        if is_number(a, 0.0) or is_number(b, 0.0):
-            return b if is_number(a, 0.0) else a
+        if is_number(a, 0.0):
+            return b
+        if is_number(b, 0.0):
+            return a
         if self.negative(a) is b:
             return self.number(0.0)
-        if a.kind == b.kind == "if" and b.arguments[0] is self.negation(a.arguments[0]):
-            return self.where(a.arguments[0], a.arguments[1], b.arguments[1])
+        if a.kind == b.kind == "if":
+            condition, when_true = a.arguments
+            opposite, when_false = b.arguments
+            if opposite is self.negation(condition):
+                return self.where(condition, when_true, when_false)
         return self.node(ADD, a, b)
 
     def negative(self, a: Term) -> Term:
@@ -144,11 +151,13 @@ class Expressions:
         """The product a b; powers of one base are collected, and a sign is moved outside."""
         if is_number(a) and is_number(b):
             return self.number(a.value * b.value)
-        for one, other in ((a, b), (b, a)):
-            if is_number(one, 0.0) or is_number(one, 1.0):
-                return other if is_number(one, 1.0) else one
-            if one.kind == NEGATIVE or (is_number(one) and one.value < 0):
-                return self.negative(self.product(self.negative(one), other))
+        for factor, cofactor in ((a, b), (b, a)):
+            if is_number(factor, 0.0):
+                return factor
+            if is_number(factor, 1.0):
+                return cofactor
+            if factor.kind == NEGATIVE or (is_number(factor) and factor.value < 0):
+                return self.negative(self.product(self.negative(factor), cofactor))
         base, m = _as_power(a)
         other_base, n = _as_power(b)
         if base is other_base:
@@ -212,7 +221,9 @@ class Expressions:
         if kind == "if" and is_number(arguments[0]):
             return arguments[1] if arguments[0].value != 0.0 else self.number(0.0)
         if kind in COMPARISONS and all(map(is_number, arguments)):
-            return self.number(float(getattr(operator, kind)(*(each.value for each in arguments))))
+            compare = getattr(operator, kind)
+            values = [argument.value for argument in arguments]
+            return self.number(float(compare(*values)))
         return self.node(kind, *arguments)
 
 
@@ -231,6 +242,8 @@ MIN_TERMS = 4
 """Maximum number of monomials of an expanded polynomial, minimum one with its coefficients as
 symbols (chosen).
 """
+MAX_EXPONENT = 20
+"""Largest exponent of a power that is expanded (chosen)."""
 Monomial = tuple[tuple[Term, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
@@ -251,8 +264,8 @@ def expand(root: Term, atoms: Collection[Term]) -> Polynomial | None:
             or inner[-1] is None
         ):
             return None
-        found = _combined(node.kind, inner[0], inner[-1])
-        return found if found is None or len(found) <= MAX_TERMS else None
+        combined = _combined(node.kind, inner[0], inner[-1])
+        return combined if combined is None or len(combined) <= MAX_TERMS else None
 
     return fold(root, expanded)
 
@@ -261,34 +274,56 @@ def _combined(kind: str, first: Polynomial, last: Polynomial) -> Polynomial | No
     """The result of an operation without monomials that cancel; None if it is no polynomial, or is
     too long.
     """
-    number = last[()] if set(last) == {()} else None
     if kind == ADD:
-        sums = {
-            monomial: first.get(monomial, 0) + last.get(monomial, 0)
-            for monomial in {**first, **last}
-        }
-        return {monomial: Fraction(c) for monomial, c in sums.items() if c}
+        return _sum(first, last)
     if kind == NEGATIVE:
         return {monomial: -c for monomial, c in first.items()}
     if kind == PRODUCT:
-        total: defaultdict[Monomial, Fraction] = defaultdict(Fraction)
-        for (m, c), (n, d) in itertools.product(first.items(), last.items()):
-            powers = (Counter(dict(m)) + Counter(dict(n))).items()
-            total[
-                tuple(sorted(powers, key=lambda item: (str(item[0].value or ""), id(item[0]))))
-            ] += c * d
-        return {monomial: c for monomial, c in total.items() if c}
-    if number is not None and kind == QUOTIENT:
-        return {monomial: c / number for monomial, c in first.items()}
-    if number is None or number.denominator != 1 or not 0 < number <= 20:
+        return _product(first, last)
+    number = last[()] if set(last) == {()} else None
+    if number is None:
         return None
-    result: Polynomial | None = {(): Fraction(1)}
-    for _ in range(int(number)):
-        result = (
-            _combined(PRODUCT, result, first)
-            if result is not None and len(result) <= MAX_TERMS
-            else None
-        )
+    if kind == QUOTIENT:
+        return {monomial: c / number for monomial, c in first.items()}
+    return _power(first, number)
+
+
+def _sum(first: Polynomial, last: Polynomial) -> Polynomial:
+    total = dict(first)
+    for monomial, coefficient in last.items():
+        total[monomial] = total.get(monomial, Fraction(0)) + coefficient
+    return _without_zeros(total)
+
+
+def _product(first: Polynomial, last: Polynomial) -> Polynomial:
+    total: defaultdict[Monomial, Fraction] = defaultdict(Fraction)
+    pairs = itertools.product(first.items(), last.items())
+    for (monomial, coefficient), (cofactor, factor) in pairs:
+        powers = Counter(dict(monomial))
+        powers += Counter(dict(cofactor))
+        in_one_order = sorted(powers.items(), key=_place_in_monomial)
+        total[tuple(in_one_order)] += coefficient * factor
+    return _without_zeros(total)
+
+
+def _without_zeros(polynomial: Polynomial) -> Polynomial:
+    return {monomial: c for monomial, c in polynomial.items() if c}
+
+
+def _place_in_monomial(power: tuple[Term, int]) -> tuple[str, int]:
+    """By name; parts, which have none, in any order that is the same in all monomials."""
+    atom, _ = power
+    return str(atom.value or ""), id(atom)
+
+
+def _power(base: Polynomial, exponent: Fraction) -> Polynomial | None:
+    if exponent.denominator != 1 or not 0 < exponent <= MAX_EXPONENT:
+        return None
+    result: Polynomial = {(): Fraction(1)}
+    for _ in range(int(exponent)):
+        if len(result) > MAX_TERMS:
+            return None
+        result = _product(result, base)
     return result
 
 
@@ -300,11 +335,11 @@ def coefficients_by_monomial(
     """
     result: dict[Monomial, Term] = {}
     for monomial, factor in polynomial.items():
-        own = [(node, power) for node, power in monomial if node in parameters]
+        coefficients = [(node, power) for node, power in monomial if node in parameters]
         rest = tuple((node, power) for node, power in monomial if node not in parameters)
-        if factor != 1 or len(own) != 1 or own[0][1] != 1 or rest in result:
+        if factor != 1 or len(coefficients) != 1 or coefficients[0][1] != 1 or rest in result:
             return None
-        result[rest] = own[0][0]
+        result[rest] = coefficients[0][0]
     if len(set(result.values())) < len(result) or len(result) < MIN_TERMS:
         return None
     return result

@@ -107,9 +107,9 @@ def within(root: Term, new: Expressions, ranges: Mapping[Term, Bounds]) -> Term:
 
     def rebuild(old: Term, arguments: list[Term]) -> Term:
         node = new.apply(old.kind, *arguments) if arguments else old
-        for each in in_order(node):
-            if each not in bounds:
-                bounds[each] = _bounds_of(each, bounds, ranges)
+        for part in in_order(node):
+            if part not in bounds:
+                bounds[part] = _bounds_of(part, bounds, ranges)
         return _reduced(node, new, bounds)
 
     return fold(root, rebuild)
@@ -122,16 +122,28 @@ def _reduced(node: Term, new: Expressions, bounds: Mapping[Term, Bounds]) -> Ter
             if _at_most(bounds[low], bounds[high]):
                 return high if node.kind == MAXIMUM else low
     if node.kind in COMPARISONS:
-        a, b = (bounds[each] for each in node.arguments)
-        apart = a[1] < b[0] or a[0] > b[1]
-        always, never = {
-            "lt": (a[1] < b[0], a[0] >= b[1]),
-            "le": (a[1] <= b[0], a[0] > b[1]),
-            "eq": (False, apart),
-            "ne": (apart, False),
-        }[node.kind]
-        return new.number(float(always)) if always or never else node
+        left, right = (bounds[argument] for argument in node.arguments)
+        always, never = _decided(node.kind, left, right)
+        if always or never:
+            return new.number(float(always))
     return node
+
+
+def _decided(kind: str, left: Bounds, right: Bounds) -> tuple[bool, bool]:
+    """Whether a comparison holds for all values within these bounds, and whether for none."""
+    low, high = left
+    least, greatest = right
+    apart = high < least or low > greatest
+    match kind:
+        case "lt":
+            return high < least, low >= greatest
+        case "le":
+            return high <= least, low > greatest
+        case "eq":
+            return False, apart
+        case "ne":
+            return apart, False
+    raise ValueError(f"{kind} is no comparison")
 
 
 def _at_most(low: Bounds, high: Bounds) -> bool:
@@ -147,25 +159,38 @@ def _bounds_of(node: Term, bounds: Mapping[Term, Bounds], ranges: Mapping[Term, 
         return node.value, node.value
     if not node.arguments:
         return ranges.get(node, UNKNOWN)
-    sides = [bounds[each] for each in node.arguments]
+    sides = [bounds[argument] for argument in node.arguments]
     low, high = sides[0]
-    last = sides[-1]
     if node.kind == expression.WHERE:
-        return min(sides[1][0], last[0]), max(sides[1][1], last[1])
+        _, when_true, when_false = sides
+        return min(when_true[0], when_false[0]), max(when_true[1], when_false[1])
     if node.kind in ("sin", "cos") and low < high:
         return -1.0, 1.0
-    defined = {
-        "div": last[0] > 0 or last[1] < 0,
-        "sqrt": low > 0,
-        "log": low > 0,
-        "tan": -0.5 * math.pi < low and high < 0.5 * math.pi,
-        "pow": is_number(node.arguments[-1]) and last[0] > 0 and (low >= 0 or last[0] % 1 == 0),
-    }
-    if not defined.get(node.kind, node.kind in _MONOTONE):
+    if not _is_monotone(node, sides):
         return UNKNOWN
+    operation = _MONOTONE[node.kind]
     try:
-        values = [_MONOTONE[node.kind](*ends) for ends in itertools.product(*sides)]
+        values = [operation(*ends) for ends in itertools.product(*sides)]
     except (OverflowError, ValueError, ZeroDivisionError):
         return UNKNOWN
-    zero = [0.0] if low < 0 < high and node.kind in ("abs", POWER) else []
-    return UNKNOWN if any(map(math.isnan, values)) else (min(values + zero), max(values + zero))
+    if any(map(math.isnan, values)):
+        return UNKNOWN
+    if low < 0 < high and node.kind in ("abs", POWER):
+        values.append(0.0)
+    return min(values), max(values)
+
+
+def _is_monotone(node: Term, sides: Sequence[Bounds]) -> bool:
+    """Whether an operation has its extrema at the ends of the bounds of its arguments, or at 0."""
+    low, high = sides[0]
+    least, greatest = sides[-1]
+    match node.kind:
+        case "div":
+            return least > 0 or greatest < 0
+        case "sqrt" | "log":
+            return low > 0
+        case "tan":
+            return -0.5 * math.pi < low and high < 0.5 * math.pi
+        case "pow":
+            return is_number(node.arguments[-1]) and least > 0 and (low >= 0 or least % 1 == 0)
+    return node.kind in _MONOTONE

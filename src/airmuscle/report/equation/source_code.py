@@ -53,34 +53,27 @@ class Notation:
             case "symbol":
                 return self._names.get(node, node.name), ATOM
             case "add":
-                left, right = texts
-                return (
-                    f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}"
-                ), SUM
+                return _sum_text(*texts), SUM
             case "neg":
                 return f"-{self._bound(inner[0], TERM)}", SUM
             case "mul":
                 strength = TERM if node.arguments[1].kind == "mul" else BASE
-                return (
-                    self._product(
-                        node, self._bound(inner[0], TERM), self._bound(inner[1], strength)
-                    ),
-                    TERM,
-                )
+                left = self._bound(inner[0], TERM)
+                right = self._bound(inner[1], strength)
+                return self._product(node, left, right), TERM
             case "div":
                 return self._quotient(node, inner)
             case "pow" if POWER not in self.functions:
                 return self._power(node, inner)
             case "where":
                 return self.choice.format(*texts), ATOM
-        if node.kind in self.relations:
-            return f"({texts[0]} {self.relations[node.kind]} {texts[1]})", ATOM
-        if node.kind in self.logical:
-            sign = self.logical[node.kind]
-            return (
-                f"({sign}{texts[0]})" if node.kind == "not" else f"({texts[0]} {sign} {texts[1]})"
-            ), ATOM
-        return self._call(self.functions.get(node.kind, node.kind), texts), ATOM
+        sign = self.relations.get(node.kind) or self.logical.get(node.kind)
+        if sign is None:
+            function = self.functions.get(node.kind, node.kind)
+            return self._call(function, texts), ATOM
+        if node.kind == "not":
+            return f"({sign}{texts[0]})", ATOM
+        return f"({texts[0]} {sign} {texts[1]})", ATOM
 
     def _bound(self, inner: tuple[str, int], strength: int) -> str:
         return inner[0] if inner[1] >= strength else self.parentheses.format(inner[0])
@@ -89,15 +82,15 @@ class Notation:
         return f"{left}{self._dot(*node.arguments)}*{right}"
 
     def _quotient(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return (
-            (
-                f"{self._bound(inner[0], TERM)}{self._dot(node.arguments[1])}/{self._bound(inner[1], BASE)}"  # noqa: E501
-            ),
-            TERM,
-        )
+        numerator = self._bound(inner[0], TERM)
+        denominator = self._bound(inner[1], BASE)
+        dot = self._dot(node.arguments[1])
+        return f"{numerator}{dot}/{denominator}", TERM
 
     def _power(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return f"{self._bound(inner[0], ATOM)}{self._dot(node)}^{self._bound(inner[1], ATOM)}", BASE
+        base = self._bound(inner[0], ATOM)
+        exponent = self._bound(inner[1], ATOM)
+        return f"{base}{self._dot(node)}^{exponent}", BASE
 
     def _dot(self, *operands: Term) -> str:
         """The sign of an operation on each element of arrays; empty where one of the operands is a
@@ -111,6 +104,10 @@ class Notation:
     def number(self, value: float) -> str:
         """A number with all its digits."""
         return repr(value)
+
+
+def _sum_text(left: str, right: str) -> str:
+    return f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}"
 
 
 class C(Notation):
@@ -136,7 +133,11 @@ class Matlab(Notation):
         return "pi" if value == math.pi else repr(value).removesuffix(".0")
 
     def _dot(self, *operands: Term) -> str:
-        return "." if all(self._arguments.intersection(in_order(each)) for each in operands) else ""
+        return (
+            "."
+            if all(self._arguments.intersection(in_order(operand)) for operand in operands)
+            else ""
+        )
 
 
 class Excel(Notation):
@@ -196,14 +197,14 @@ class Latex(Notation):
     def _write(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
         if node.kind == "symbol" and node not in self._names:
             return latex_symbol(node.name), ATOM
-        if node.kind == "number" and (
-            "cdot" in self.number(node.value) or r"\," in self.number(node.value)
-        ):
-            return self.number(node.value), TERM if node.value > 0 else SUM
-        if node.kind == "sqrt":
-            return rf"\sqrt{{{inner[0][0]}}}", ATOM
-        if node.kind == "abs":
-            return rf"\left|{inner[0][0]}\right|", ATOM
+        if node.kind == "number":
+            number = self.number(node.value)
+            if "cdot" in number or r"\," in number:
+                return number, TERM if node.value > 0 else SUM
+        if node.kind in ("sqrt", "abs"):
+            [(text, _)] = inner
+            root = rf"\sqrt{{{text}}}"
+            return root if node.kind == "sqrt" else rf"\left|{text}\right|", ATOM
         return super()._write(node, inner)
 
     def _product(self, node: Term, left: str, right: str) -> str:
@@ -255,16 +256,16 @@ def latex_source(equation: LawEquation, validity: str) -> str:
     """The equation and the values of its parameters in LaTeX (amsmath), with all digits."""
     notation = Latex(equation.part_nodes)
     lines = _latex_rows(equation, notation)
-    for each in equation.parameters:
-        unit = "" if each.unit == "1" else rf"\,\mathrm{{{each.unit.replace('^', '')}}}"
-        lines.append(rf"{latex_symbol(each.name)} &= {notation.number(each.value)}{unit}")
+    for parameter in equation.parameters:
+        unit = "" if parameter.unit == "1" else rf"\,\mathrm{{{parameter.unit.replace('^', '')}}}"
+        lines.append(rf"{latex_symbol(parameter.name)} &= {notation.number(parameter.value)}{unit}")
     head = f"% {_signature(equation)}. {validity}\n\\begin{{align*}}\n"
     return head + " \\\\\n".join(lines) + "\n\\end{align*}"
 
 
 def matlab_source(equation: LawEquation, validity: str) -> str:
     """The equation as a MATLAB function of arrays."""
-    names = [each.name for each in equation.arguments]
+    names = [symbol.name for symbol in equation.arguments]
     result = equation.result
     notation = Matlab(
         equation.part_nodes, {node for node in _symbols(equation) if node.name in names}
@@ -274,8 +275,9 @@ def matlab_source(equation: LawEquation, validity: str) -> str:
             f"function {result.name} = muscle_{result.meaning.split()[-1]}({', '.join(names)})",
             f"% {_signature(equation)}. {validity}",
             *(
-                f"{each.name} = {notation.number(each.value)};  % [{each.unit}] {each.meaning}"
-                for each in equation.parameters
+                f"{parameter.name} = {notation.number(parameter.value)};"
+                f"  % [{parameter.unit}] {parameter.meaning}"
+                for parameter in equation.parameters
             ),
             *(
                 f"{part.name} = {notation.text(node, definition=True)};"
@@ -290,7 +292,7 @@ def matlab_source(equation: LawEquation, validity: str) -> str:
 def c_source(equation: LawEquation, validity: str) -> str:
     """The equation as a C function."""
     notation = C(equation.part_nodes)
-    arguments = ", ".join(f"double {each.name}" for each in equation.arguments)
+    arguments = ", ".join(f"double {symbol.name}" for symbol in equation.arguments)
     return "\n".join(
         [
             "#include <math.h>",
@@ -299,9 +301,9 @@ def c_source(equation: LawEquation, validity: str) -> str:
             f"double muscle_{equation.result.meaning.split()[-1]}({arguments})",
             "{",
             *(
-                f"    const double {each.name} = {notation.number(each.value)}; /* [{each.unit}]"
-                f" {each.meaning} */"
-                for each in equation.parameters
+                f"    const double {parameter.name} = {notation.number(parameter.value)};"
+                f" /* [{parameter.unit}] {parameter.meaning} */"
+                for parameter in equation.parameters
             ),
             *(
                 f"    const double {part.name} = {notation.text(node, definition=True)};"
@@ -317,22 +319,22 @@ def excel_source(equation: LawEquation) -> str:
     """The equation as two rows of a worksheet for cell A1, with tabulators: headers, then example
     and formulas.
     """
-    cells = {each.name: f"{chr(ord('A') + i)}2" for i, each in enumerate(equation.arguments)}
+    cells = {symbol.name: f"{chr(ord('A') + i)}2" for i, symbol in enumerate(equation.arguments)}
     for part, _ in equation.parts:
         cells[part.name] = f"{chr(ord('A') + len(cells))}2"
     texts = Excel({}).number
-    values = {each.name: texts(each.value) for each in equation.parameters}
+    values = {parameter.name: texts(parameter.value) for parameter in equation.parameters}
     names: dict[Term, str] = {node: cells[part.name] for part, node in equation.parts}
     for node in _symbols(equation):
         text = cells.get(node.name) or values[node.name]
         names[node] = f"({text})" if text.startswith("-") else text
     notation = Excel(names)
     headers = [
-        _headed(each)
-        for each in (*equation.arguments, *(part for part, _ in equation.parts), equation.result)
+        _headed(symbol)
+        for symbol in (*equation.arguments, *(part for part, _ in equation.parts), equation.result)
     ]
     formulas = [f"={notation.text(node, definition=True)}" for _, node in equation.parts]
-    examples = [texts(EXAMPLE[each.name]) for each in equation.arguments]
+    examples = [texts(EXAMPLE[symbol.name]) for symbol in equation.arguments]
     return (
         "\t".join(headers)
         + "\n"
@@ -348,10 +350,10 @@ def _latex_rows(equation: LawEquation, notation: Latex) -> list[str]:
         terms = summands(node) if is_part or node not in equation.part_nodes else [node]
         lines = [notation.text(node, definition=is_part)]
         if len(terms) > TERMS_PER_LINE:
-            first, *others = map(notation.text, terms)
+            first, *further = map(notation.text, terms)
             signed = [
                 first,
-                *(f"- {text[1:]}" if text.startswith("-") else f"+ {text}" for text in others),
+                *(f"- {text[1:]}" if text.startswith("-") else f"+ {text}" for text in further),
             ]
             lines = [
                 " ".join(signed[i : i + TERMS_PER_LINE])
@@ -368,7 +370,7 @@ def _symbols(equation: LawEquation) -> set[Term]:
 
 def _signature(equation: LawEquation) -> str:
     result, *sources = (
-        f"{each.meaning} {_headed(each)}" for each in (equation.result, *equation.arguments)
+        f"{symbol.meaning} {_headed(symbol)}" for symbol in (equation.result, *equation.arguments)
     )
     text = f"{result} from {' and '.join(sources)}"
     return text[0].upper() + text[1:]

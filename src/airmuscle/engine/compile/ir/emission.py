@@ -136,25 +136,25 @@ class FunctionBlock(abc.ABC):
             return self.arithmetic(_ARITHMETIC[operation], x[0], x[-1])
         if operation in _FUNCTIONS:
             return self.call(_FUNCTIONS[operation], x)
-        one = self.constant(1.0)
+        unity = self.constant(1.0)
         zero = self.constant(0.0)
         if operation in _COMPARISONS:
-            return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
+            return self.choose(_COMPARISONS[operation], x[0], x[1], unity, zero)
         if operation in _EXTREMES:
             return self.choose(_EXTREMES[operation], x[0], x[1], x[0], x[1])
         match operation:
             case Operation.NEGATE:
                 return self.negative(x[0])
             case Operation.INVERSE:
-                return self.arithmetic("/", one, x[0])
+                return self.arithmetic("/", unity, x[0])
             case Operation.SIGN:
                 return self.sign(x[0])
             case Operation.NOT:
-                return self.choose("==", x[0], zero, one, zero)
+                return self.choose("==", x[0], zero, unity, zero)
             case Operation.AND:
                 return self.logical("*", x[0], x[1])
             case Operation.OR:
-                return self.choose("!=", self.logical("+", x[0], x[1]), zero, one, zero)
+                return self.choose("!=", self.logical("+", x[0], x[1]), zero, unity, zero)
             case Operation.MASK | Operation.SELECT:
                 return self.choose(
                     "!=", x[0], zero, x[1], x[2] if operation == Operation.SELECT else zero
@@ -209,20 +209,20 @@ def computed(
     block: FunctionBlock,
     code: Code,
     inputs: Sequence[str],
-    held: Mapping[Operand, int] | None = None,
+    precomputed: Mapping[Operand, int] | None = None,
 ) -> dict[tuple[int, int], str]:
     """Append code to a block; the names of its results by output and index. Other arguments as of
     `Emission`.
     """
-    emission = Emission(block, inputs, held or {}, {})
-    emission.run(with_gates(code, inputs, held or {}))
+    emission = Emission(block, inputs, precomputed or {}, {})
+    emission.run(with_gates(code, inputs, precomputed or {}))
     return {(o, i): emission.value_of(operand) for o, i, operand in code.outputs}
 
 
 def with_gates(
     code: Code,
     inputs: Sequence[str],
-    held: Mapping[Operand, int],
+    precomputed: Mapping[Operand, int],
     early: frozenset[Operand] = frozenset(),
 ) -> list[Item]:
     """The instructions of `code`, with those that a zero factor or an inactive clamp makes
@@ -230,7 +230,7 @@ def with_gates(
     """
 
     def level(operand: Operand) -> int:
-        return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
+        return STEADY if operand in precomputed else LEVEL.get(inputs[operand[1]], VARYING)
 
     return skipping(code, level, early)
 
@@ -238,7 +238,7 @@ def with_gates(
 class Emission:
     """Instructions appended to a block, and the names of their results, `values`.
 
-    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given`
+    `inputs` are the names of the arrays, `precomputed` the indices of operands in `c`, `values`
     the names of known values.
     """
 
@@ -246,10 +246,10 @@ class Emission:
         self,
         block: FunctionBlock,
         inputs: Sequence[str],
-        held: Mapping[Operand, int],
-        given: Mapping[Operand, str],
+        precomputed: Mapping[Operand, int],
+        values: Mapping[Operand, str],
     ) -> None:
-        self.block, self.inputs, self.held, self.values = block, inputs, held, dict(given)
+        self.block, self.inputs, self.held, self.values = block, inputs, precomputed, dict(values)
 
     def run(self, body: Iterable[Item]) -> dict[Operand, str]:
         """Append instructions and conditional blocks; the names of all values."""

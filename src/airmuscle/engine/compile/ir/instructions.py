@@ -106,12 +106,17 @@ def _selects(body: Sequence[Instruction]) -> list[Instruction]:
     chosen = []
     for line in body:
         masks = [
-            found for a in line.arguments if line.operation == Operation.ADD and (found := mask(a))
+            masked
+            for a in line.arguments
+            if line.operation == Operation.ADD and (masked := mask(a))
         ]
-        for one, other in (masks, masks[::-1]) if len(masks) == 2 else ():
-            if line.operation == Operation.ADD and negated(other.arguments[0]) == one.arguments[0]:
+        for mask_line, complement in (masks, masks[::-1]) if len(masks) == 2 else ():
+            if (
+                line.operation == Operation.ADD
+                and negated(complement.arguments[0]) == mask_line.arguments[0]
+            ):
                 line = Instruction(
-                    Operation.SELECT, line.result, (*one.arguments, other.arguments[1])
+                    Operation.SELECT, line.result, (*mask_line.arguments, complement.arguments[1])
                 )
         chosen.append(line)
     return chosen
@@ -145,9 +150,9 @@ def _extreme_of_zero(
         or number not in product.arguments
     ):
         return [line]
-    other = product.arguments[product.arguments[0] == number]
+    factor = product.arguments[product.arguments[0] == number]
     extreme = Instruction(extreme.operation, ("t", "extreme of", line.result), pair)
-    return [extreme, Instruction(Operation.MULTIPLY, line.result, (extreme.result, other))]
+    return [extreme, Instruction(Operation.MULTIPLY, line.result, (extreme.result, factor))]
 
 
 def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
@@ -166,12 +171,12 @@ def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Ins
 
 def _without_unused(body: list[Instruction], outputs: tuple[tuple[int, int, Operand], ...]) -> Code:
     needed = {operand for _, _, operand in outputs}
-    kept = []
+    used = []
     for line in reversed(body):
         if line.result in needed:
-            kept.append(line)
+            used.append(line)
             needed.update(line.arguments)
-    return Code(tuple(reversed(kept)), outputs)
+    return Code(tuple(reversed(used)), outputs)
 
 
 def hoisted(
@@ -210,5 +215,5 @@ def hoisted(
     used = [a for line in always for a in line.arguments] + [
         operand for _, _, operand in code.outputs
     ]
-    handed = tuple(dict.fromkeys(a for a in used if a[0] != "c" and not depends(a)))
-    return Code(tuple(always), code.outputs), tuple(once), handed
+    constants = tuple(dict.fromkeys(a for a in used if a[0] != "c" and not depends(a)))
+    return Code(tuple(always), code.outputs), tuple(once), constants

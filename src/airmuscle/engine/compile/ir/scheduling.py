@@ -159,41 +159,41 @@ class _Pieces:
         """The pieces that are executable completely; if there are none, the executable part of the
         first one.
         """
-        whole = [
+        executable = [
             (piece, lines) for piece, lines in pieces.items() if self._is_executable(piece, lines)
         ]
-        parts = whole or [
+        parts = executable or [
             (piece, part) for piece, lines in pieces.items() if (part := self._part(piece, lines))
         ]
         parts.sort(key=lambda entry: self._place[entry[1][0].result])
-        return whole or parts[:1]
+        return executable or parts[:1]
 
     def _is_executable(self, piece: _Piece, lines: Sequence[Instruction]) -> bool:
         """Whether all instructions of a piece can be executed now."""
         if self._blockers.get(piece) in self._pending:
             return False
-        own: set[Operand] = set()
+        computed: set[Operand] = set()
         for line in lines:
             for operand in (
                 *piece[0],
                 self._instead(line),
-                *(a for a in line.arguments if a not in own),
+                *(a for a in line.arguments if a not in computed),
             ):
                 if operand in self._pending:
                     self._blockers[piece] = operand
                     return False
-            own.add(line.result)
+            computed.add(line.result)
         return True
 
     def _part(self, piece: _Piece, lines: Sequence[Instruction]) -> list[Instruction]:
         """The instructions of a piece that can be executed now."""
-        own: set[Operand] = set()
+        computed: set[Operand] = set()
         part = []
         for line in lines:
             if self._pending.isdisjoint(
-                (*piece[0], self._instead(line), *(a for a in line.arguments if a not in own))
+                (*piece[0], self._instead(line), *(a for a in line.arguments if a not in computed))
             ):
-                own.add(line.result)
+                computed.add(line.result)
                 part.append(line)
         return part
 
@@ -205,9 +205,10 @@ class _Pieces:
         """The results of a block that other instructions use, with their values if the block is
         skipped.
         """
-        own = {line.result for line in body}
+        results = {line.result for line in body}
         return tuple(
             (line.result, self._apart.instead.get(line.result, ZERO))
             for line in body
-            if line.result in self._wanted or not own.issuperset(self._users.get(line.result, ()))
+            if line.result in self._wanted
+            or not results.issuperset(self._users.get(line.result, ()))
         )

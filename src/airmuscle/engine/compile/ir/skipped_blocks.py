@@ -218,9 +218,9 @@ class _Search:
         return known
 
     def _superfluous(
-        self, known: Mapping[Operand, Operand], kept: set[Operand]
+        self, known: Mapping[Operand, Operand], needed: set[Operand]
     ) -> tuple[set[Operand], dict[Operand, Operand]]:
-        """Redundant results, none of `kept`, given the known ones; the known values of those that
+        """Redundant results, none of `needed`, given the known ones; the known values of those that
         others use.
         """
         times: dict[Operand, int] = {}
@@ -230,13 +230,13 @@ class _Search:
             if operand not in times:
                 times[operand] = (
                     len(self._users.get(operand, ()))
-                    + (operand in kept)
+                    + (operand in needed)
                     + (operand in self._outputs)
                 )
             times[operand] += more
             return times[operand]
 
-        named = {o: v for o, v in known.items() if o not in kept and self._worth_naming(o, v)}
+        named = {o: v for o, v in known.items() if o not in needed and self._worth_naming(o, v)}
         for value in named.values():
             asked(value, 1)
         superfluous: set[Operand] = set()
@@ -271,9 +271,9 @@ def _value(operation: Operation, x: Sequence[Operand]) -> Operand | None:
     else None.
     """
     zero = ZERO in x
-    one = ONE in x
+    unity = ONE in x
     if operation in (Operation.MULTIPLY, Operation.AND):
-        return ZERO if zero else x[x[0] == ONE] if one else None
+        return ZERO if zero else x[x[0] == ONE] if unity else None
     if operation == Operation.ADD:
         return x[x[0] == ZERO] if zero else None
     if operation == Operation.SUBTRACT:

@@ -98,8 +98,8 @@ class BraceKernels(KernelPrinter):
             "".join(self.declared(t, node) for t in targets[: len(targets) - len(early)]) + line,
         ]
 
-    def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
-        return f"{self.prefix}{name}({self.joined(given)});"
+    def invoke(self, name: str, arguments: Sequence[ast.expr], results: int) -> str:
+        return f"{self.prefix}{name}({self.joined(arguments)});"
 
     def loop(self, variable: str, first: str, limit: ast.expr) -> str:
         test = f"{variable} < {self.expression(limit, 5)}"
@@ -114,11 +114,11 @@ def _place(name: str, block: Sequence[ast.stmt]) -> ast.stmt | None:
     """The statement of a block, or of a block within it, that declares a variable; None if there is
     none.
     """
-    first, *others = [node for node in block if _mentions(name, node)]
+    first, *further = [node for node in block if _mentions(name, node)]
     if isinstance(first, ast.Assign):
         targets = [target.id for target, _ in pairs(first) if isinstance(target, ast.Name)]
         return first if name in targets and not _mentions(name, first.value) else None
-    if others or not isinstance(first, ast.If | ast.While | ast.For):
+    if further or not isinstance(first, ast.If | ast.While | ast.For):
         return None
     inner = [
         part for part in (first.body, first.orelse) if any(_mentions(name, node) for node in part)
@@ -168,11 +168,13 @@ class CKernels(BraceKernels):
     def head(self) -> list[str]:
         kernel = self.kernel
         returned = self.kernel.returns
-        given = [self._argument(name) for name in kernel.arguments]
-        given += [f"{self._type(kind)} *{self._out(i)}" for i, kind in enumerate(returned) if i]
+        declarations = [self._argument(name) for name in kernel.arguments]
+        declarations += [
+            f"{self._type(kind)} *{self._out(i)}" for i, kind in enumerate(returned) if i
+        ]
         text = (
             f"static {self._type(returned[0]) if returned else 'void'}"
-            f" {kernel.source.name}({', '.join(given)})"
+            f" {kernel.source.name}({', '.join(declarations)})"
         )
         return [
             text,
@@ -218,25 +220,25 @@ class CKernels(BraceKernels):
         numbers = any(self.kernel.of(argument) == ElementType.NUMBER for argument in arguments)
         if name in {"min", "max"}:
             return self._extreme(name, arguments, numbers)
-        own = "" if name in self.kernel.calls or (name == "abs" and not numbers) else self.suffix
-        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}{own}({self.joined(arguments)})"  # noqa: E501
+        suffix = "" if name in self.kernel.calls or (name == "abs" and not numbers) else self.suffix
+        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}{suffix}({self.joined(arguments)})"  # noqa: E501
 
     def _extreme(self, name: str, arguments: Sequence[ast.expr], numbers: bool) -> str:
-        first, *others = arguments
-        if not others:
+        first, *further = arguments
+        if not further:
             return self.expression(first)
         if numbers:
-            rest = self._extreme(name, others, numbers)
+            rest = self._extreme(name, further, numbers)
             return f"f{name}{self.suffix}({self.expression(first)}, {rest})"
-        if len(others) > 1:
+        if len(further) > 1:
             raise self.source.unprintable(first, "the extreme of more than two integers")
-        a, b = (self.expression(each, 5) for each in arguments)
+        a, b = (self.expression(argument, 5) for argument in arguments)
         return f"({a} {'<' if name == 'min' else '>'} {b} ? {a} : {b})"
 
     def called_with(
-        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+        self, kernel: TypedKernel, texts: Mapping[str, str], results: Sequence[str]
     ) -> str:
-        values = [given.get(name, name) for name in kernel.arguments] + [
+        values = [texts.get(name, name) for name in kernel.arguments] + [
             f"&{name}" for name in results[1:]
         ]
         return f"{f'{results[0]} = ' if results else ''}{kernel.source.name}({', '.join(values)});"
@@ -289,9 +291,9 @@ class JavaScriptKernels(BraceKernels):
         return f"{name if name in self.kernel.calls else usual}({self.joined(arguments)})"
 
     def called_with(
-        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+        self, kernel: TypedKernel, texts: Mapping[str, str], results: Sequence[str]
     ) -> str:
-        values = ", ".join(given.get(name, name) for name in kernel.arguments)
+        values = ", ".join(texts.get(name, name) for name in kernel.arguments)
         left = (
             f"[{', '.join(results)}] = "
             if len(results) > 1

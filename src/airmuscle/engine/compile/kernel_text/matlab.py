@@ -52,12 +52,12 @@ class MatlabKernels(KernelPrinter):
     def head(self) -> list[str]:
         results = self._results(self.kernel)
         names = results[0] if len(results) == 1 else f"[{', '.join(results)}]"
-        given = ", ".join(map(self.name, self.kernel.arguments))
+        arguments = ", ".join(map(self.name, self.kernel.arguments))
         constants = [
             f"  {self.constant(name, value)}" for name, value in used_constants(self.kernel).items()
         ]
         return [
-            f"function {f'{names} = ' if results else ''}{self.source.name}({given})",
+            f"function {f'{names} = ' if results else ''}{self.source.name}({arguments})",
             *constants,
         ]
 
@@ -144,8 +144,8 @@ class MatlabKernels(KernelPrinter):
     def _left(names: Sequence[str]) -> str:
         return (names[0] if len(names) == 1 else f"[{', '.join(names)}]") + " = " if names else ""
 
-    def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
-        return f"{self._left(list(map(self.expression, given[-results:])))}{name}({self.joined(given[:-results])});"  # noqa: E501
+    def invoke(self, name: str, arguments: Sequence[ast.expr], results: int) -> str:
+        return f"{self._left(list(map(self.expression, arguments[-results:])))}{name}({self.joined(arguments[:-results])});"  # noqa: E501
 
     # Operations on whole arrays
 
@@ -153,7 +153,7 @@ class MatlabKernels(KernelPrinter):
         if not isinstance(node, ast.For) or not self._is_elementwise(node):
             return super().compound(node)
         self._counter = ast.unparse(node.target)
-        lines = [line for each in node.body for line in self.statement(each)]
+        lines = [line for inner in node.body for line in self.statement(inner)]
         self._counter, self._columns = "", set()
         return lines
 
@@ -188,10 +188,10 @@ class MatlabKernels(KernelPrinter):
         )
 
     def called_with(
-        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+        self, kernel: TypedKernel, texts: Mapping[str, str], results: Sequence[str]
     ) -> str:
-        values = ", ".join(given.get(name, name) for name in kernel.arguments)
-        changed = [given.get(name, name) for name in kernel.changed]
+        values = ", ".join(texts.get(name, name) for name in kernel.arguments)
+        changed = [texts.get(name, name) for name in kernel.changed]
         return f"{self._left([*results, *changed])}{kernel.source.name}({values});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:

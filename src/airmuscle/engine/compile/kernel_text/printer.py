@@ -99,12 +99,12 @@ class KernelPrinter(ExpressionPrinter):
         )
 
     def bound_call(
-        self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]
+        self, kernel: TypedKernel, texts: Mapping[str, str], results: Sequence[str]
     ) -> str:
         """A call from a template: its arguments are texts, or variables of the same name; `results`
         are variables.
         """
-        return self.lines(self.called_with(kernel, given, results))
+        return self.lines(self.called_with(kernel, texts, results))
 
     def lines(self, line: str) -> str:
         """A line of a template, divided where it is too long."""
@@ -214,8 +214,8 @@ class KernelPrinter(ExpressionPrinter):
             for target, kind in zip(targets, called.returns, strict=False)
         ):
             raise self.source.unprintable(call, "a result of another type than its variable")
-        given = {name: self.expression(value) for name, value in called.given(call).items()}
-        return [self.called_with(called, given, list(map(self.expression, targets)))]
+        texts = {name: self.expression(value) for name, value in called.given(call).items()}
+        return [self.called_with(called, texts, list(map(self.expression, targets)))]
 
     def _checked_pairs(self, node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
         """Targets and values, which must not read a target before them."""

@@ -111,9 +111,9 @@ def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
     names: dict[str, Any] = {"np": math, "sqrt": math.sqrt}
     for source in defined.values():
         names |= source.constants
-        for name, other in source.imported.items():
-            if other != module and name in read_kernels(other):
-                names[name] = plain_kernels(other)[name]
+        for name, module_of_import in source.imported.items():
+            if module_of_import != module and name in read_kernels(module_of_import):
+                names[name] = plain_kernels(module_of_import)[name]
     exec(compile(ast.fix_missing_locations(tree), str(path), "exec"), names)
     return {name: names[name] for name in defined}
 

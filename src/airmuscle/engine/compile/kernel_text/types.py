@@ -63,10 +63,10 @@ class TypedKernel:
     @property
     def returned_names(self) -> list[str] | None:
         """The names of the results, if every return statement returns the same variables."""
-        found = [ast.unparse(n.value) for n in returns_of(self.source) if n.value]
-        names = found[0].strip("()").split(", ") if found else []
+        results = [ast.unparse(n.value) for n in returns_of(self.source) if n.value]
+        names = results[0].strip("()").split(", ") if results else []
         return (
-            names if len(set(found)) <= 1 and all(name.isidentifier() for name in names) else None
+            names if len(set(results)) <= 1 and all(name.isidentifier() for name in names) else None
         )
 
 
@@ -79,8 +79,13 @@ def invoked(call: ast.expr) -> tuple[str, list[ast.expr], int] | None:
     ones, it writes.
     """
     match call:
-        case ast.Call(func=ast.Name(id="invoke"), args=[ast.Name(id=name), ast.Tuple(elts=given)]):
-            arrays = [each.args[0] if isinstance(each, ast.Call) else each for each in given]
+        case ast.Call(
+            func=ast.Name(id="invoke"), args=[ast.Name(id=name), ast.Tuple(elts=arguments)]
+        ):
+            arrays = [
+                argument.args[0] if isinstance(argument, ast.Call) else argument
+                for argument in arguments
+            ]
             return name, arrays, 2 if name == "jac" else 1
     return None
 
@@ -97,7 +102,7 @@ def pairs(node: ast.Assign) -> list[tuple[ast.expr, ast.expr | None]]:
         return [(target, node.value)]
     if isinstance(node.value, ast.Tuple):
         return list(zip(target.elts, node.value.elts, strict=True))
-    return [(each, None) for each in target.elts]
+    return [(element, None) for element in target.elts]
 
 
 def indices(node: ast.Subscript) -> list[ast.expr]:
@@ -139,8 +144,10 @@ class _Inference:
                 self._assign(node)
         kinds = {name: VariableType(scalar) for name, scalar in self.locals.items()}
         for name in self.source.arguments:
-            given = self._name(name) if name not in self.locals else ElementType.FLAG
-            kinds[name] = VariableType(max(given, self.locals.get(name, given)), self.ranks[name])
+            element = self._name(name) if name not in self.locals else ElementType.FLAG
+            kinds[name] = VariableType(
+                max(element, self.locals.get(name, element)), self.ranks[name]
+            )
         return TypedKernel(
             self.source,
             kinds,
@@ -152,16 +159,16 @@ class _Inference:
         )
 
     def _returns(self) -> tuple[ElementType, ...]:
-        found = [
+        results = [
             n.value.elts if isinstance(n.value, ast.Tuple) else [n.value]
             for n in returns_of(self.source)
             if n.value
         ]
-        if len({len(values) for values in found}) > 1:
+        if len({len(values) for values in results}) > 1:
             raise self.source.unprintable(
                 self.source.node, "a function with different numbers of results"
             )
-        return tuple(max(map(self.of, values)) for values in zip(*found, strict=True))
+        return tuple(max(map(self.of, values)) for values in zip(*results, strict=True))
 
     def _use(self, node: ast.AST) -> None:
         """Learn from an element, a range or a call which arguments are arrays and integers, and
@@ -186,11 +193,11 @@ class _Inference:
             and node.func.id in self.calls
         ):
             called = self.calls[node.func.id]
-            for name, given in zip(called.source.arguments, node.args, strict=True):
+            for name, argument in zip(called.source.arguments, node.args, strict=True):
                 if name in called.called:
-                    self.called.add(ast.unparse(given))
+                    self.called.add(ast.unparse(argument))
                 else:
-                    self._given(given, called.kinds[name], name in called.written)
+                    self._given(argument, called.kinds[name], name in called.written)
         elif isinstance(node, ast.Call) and (system := invoked(node)):
             name, arrays, results = system
             self.called.add(name)
@@ -278,8 +285,8 @@ class _Inference:
                 ast.Subscript(value=ast.Attribute(attr="shape")) | ast.Call(func=ast.Name(id="int"))
             ):
                 return ElementType.INTEGER
-            case ast.Call(func=ast.Name(id=name), args=given) if name in SAME_TYPE:
-                return max(self.of(each) for each in given)
+            case ast.Call(func=ast.Name(id=name), args=arguments) if name in SAME_TYPE:
+                return max(self.of(argument) for argument in arguments)
             case ast.Call(func=ast.Name(id=name)) if name in self.calls:
                 return self._result(node, 0)
         return ElementType.NUMBER
@@ -294,7 +301,7 @@ class _Inference:
 
 def stored_names(nodes: list[ast.stmt]) -> Iterator[str]:
     """Names of variables and arrays to which statements write, once for each assignment."""
-    for node in (inner for each in nodes for inner in ast.walk(each)):
+    for node in (inner for statement in nodes for inner in ast.walk(statement)):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             yield node.id
         elif (

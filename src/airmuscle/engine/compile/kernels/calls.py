@@ -44,12 +44,12 @@ def as_vector(typing_context, table):
     vector = types.Array(table.dtype, 1, "C")
 
     def generate(context, builder, sig, values):
-        given = context.make_array(sig.args[0])(context, builder, values[0])
+        source = context.make_array(sig.args[0])(context, builder, values[0])
         flat = context.make_array(vector)(context, builder)
         shape, strides = (
-            cgutils.pack_array(builder, [each]) for each in (given.nitems, given.itemsize)
+            cgutils.pack_array(builder, [number]) for number in (source.nitems, source.itemsize)
         )
-        arrayobj.populate_array(flat, given.data, shape, strides, given.itemsize, given.meminfo)
+        arrayobj.populate_array(flat, source.data, shape, strides, source.itemsize, source.meminfo)
         return arrayobj.impl_ret_borrowed(context, builder, vector, flat._getvalue())
 
     return vector(table), generate

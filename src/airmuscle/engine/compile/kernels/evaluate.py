@@ -89,10 +89,10 @@ def _find_range(table, column, lower, upper, place):
     Four rows at a time, because a comparison waits for the one before it.
     """
     count = table.shape[0]
-    whole = count // 4
+    quarters = count // 4
     low = low1 = low2 = low3 = 1e308 * 10.0
     high = high1 = high2 = high3 = -1e308 * 10.0
-    for four in range(whole):
+    for four in range(quarters):
         row = 4 * four
         a = table[row, column]
         b = table[row + 1, column]
@@ -106,7 +106,7 @@ def _find_range(table, column, lower, upper, place):
         high1 = max(high1, b)
         high2 = max(high2, c)
         high3 = max(high3, d)
-    for row in range(4 * whole, count):
+    for row in range(4 * quarters, count):
         a = table[row, column]
         low = min(low, a)
         high = max(high, a)
@@ -148,12 +148,12 @@ def _evaluate(function, c, states, inputs, outputs, x, u, o):
         )
         rest += width
     if rest < count:
-        for each in range(width):
-            row = min(rest + each, count - 1)
+        for lane in range(width):
+            row = min(rest + lane, count - 1)
             for i in range(states.shape[1]):
-                x[each, i] = states[row, i]
+                x[lane, i] = states[row, i]
             for i in range(inputs.shape[1]):
-                u[each, i] = inputs[row, i]
+                u[lane, i] = inputs[row, i]
         invoke(function, (pointer(x), pointer(u), pointer(c), pointer(o)))
         for row in range(rest, count):
             for i in range(outputs.shape[1]):
@@ -208,8 +208,8 @@ def record(
         for i in range(m):
             value = values[segment, i]
             slope = slopes[segment, i]
-            for each in range(first, row):
-                inputs[each, i] = value + (times[each] - start) * slope
+            for place_of_time in range(first, row):
+                inputs[place_of_time, i] = value + (times[place_of_time] - start) * slope
     if k > 0:
         _evaluate(function, c, states, inputs, outputs, x, u, o)
     for place in range(columns.shape[0]):

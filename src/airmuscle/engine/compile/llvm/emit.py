@@ -251,8 +251,8 @@ class FunctionBody(FunctionBlock):
         joined = {}
         for operand, value in instead.items():
             joined[operand] = self.new_name()
-            ways = f"[ {value}, %{here}.if ], [ {inside[operand]}, %{here}.then ]"
-            self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
+            sources = f"[ {value}, %{here}.if ], [ {inside[operand]}, %{here}.then ]"
+            self.lines.append(f"  {joined[operand]} = phi {number.text} {sources}")
         return joined
 
     def arithmetic(self, operator: str, a: str, b: str) -> str:

@@ -56,8 +56,8 @@ class ExactBody(FunctionBody):
         """An integer operation with a constant, given as the double of the same bits, or with a
         value.
         """
-        other = self.bits(self.constant(b)) if isinstance(b, float) else b
-        return self.put(f"{operation} {self.number.whole} {a}, {other}")
+        operand = self.bits(self.constant(b)) if isinstance(b, float) else b
+        return self.put(f"{operation} {self.number.whole} {a}, {operand}")
 
     def shifted(self, operation: str, a: str) -> str:
         """Shift by the bits of the mantissa."""
@@ -130,8 +130,8 @@ def _logarithm(block: ExactBody, x: str, accuracy: _Accuracy) -> str:
         block.from_bits(block.on_bits("add", exponent, block.rounder)),
         block.constant(block.rounder),
     )
-    one = block.constant(1.0)
-    s = block.over(block.subtract(m, one), block.add(m, one))
+    unity = block.constant(1.0)
+    s = block.over(block.subtract(m, unity), block.add(m, unity))
     scale = 2 / math.log(2)
     series = _polynomial(
         block, block.times(s, s), [scale / (2 * i + 1) for i in range(accuracy.logarithm + 1)]
@@ -161,9 +161,11 @@ def _otherwise(block: ExactBody, usual: str, value: str) -> str:
     """
     number = block.number
     flipped = f"<i1 true{', i1 true' * (number.lanes - 1)}>"
-    other = block.put(f"xor {number.mask} {usual}, {flipped}")
-    some = block.put(f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {other})")
-    block.lines += [f"  br i1 {some}, label %unusual, label %end", "unusual:"]
+    unusual = block.put(f"xor {number.mask} {usual}, {flipped}")
+    any_unusual = block.put(
+        f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {unusual})"
+    )
+    block.lines += [f"  br i1 {any_unusual}, label %unusual, label %end", "unusual:"]
     block.lines += [
         (
             f"  %exact = call {number.text} @{number.function('pow')}({number.text} %x,"
@@ -206,19 +208,19 @@ class LlvmValue:
             lanes,
         )
 
-    def _with(self, operation: str, other: "LlvmValue") -> "LlvmValue":
-        a, b = self.spread(other.lanes), other.spread(self.lanes)
+    def _with(self, operation: str, operand: "LlvmValue") -> "LlvmValue":
+        a, b = self.spread(operand.lanes), operand.spread(self.lanes)
         result = self.block.put(f"{operation} {FLAGS} {a.kind} {a.name}, {b.name}")
         return dataclasses.replace(a, name=result)
 
-    def __add__(self, other: "LlvmValue") -> "LlvmValue":
-        return self._with("fadd", other)
+    def __add__(self, operand: "LlvmValue") -> "LlvmValue":
+        return self._with("fadd", operand)
 
-    def __sub__(self, other: "LlvmValue") -> "LlvmValue":
-        return self._with("fsub", other)
+    def __sub__(self, operand: "LlvmValue") -> "LlvmValue":
+        return self._with("fsub", operand)
 
-    def __mul__(self, other: "LlvmValue") -> "LlvmValue":
-        return self._with("fmul", other)
+    def __mul__(self, operand: "LlvmValue") -> "LlvmValue":
+        return self._with("fmul", operand)
 
     def store(self, array: str, index: int) -> None:
         """Write the value to array elements from `index` on."""

@@ -98,8 +98,8 @@ class LaneGroups(TargetLanguage):
                 block.put(f"getelementptr inbounds i8, ptr %{array}, i64 {group * self.width}")
                 for array in parts[part]
             ]
-            given = ", ".join(f"ptr {place}" for place in places)
-            block.lines.append(f"  call void @{part}({given})")
+            pointers = ", ".join(f"ptr {place}" for place in places)
+            block.lines.append(f"  call void @{part}({pointers})")
         return emit.function(name, arguments, block, emit.ALIGNED if room else "nounwind")
 
 

@@ -14,7 +14,7 @@ Mathematik 18, 1971.
 """
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from .emit import STEADY_POWER, FunctionBody, LlvmType, function_of_values
 from .exact import ExactBody, steady_power
@@ -31,6 +31,8 @@ LARGEST_ANGLE = 1e6
 TWO_THIRDS_LOW = 2.0**-53 / 3
 """2/3 minus the nearest double."""
 LEAST_NORMAL = 2.0**-1022
+LEAST = 5e-324
+"""The double whose bits are those of the integer 1."""
 
 
 class _Functions(ExactBody):
@@ -40,47 +42,66 @@ class _Functions(ExactBody):
         """e**(x + low) with low of the order of the rounding error of x: 2**n e**r, |r| <= ln 2 /
         2, Taylor series.
         """
-        x = self.choose(">", x, self.constant(720.0), self.constant(720.0), x)
-        x = self.choose("<", x, self.constant(-760.0), self.constant(-760.0), x)
-        n = self.rounded(self.times(x, self.constant(1 / math.log(2))))
+        # beyond these arguments the result is infinite or zero
+        largest = self.constant(720.0)
+        x = self.choose(">", x, largest, largest, x)
+        smallest = self.constant(-760.0)
+        x = self.choose("<", x, smallest, smallest, x)
+        doublings = self.times(x, self.constant(1 / math.log(2)))
+        n = self.rounded(doublings)
         back = self.negative(n)
         r = self.fused(back, self.constant(LN2_HIGH), x)
         rest = self.times(back, self.constant(LN2_LOW))
-        r, lost = self.sum_of(r, rest if low is None else self.add(rest, low))
-        tail = self.polynomial(r, [1 / math.factorial(i) for i in range(2, 14)])
-        value = self.add(self.constant(1.0), self.add(r, self.fused(self.times(r, r), tail, lost)))
+        if low is not None:
+            rest = self.add(rest, low)
+        r, lost = self.sum_of(r, rest)
+        coefficients = [1 / math.factorial(i) for i in range(2, 14)]
+        tail = self.polynomial(r, coefficients)
+        unity = self.constant(1.0)
+        square = self.times(r, r)
+        beyond_first = self.fused(square, tail, lost)
+        above_unity = self.add(r, beyond_first)
+        value = self.add(unity, above_unity)
+        # in two factors, because 2**n itself may lie outside the ordinary numbers
         half = self.rounded(self.times(n, self.constant(0.5)))
-        return self.times(
-            self.times(value, self.power_of_two(half)), self.power_of_two(self.subtract(n, half))
-        )
+        value = self.times(value, self.power_of_two(half))
+        remaining = self.subtract(n, half)
+        return self.times(value, self.power_of_two(remaining))
 
     def logarithm(self, x: str) -> tuple[str, str]:
         """ln x in two parts: x = 2**n m with m from sqrt(1/2) to sqrt(2), ln m = 2 artanh((m -
         1)/(m + 1)).
         """
+        # a subnormal number has no exponent of its own
         scaled = self.times(x, self.constant(2.0**54))
-        bits = self.bits(self.choose("<", x, self.constant(LEAST_NORMAL), scaled, x))
-        offset = self.choose(
-            "<", x, self.constant(LEAST_NORMAL), self.constant(-54.0), self.constant(0.0)
-        )
-        exponent = self.shifted("ashr", self.on_bits("sub", bits, math.sqrt(0.5)))
-        m = self.from_bits(self.on_bits("sub", bits, self.shifted("shl", exponent)))
-        n = self.subtract(
-            self.from_bits(self.on_bits("add", exponent, self.rounder)), self.constant(self.rounder)
-        )
+        least_normal = self.constant(LEAST_NORMAL)
+        normal = self.choose("<", x, least_normal, scaled, x)
+        bits = self.bits(normal)
+        offset = self.choose("<", x, least_normal, self.constant(-54.0), self.constant(0.0))
+        from_root_of_half = self.on_bits("sub", bits, math.sqrt(0.5))
+        exponent = self.shifted("ashr", from_root_of_half)
+        exponent_bits = self.shifted("shl", exponent)
+        m = self.from_bits(self.on_bits("sub", bits, exponent_bits))
+        rounder_and_exponent = self.from_bits(self.on_bits("add", exponent, self.rounder))
+        n = self.subtract(rounder_and_exponent, self.constant(self.rounder))
         n = self.add(n, offset)
-        one = self.constant(1.0)
-        above = self.subtract(m, one)
-        below = self.add(m, one)
-        lost = self.subtract(m, self.subtract(below, one))
-        s = self.over(above, below)
-        left = self.fused(self.negative(s), below, above)
-        left = self.over(self.fused(self.negative(s), lost, left), below)
-        n_high, n_low = (self.times(n, self.constant(part)) for part in (LN2_HIGH, LN2_LOW))
-        high, error = self.sum_of(n_high, self.add(s, s))
+        unity = self.constant(1.0)
+        numerator = self.subtract(m, unity)
+        denominator = self.add(m, unity)
+        represented = self.subtract(denominator, unity)
+        lost = self.subtract(m, represented)
+        s = self.over(numerator, denominator)
+        left = self.fused(self.negative(s), denominator, numerator)
+        left = self.fused(self.negative(s), lost, left)
+        left = self.over(left, denominator)
+        n_high = self.times(n, self.constant(LN2_HIGH))
+        n_low = self.times(n, self.constant(LN2_LOW))
+        high, error_of_first = self.sum_of(n_high, self.add(s, s))
         cube, rest = self._after_the_first(s, left)
-        high, more = self.sum_of(high, cube)
-        low = self.add(self.add(n_low, self.add(left, left)), self.add(self.add(error, more), rest))
+        high, error_of_cube = self.sum_of(high, cube)
+        low = self.add(n_low, self.add(left, left))
+        errors = self.add(error_of_first, error_of_cube)
+        low = self.add(low, self.add(errors, rest))
         return self._at_the_ends(x, *self.sum_of(high, low))
 
     def _after_the_first(self, s: str, lost: str) -> tuple[str, str]:
@@ -88,81 +109,104 @@ class _Functions(ExactBody):
         terms.
         """
         z = self.times(s, s)
-        z_lost = self.fused(self.add(s, s), lost, self.fused(s, s, self.negative(z)))
+        twice_s = self.add(s, s)
+        z_rounding = self.fused(s, s, self.negative(z))
+        z_lost = self.fused(twice_s, lost, z_rounding)
         third = self.times(s, z)
-        third_lost = self.fused(s, z, self.negative(third))
-        third_lost = self.add(third_lost, self.fused(s, z_lost, self.times(lost, z)))
+        third_rounding = self.fused(s, z, self.negative(third))
+        of_first_order = self.times(lost, z)
+        third_lost = self.add(third_rounding, self.fused(s, z_lost, of_first_order))
         share = self.constant(2 / 3)
         share_lost = self.constant(TWO_THIRDS_LOW)
         cube = self.times(share, third)
-        cube_lost = self.fused(share, third_lost, self.fused(share, third, self.negative(cube)))
+        cube_rounding = self.fused(share, third, self.negative(cube))
+        cube_lost = self.fused(share, third_lost, cube_rounding)
         cube_lost = self.fused(share_lost, third, cube_lost)
-        tail = self.polynomial(z, [2 / (2 * i + 5) for i in range(11)])
-        return cube, self.fused(self.times(third, z), tail, cube_lost)
+        coefficients = [2 / (2 * i + 5) for i in range(11)]
+        tail = self.polynomial(z, coefficients)
+        fifth = self.times(third, z)
+        return cube, self.fused(fifth, tail, cube_lost)
 
     def _at_the_ends(self, x: str, high: str, low: str) -> tuple[str, str]:
         """The logarithm with its values at 0, infinity, negative arguments and NaN."""
         zero = self.constant(0.0)
         infinity = self.constant(math.inf)
         high = self.choose("<", x, infinity, high, x)
-        high = self.choose("==", x, zero, self.constant(-math.inf), high)
-        high = self.choose("<", x, zero, self.constant(math.nan), high)
-        return high, self.choose("<", self.size_of(high), infinity, low, zero)
+        pole = self.constant(-math.inf)
+        high = self.choose("==", x, zero, pole, high)
+        undefined = self.constant(math.nan)
+        high = self.choose("<", x, zero, undefined, high)
+        size = self.size_of(high)
+        low = self.choose("<", size, infinity, low, zero)
+        return high, low
 
     def power_by_logarithm(self, x: str, y: str) -> str:
         """x**y = e**(y ln|x|), with the sign and the exceptions of IEEE 754."""
         zero = self.constant(0.0)
-        one = self.constant(1.0)
+        unity = self.constant(1.0)
         infinity = self.constant(math.inf)
         size = self.size_of(x)
         high, low = self.logarithm(size)
         product = self.times(y, high)
-        lost = self.fused(y, low, self.fused(y, high, self.negative(product)))
+        rounding = self.fused(y, high, self.negative(product))
+        lost = self.fused(y, low, rounding)
+        # beyond 1000 the power is infinite or zero, and the lost part may be no number
         lost = self.choose("<", self.size_of(product), self.constant(1e3), lost, zero)
         value = self.exponential(product, lost)
-        value = self.choose("==", size, one, self.choose("ordered", y, y, one, y), value)
+        power_of_unity = self.choose("ordered", y, y, unity, y)
+        value = self.choose("==", size, unity, power_of_unity, value)
         half = self.times(y, self.constant(0.5))
-        whole = self.choose("==", self.rounded(y), y, one, zero)
-        even = self.choose("==", self.rounded(half), half, one, zero)
-        signed = self.intrinsic("copysign", (value, x), "")
-        value = self.choose(">", whole, even, signed, value)
-        undefined = self.choose("==", whole, one, value, self.constant(math.nan))
-        value = self.choose("<", x, zero, self.choose("<", size, infinity, undefined, value), value)
-        value = self.choose("==", y, zero, one, value)
-        return self.choose("==", x, one, one, value)
+        integer = self.rounded(y)
+        is_integer = self.choose("==", integer, y, unity, zero)
+        integer_half = self.rounded(half)
+        is_even = self.choose("==", integer_half, half, unity, zero)
+        with_sign_of_x = self.intrinsic("copysign", (value, x), "")
+        value = self.choose(">", is_integer, is_even, with_sign_of_x, value)
+        real_or_nan = self.choose("==", is_integer, unity, value, self.constant(math.nan))
+        of_negative = self.choose("<", size, infinity, real_or_nan, value)
+        value = self.choose("<", x, zero, of_negative, value)
+        value = self.choose("==", y, zero, unity, value)
+        return self.choose("==", x, unity, unity, value)
 
     def sine(self, x: str, quarters: float) -> str:
         """sin(x + quarters pi/2) for |x| up to LARGEST_ANGLE: reduction by multiples of pi/2, then
         Taylor series.
         """
+        number = self.number
         n = self.rounded(self.times(x, self.constant(2 / math.pi)))
         back = self.negative(n)
         nearly = self.fused(back, self.constant(QUARTER_HIGH), x)
-        low = self.times(back, self.constant(QUARTER_LOW))
-        lost = self.fused(back, self.constant(QUARTER_LOW), self.negative(low))
+        quarter_low = self.constant(QUARTER_LOW)
+        low = self.times(back, quarter_low)
+        rounding = self.fused(back, quarter_low, self.negative(low))
         r, error = self.sum_of_any(nearly, low)
-        lost = self.add(error, self.fused(back, self.constant(QUARTER_LEAST), lost))
+        least = self.fused(back, self.constant(QUARTER_LEAST), rounding)
+        lost = self.add(error, least)
         z = self.times(r, r)
-        odd = self.polynomial(z, [(-1) ** i / math.factorial(2 * i + 1) for i in range(1, 9)])
-        even = self.polynomial(z, [(-1) ** i / math.factorial(2 * i) for i in range(2, 9)])
-        sine = self.add(r, self.fused(self.times(z, r), odd, lost))
+        odd = self.polynomial(z, _alternating_inverse_factorials(range(3, 18, 2)))
+        even = self.polynomial(z, _alternating_inverse_factorials(range(4, 17, 2)))
+        cube = self.times(z, r)
+        sine = self.add(r, self.fused(cube, odd, lost))
         half = self.times(z, self.constant(0.5))
-        near = self.subtract(self.constant(1.0), half)
-        one = self.constant(1.0)
-        left = self.subtract(self.subtract(one, near), half)
-        cosine = self.add(
-            near, self.fused(self.times(z, z), even, self.subtract(left, self.times(r, lost)))
+        unity = self.constant(1.0)
+        near = self.subtract(unity, half)
+        represented = self.subtract(unity, near)
+        left = self.subtract(represented, half)
+        fourth = self.times(z, z)
+        first_order = self.times(r, lost)
+        left = self.subtract(left, first_order)
+        cosine = self.add(near, self.fused(fourth, even, left))
+        turned = self.add(n, self.constant(quarters))
+        turn = self.bits(self.add(turned, self.constant(self.rounder)))
+        is_cosine = self.put(f"trunc {number.whole} {turn} to {number.mask}")
+        value = self.put(
+            f"select {number.mask} {is_cosine}, {number.text} {cosine}, {number.text} {sine}"
         )
-        turn = self.bits(
-            self.add(self.add(n, self.constant(quarters)), self.constant(self.rounder))
-        )
-        which = self.put(f"trunc {self.number.whole} {turn} to {self.number.mask}")
-        chosen = self.put(
-            f"select {self.number.mask} {which}, {self.number.text} {cosine}, {self.number.text}"
-            f" {sine}"
-        )
-        sign = self.on_bits("shl", self.on_bits("and", turn, 2 * 5e-324), 62 * 5e-324)
-        return self.from_bits(self.on_bits("xor", self.bits(chosen), sign))
+        # the second bit of the turn, moved to the place of the sign
+        second_bit = self.on_bits("and", turn, 2 * LEAST)
+        sign = self.on_bits("shl", second_bit, 62 * LEAST)
+        signed = self.on_bits("xor", self.bits(value), sign)
+        return self.from_bits(signed)
 
     def unless_large(self, x: str, otherwise: str) -> None:
         """Return the value of the function `otherwise` if any lane exceeds LARGEST_ANGLE, is
@@ -172,14 +216,21 @@ class _Functions(ExactBody):
         large = self.put(
             f"fcmp ugt {number.text} {self.size_of(x)}, {self.constant(LARGEST_ANGLE)}"
         )
-        some = self.put(f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {large})")
+        any_large = self.put(
+            f"call i1 @llvm.vector.reduce.or.v{number.lanes}i1({number.mask} {large})"
+        )
         self.lines += [
-            f"  br i1 {some}, label %large, label %usual",
+            f"  br i1 {any_large}, label %large, label %usual",
             "large:",
             f"  %large.value = call {number.text} @{otherwise}({number.text} {x})",
             f"  ret {number.text} %large.value",
             "usual:",
         ]
+
+
+def _alternating_inverse_factorials(numbers: Iterable[int]) -> list[float]:
+    """Coefficients of the series of sine (odd numbers) and cosine (even ones)."""
+    return [(-1) ** (n // 2) / math.factorial(n) for n in numbers]
 
 
 def definition(name: str, count: int, number: LlvmType) -> str:
@@ -199,9 +250,9 @@ def definition(name: str, count: int, number: LlvmType) -> str:
     elif name == "pow":
         value = block.power_by_logarithm("%x", "%y")
     elif name in ("sin", "cos"):
-        each = f"each.{number.function(name)}"
-        before = _lane_by_lane(name, each, arguments, number)
-        block.unless_large("%x", each)
+        scalar_function = f"each.{number.function(name)}"
+        before = _lane_by_lane(name, scalar_function, arguments, number)
+        block.unless_large("%x", scalar_function)
         value = block.sine("%x", 1.0 if name == "cos" else 0.0)
     else:
         return _lane_by_lane(name, number.function(name), arguments, number)
@@ -212,22 +263,31 @@ def _in_double(name: str, count: int, number: LlvmType, double: LlvmType) -> str
     """A function in single precision by that in double precision, which is printed with it."""
     block = _Functions(number.lanes)
     arguments = [f"%{a}" for a in "xy"[:count]]
-    wide = [block.put(f"fpext {number.text} {a} to {double.text}") for a in arguments]
-    given = ", ".join(f"{double.text} {a}" for a in wide)
-    value = block.put(f"call {double.text} @{double.function(name)}({given})")
-    value = block.put(f"fptrunc {double.text} {value} to {number.text}")
-    return definition(name, count, double) + function_of_values(
-        number.function(name), arguments, block, number, value
-    )
+    single = number.text
+    wide = double.text
+    operands = []
+    for argument in arguments:
+        extended = block.put(f"fpext {single} {argument} to {wide}")
+        operands.append(f"{wide} {extended}")
+    called = double.function(name)
+    in_double = block.put(f"call {wide} @{called}({', '.join(operands)})")
+    value = block.put(f"fptrunc {wide} {in_double} to {single}")
+    text_in_double = definition(name, count, double)
+    as_name = number.function(name)
+    return text_in_double + function_of_values(as_name, arguments, block, number, value)
 
 
 def _lane_by_lane(name: str, as_name: str, arguments: Sequence[str], number: LlvmType) -> str:
     block = FunctionBody((), number)
+    kind = number.text
     vector = "poison"
     for i in range(number.lanes):
-        given = [block.put(f"extractelement {number.text} {a}, i32 {i}") for a in arguments]
-        value = block.put(f"call double @{name}({', '.join(f'double {a}' for a in given)})")
-        vector = block.put(f"insertelement {number.text} {vector}, double {value}, i32 {i}")
+        operands = []
+        for argument in arguments:
+            element = block.put(f"extractelement {kind} {argument}, i32 {i}")
+            operands.append(f"double {element}")
+        value = block.put(f"call double @{name}({', '.join(operands)})")
+        vector = block.put(f"insertelement {kind} {vector}, double {value}, i32 {i}")
     return function_of_values(as_name, arguments, block, number, vector)
 
 

@@ -160,8 +160,8 @@ class TextBody(FunctionBlock):
                 names[value] = label
                 used.add(label.name)
         for number, line in enumerate(self.lines):
-            found = _DEFINED.match(line)
-            remark = names[found[1]].remark if found and found[1] in names else ""
+            definition = _DEFINED.match(line)
+            remark = names[definition[1]].remark if definition and definition[1] in names else ""
             text = _NUMBERED.sub(
                 lambda value: names[value[0]].name if value[0] in names else value[0], line
             )

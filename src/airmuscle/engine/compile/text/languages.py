@@ -61,13 +61,13 @@ class CLanguage(TextLanguage):
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
     ) -> str:
         number = self.number
-        given = [
+        declarations = [
             f"{number} {a}" if a in body.scalars else f"const {number} *restrict {a}"
             for a in inputs
         ]
         results = [f"{number} *restrict {a}" for a in outputs]
         storage = "" if self.public is None or name in self.public else "static "
-        head = f"{storage}void {self.prefix}{name}({', '.join([*given, *results])}) {{"
+        head = f"{storage}void {self.prefix}{name}({', '.join([*declarations, *results])}) {{"
         unused = [f"  (void){a};" for a in (*inputs, *outputs) if a not in body.read | body.written]
         return "\n".join([head, *unused, *body.lines, "}", ""])
 
@@ -219,13 +219,13 @@ class WarpLanguage(TextLanguage):
     def function(
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
     ) -> str:
-        given = [
+        declarations = [
             f"{a}: {'real' if a in body.scalars else 'wp.array2d(dtype=real)'}"
             for a in (*inputs, *outputs)
         ]
         head = [
             "@wp.kernel(enable_backward=False)",
-            f"def {name}({', '.join(given)}):",
+            f"def {name}({', '.join(declarations)}):",
             "    column = wp.tid()",
         ]
         return "\n".join([*head, *body.lines, "", ""])

@@ -94,22 +94,22 @@ class BatchJob:
 
     def run_single(self, index: int) -> None:
         """Simulate one plant alone, exactly as `simulate` would, and write its results."""
-        one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
+        plant = self.compiled.at(self.variations.parameters(index), self.nominal[index])
         state = self.initial_states[index]
         if not self.loops:
             segments = self.segments[index]
-            raw = self.integrator.run(one, segments, self.start_time, state, self.times)
-            self._write(index, one, self._truncate(raw), segments, {})
+            raw = self.integrator.run(plant, segments, self.start_time, state, self.times)
+            self._write(index, plant, self._truncate(raw), segments, {})
             return
         loop = self.loop_of(index)
-        run = self._integrated(index, one, loop)
+        run = self._integrated(index, plant, loop)
         times, rows = run.rows
         if loop.prepared.loop.drivers:  # there may be further rows
             at = np.searchsorted(times, self.times - 1e-9 * self.duration)
             rows = rows[at[at < times.size]]
         at, setpoints = loop.prepared.at_times
         more = run.columns(at[: len(rows)], setpoints[: len(rows)]) if len(run.measured) else {}
-        self._write(index, one, self._truncate(run.raw(rows)), run.signal, more)
+        self._write(index, plant, self._truncate(run.raw(rows)), run.signal, more)
         self._runs.give_back(id(loop), run)
 
     def loop_of(self, index: int) -> CompiledLoop:
@@ -128,7 +128,7 @@ class BatchJob:
                 self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared)
         return self._prepared[id(loop)]
 
-    def _integrated(self, index: int, one: CompiledSystem, loop: CompiledLoop) -> CompiledRun:
+    def _integrated(self, index: int, plant: CompiledSystem, loop: CompiledLoop) -> CompiledRun:
         """The loop of one plant, integrated from its initial state; it serves another one when it
         is given back.
         """
@@ -137,11 +137,13 @@ class BatchJob:
         begin = loop.prepared.loop.init
         run: CompiledRun | None = self._runs.borrow(id(loop))
         if run is None:
-            run = CompiledRun(loop, one, self.integrator, state, begin(self.start_time), parameters)
+            run = CompiledRun(
+                loop, plant, self.integrator, state, begin(self.start_time), parameters
+            )
         # a controller of the user may have changed its first memory, although a memory is a value
         else:
             run.restart(
-                one, state, parameters, begin(self.start_time) if loop.law is None else None
+                plant, state, parameters, begin(self.start_time) if loop.law is None else None
             )
         run.integrate()
         return run
@@ -162,7 +164,7 @@ class BatchJob:
     def _write(
         self,
         index: int,
-        one: CompiledSystem,
+        plant: CompiledSystem,
         raw: RawSolution,
         segments: PiecewiseLinear,
         more: Mapping[str, Array],
@@ -170,15 +172,15 @@ class BatchJob:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
         values = [*states.T]
-        kept = self.kept.tolist()
-        if any(len(values) <= place < self.own for place in kept):  # outputs or inputs are stored
-            recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(one)
-            recorder.adopt(one)
+        places = self.kept.tolist()
+        if any(len(values) <= place < self.own for place in places):  # outputs or inputs are stored
+            recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(plant)
+            recorder.adopt(plant)
             table = recorder.evaluate(states, self.times[:reached], segments, self.start_time)
             self._recorders.give_back(None, recorder)
             values += [*table.outputs.T, *table.inputs.T]
         with np.errstate(over="ignore"):  # a column in single precision
-            for place, (name, column) in zip(kept, self.columns.items(), strict=True):
+            for place, (name, column) in zip(places, self.columns.items(), strict=True):
                 if place < self.own:
                     column[index, :reached] = values[place]
                 else:
@@ -255,8 +257,8 @@ def run_workers(
         except KeyboardInterrupt:
             complete = False
             queue.halt()  # the pool does not know a thread whose start was interrupted
-    for each in working:
-        each.result()
+    for future in working:
+        future.result()
     return complete
 
 

@@ -87,10 +87,10 @@ class LaneArrays(abc.ABC):
         self.job = job
         self.step = integrator.step
         self.width = number.lanes
-        self.addresses, held = job.compiled.program.lanes(integrator.tableau(), number)
+        self.addresses, prepared_numbers = job.compiled.program.lanes(integrator.tableau(), number)
         n = sizes.states
         m = sizes.inputs
-        lengths = (sizes.parameters, held, n, n, m, m, m, 1, sizes.outputs, *more)
+        lengths = (sizes.parameters, prepared_numbers, n, n, m, m, m, 1, sizes.outputs, *more)
         self.arrays = [aligned_array((length, self.width), precision.dtype) for length in lengths]
         self.arrays[0][:] = job.compiled.parameters[:, None]
         self.status = np.empty(self.width, dtype=np.int64)
@@ -291,17 +291,19 @@ class LoopLaneBlock(LaneArrays):
 
     def write(self, plants: Plants) -> None:
         job = self.job
-        kept = iter(self.rows)
+        rows_of_plants = iter(self.rows)
         for place, (name, column) in zip(job.kept.tolist(), job.columns.items(), strict=True):
             column[plants] = (
-                next(kept)[: plants.size] if place < job.own else self._of_loop(name, plants)
+                next(rows_of_plants)[: plants.size]
+                if place < job.own
+                else self._of_loop(name, plants)
             )
         self.finish(plants, self.arrays[2].T)
 
     def _of_loop(self, name: str, plants: Plants) -> Array:
         """A column (R, T) of the set points, measurements or commands of plants."""
         signals = self.job.loops[0].signals
-        prefix = next(each for each in signals if name.startswith(each))
+        prefix = next(signal_prefix for signal_prefix in signals if name.startswith(signal_prefix))
         index = signals[prefix].index(name.removeprefix(prefix))
         if prefix == SETPOINT:
             return np.array(
@@ -326,9 +328,9 @@ class SegmentTable:
         self.values = np.ascontiguousarray(np.concatenate([s.values for s in distinct]))
         self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in distinct]))
         ends = np.cumsum([s.ends.size for s in distinct])
-        own = np.array([number[key] for key in map(id, job.segments)])
-        self.first = np.append(0, ends)[own]
-        self.last = ends[own]
+        signal_of_plant = np.array([number[key] for key in map(id, job.segments)])
+        self.first = np.append(0, ends)[signal_of_plant]
+        self.last = ends[signal_of_plant]
 
 
 def lane_workers(

@@ -109,7 +109,7 @@ def simulate_batch(
 
 
 def _times(
-    given: float | npt.ArrayLike | None,
+    requested: float | npt.ArrayLike | None,
     start: float,
     duration: float,
     input: object,
@@ -123,7 +123,7 @@ def _times(
     if keep is not None and len(keep) == 0:
         return end
     return times_of(
-        given, start, duration, segments[0].ends if isinstance(input, InputSignal) else end
+        requested, start, duration, segments[0].ends if isinstance(input, InputSignal) else end
     )
 
 
@@ -219,23 +219,23 @@ def _segments(
     """The segments of the input of each plant; the same object where it is the same signal."""
     known: dict[int, PiecewiseLinear] = {}
     signals = [input] if isinstance(input, InputSignal) else list(input)
-    for row, one in enumerate(signals):
-        if id(one) in known:
+    for row, signal in enumerate(signals):
+        if id(signal) in known:
             continue
-        if not isinstance(one, InputSignal):
+        if not isinstance(signal, InputSignal):
             raise ParameterError(
-                f"inputs, row {row} is {one_line(one)}; give a Schedule or a SampledSignal."
+                f"inputs, row {row} is {one_line(signal)}; give a Schedule or a SampledSignal."
             )
         try:
-            segments = one.checked_segments(compiled.description.input_names, start, duration)
+            segments = signal.checked_segments(compiled.description.input_names, start, duration)
             check_input_range(compiled, segments, start)
         except ParameterError as error:
             raise (
                 error if isinstance(input, InputSignal) else error.located(f"inputs, row {row}")
             ) from None
-        known[id(one)] = segments
-    each = tuple(known[id(one)] for one in signals)
-    return each * count if isinstance(input, InputSignal) else each
+        known[id(signal)] = segments
+    segments_of_signals = tuple(known[id(signal)] for signal in signals)
+    return segments_of_signals * count if isinstance(input, InputSignal) else segments_of_signals
 
 
 def _kept(job: BatchJob, keep: Sequence[str] | None) -> tuple[str, ...]:
@@ -246,13 +246,15 @@ def _kept(job: BatchJob, keep: Sequence[str] | None) -> tuple[str, ...]:
     return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
 
 
-def _loops_of(given: Any, system: System) -> tuple[ControlLoop, ...]:
+def _loops_of(inputs_of_plants: Any, system: System) -> tuple[ControlLoop, ...]:
     """The control loops among the inputs of a batch; none where its inputs are signals.
 
     Raises ParameterError where signals and loops are mixed, or loops of different controllers.
     """
-    inputs = tuple(given) if isinstance(given, Sequence) else (given,)
-    loops = tuple(one for one in inputs if isinstance(one, ControlLoop))
+    inputs = (
+        tuple(inputs_of_plants) if isinstance(inputs_of_plants, Sequence) else (inputs_of_plants,)
+    )
+    loops = tuple(signal for signal in inputs if isinstance(signal, ControlLoop))
     if not loops:
         return ()
     if len(loops) < len(inputs):
@@ -274,19 +276,25 @@ def _loops_of(given: Any, system: System) -> tuple[ControlLoop, ...]:
 
 def _vary(
     plant: System,
-    given: Mapping[str, npt.ArrayLike],
+    varied_columns: Mapping[str, npt.ArrayLike],
     loops: tuple[ControlLoop, ...],
     count: int | None,
 ) -> tuple[Variations, Variations | None]:
     """The variations of the plants, and those of the controllers, whose paths begin with
     "controller.".
     """
-    if not loops or not isinstance(given, Mapping):
-        return variations_of(plant, given, count), None
+    if not loops or not isinstance(varied_columns, Mapping):
+        return variations_of(plant, varied_columns, count), None
     plants = {
-        path: values for path, values in given.items() if not str(path).startswith(CONTROLLER)
+        path: values
+        for path, values in varied_columns.items()
+        if not str(path).startswith(CONTROLLER)
     }
-    laws = {path[len(CONTROLLER) :]: given[path] for path in given if path not in plants}
+    laws = {
+        path[len(CONTROLLER) :]: varied_columns[path]
+        for path in varied_columns
+        if path not in plants
+    }
     if not laws:
         return variations_of(plant, plants, count), None
     controller = loops[0].controller
@@ -314,18 +322,20 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     if not active.size:
         return
     if in_lanes := lane_workers(job, active, precision, cores):
-        queue, workers, each = in_lanes
+        queue, workers, plants_at_once = in_lanes
     else:
         job.run_single(
             int(active[0])
         )  # what compiles, compiles here, before threads need it at once
         queue = Queue(active.size - 1)
-        each = 1
+        plants_at_once = 1
         queue.stop[0] = job.status[active[0]] == Status.INTERRUPTED
         active = active[1:]
         workers = [lambda item: job.run_single(int(active[item]))] * min(cores, active.size)
     with progress(f"simulating {active.size} plants", active.size) as advanced:
-        complete = run_workers(queue, workers, lambda done: advanced(min(done * each, active.size)))
+        complete = run_workers(
+            queue, workers, lambda done: advanced(min(done * plants_at_once, active.size))
+        )
     if not complete or queue.stop[0]:
         for left in np.flatnonzero(job.status == NOT_RUN):
             job.mark_not_run(int(left), Status.INTERRUPTED)

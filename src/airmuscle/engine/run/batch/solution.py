@@ -96,11 +96,11 @@ class BatchSolution:
         index = self._row(index)
         system = self.plant(index)
         rows = slice(int(self.reached[index]))
-        kept = {
+        stored = {
             name: np.asarray(values[index, rows], dtype=float)
             for name, values in self.columns.items()
         }
-        columns = {"time": self.time[rows], **kept}
+        columns = {"time": self.time[rows], **stored}
         remarks = [
             *system.describe(),
             *(system.diagnose(Columns(columns)) if self.reached[index] else []),
@@ -114,12 +114,12 @@ class BatchSolution:
 
     def __repr__(self) -> str:
         failed = f", {self.failed.size} failed" if self.failed.size else ""
-        kept = (
+        content = (
             f"{', '.join(self.columns)} at {self.time.size} times"
             if self.columns
             else "final states"
         )
-        return f"BatchSolution({len(self)} plants: {kept}{failed})"
+        return f"BatchSolution({len(self)} plants: {content}{failed})"
 
 
 @contextlib.contextmanager

@@ -70,7 +70,9 @@ class BatchStepper:
         self._options = {"integrator": integrator, "precision": precision, "cores": cores}
         self.dtype: Any = precision.dtype
         self.blocks = -(-count // self.width)
-        (prepare, *functions), held = compiled.program.lanes(integrator.tableau(), number)
+        (prepare, *functions), prepared_numbers = compiled.program.lanes(
+            integrator.tableau(), number
+        )
         self._program, self._prepare = compiled.program, _PREPARE(prepare)
         sizes = compiled.sizes
         self.states, self.inputs = self._columns(sizes.states), self._columns(sizes.inputs)
@@ -78,7 +80,7 @@ class BatchStepper:
             self._columns(sizes.parameters),
             self._columns(sizes.outputs),
         )
-        self._held = self._columns(held)
+        self._held = self._columns(prepared_numbers)
         self.parameters[:] = compiled.parameters[None, :, None]
         self.prepare()
         cores = min(cores or available_cores(), self.blocks)
@@ -101,10 +103,10 @@ class BatchStepper:
 
     def __setstate__(self, stored: dict[str, Any]) -> None:
         self.__init__(stored["plant"], stored["count"], **stored["options"])  # type: ignore[misc]
-        for own, array in zip(
+        for table, array in zip(
             (self.states, self.inputs, self.parameters, self.outputs), stored["arrays"], strict=True
         ):
-            own[...] = array
+            table[...] = array
         self.prepare()
 
     def _columns(self, length: int, blocks: int | None = None) -> Columns:
@@ -119,7 +121,7 @@ class BatchStepper:
         m = self.inputs.shape[1]
         still = self._columns(m, 1)[0]
         h = self._columns(1, 1)[0]
-        other = self._columns(n, 1)[0]
+        next_states = self._columns(n, 1)[0]
         h[:] = length
         return lane_blocks.bind(
             *functions,
@@ -128,7 +130,7 @@ class BatchStepper:
             self._held,
             still,
             h,
-            other,
+            next_states,
             self.outputs,
             span,
             self._steps,

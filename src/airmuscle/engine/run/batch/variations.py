@@ -109,29 +109,33 @@ class Column(np.ndarray):
         return bool(answers.any())
 
 
-def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
+def variations_of(
+    system: Any, columns_by_path: Mapping[str, npt.ArrayLike], count: int | None
+) -> Variations:
     """The variations of a System, or of a controller. Raises ParameterError for an unknown path or
     an impossible value.
 
     `count` is the number of plants where initial states or inputs determine it.
     """
-    if not isinstance(given, Mapping):
+    if not isinstance(columns_by_path, Mapping):
         raise ParameterError(
-            f"variations: they are {one_line(given)}; give a column of values for each path."
+            f"variations: they are {one_line(columns_by_path)}; give a column of values for each"
+            " path."
         )
     leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(tree.leaves(system))}
     columns = []
-    for path, values in given.items():
+    for path, values in columns_by_path.items():
         check_known(f"variations: {type(system).__name__} has no parameter", path, leaves)
         columns.append(_column(leaves[path][1], values))
-    follow = tree.absolute_pressures(system, dict(zip(given, columns, strict=True)))
-    given = {**given, **follow}
+    follow = tree.absolute_pressures(system, dict(zip(columns_by_path, columns, strict=True)))
+    columns_by_path = {**columns_by_path, **follow}
     columns += [_column(leaves[path][1], values) for path, values in follow.items()]
-    sizes = {path: len(column) for path, column in zip(given, columns, strict=True)}
+    sizes = {path: len(column) for path, column in zip(columns_by_path, columns, strict=True)}
     if len({*sizes.values(), *(() if count is None else (count,))}) > 1:
-        others = "" if count is None else f", and initial states or inputs for {count}"
+        counted_by_rest = "" if count is None else f", and initial states or inputs for {count}"
         raise ParameterError(
-            f"variations: every column needs one value per plant; there are {sizes}{others}."
+            f"variations: every column needs one value per plant; there are {sizes}"
+            f"{counted_by_rest}."
         )
     count = next(iter(sizes.values()), count)
     if count is None:
@@ -143,20 +147,23 @@ def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | 
         raise ParameterError("simulate_batch: there are no plants; give at least one row.")
     table = np.column_stack(columns) if columns else np.empty((count, 0))
     varied = Variations(
-        system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table
+        system,
+        tuple(columns_by_path),
+        np.array([leaves[p][0] for p in columns_by_path], dtype=np.intp),
+        table,
     )
     varied.check_consistent()
     return varied
 
 
-def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
+def _column(leaf: tree.Leaf, column: npt.ArrayLike) -> Array:
     """One parameter of all plants, within its bounds."""
     try:
-        values = np.array(given, dtype=float)
+        values = np.array(column, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError(
             f"variations: '{leaf.path}' must be numbers, one for each plant; it is"
-            f" {one_line(given)}."
+            f" {one_line(column)}."
         ) from None
     if values.ndim != 1:
         raise ParameterError(
@@ -178,14 +185,16 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
     return values
 
 
-def given_states(variations: Variations, given: Mapping[str, npt.ArrayLike], count: int) -> Array:
+def given_states(
+    variations: Variations, states_by_name: Mapping[str, npt.ArrayLike], count: int
+) -> Array:
     """Initial states (N, n) from numbers or columns (N,) by name. Raises ParameterError for an
     impossible one.
     """
     system = variations.system
     names = [s.name for s in system.states]
-    check_known("the plant has no state", given, names)
-    missing = [name for name in names if name not in given]
+    check_known("the plant has no state", states_by_name, names)
+    missing = [name for name in names if name not in states_by_name]
     if missing:
         raise ParameterError(
             f"initial_states lack {', '.join(missing)}; give a number for all, or a column (N,)."
@@ -193,11 +202,11 @@ def given_states(variations: Variations, given: Mapping[str, npt.ArrayLike], cou
     states = np.empty((count, len(names)))
     for i, name in enumerate(names):
         try:
-            states[:, i] = given[name]
+            states[:, i] = states_by_name[name]
         except (TypeError, ValueError):
             raise ParameterError(
-                f"initial_states: '{name}' is {str(given[name])[:80]}; it must be a number for all,"
-                " or a column (N,)."
+                f"initial_states: '{name}' is {str(states_by_name[name])[:80]}; it must be a number"
+                " for all, or a column (N,)."
             ) from None
         wrong = np.flatnonzero(~np.isfinite(states[:, i]))
         if wrong.size:
