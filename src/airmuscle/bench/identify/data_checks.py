@@ -21,12 +21,17 @@ from ..segment import estimate_noise, estimate_sensors, find_outliers, remembere
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .matched_rows import match_rows
+from .misfit import Misfit
 from .weighting import Huber
 
 MAX_MISFIT = 3.0
 MIN_MISFIT = 0.002
 """Residual above which the law does not follow the data: ratio to their scatter, and to the maximum
 force, below which it is within the accuracy of load cells (chosen).
+"""
+MARGIN = 1.645
+"""Standard errors of the rms error by which it must exceed this ratio: 5 % of the laws that reach
+it exactly exceed it by chance.
 """
 MIN_UNREPEATABLE = 0.005
 """Residual above which a difference of repeated runs is named that exceeds the noise by the first
@@ -58,30 +63,38 @@ class Scatter:
         if self.branches:
             yield NamedValue("distance of the branches", self.branches, "N", digits=3)
 
-    def misfit_notes(self, rmse: float, greatest: float, lengths: int = 1) -> list[str]:
-        """The remark that a residual [N] is greater than the scatter explains. A static law follows
-        the middle of two branches. `greatest` is the maximum force of the data [N], `lengths` the
-        number of resting lengths that a law without an effect of the length is fitted to."""
+    def misfit(self, rmse: float, rows: int, greatest: float, lengths: int = 1) -> Misfit | None:
+        """The misfit of a law whose residual [N] is greater than the scatter explains, without its
+        causes; None of a law that follows the data, or where their scatter is not known. A static
+        law follows the middle of two branches.
+
+        rmse      rms error of the law [N], which `rows` of the data determine
+        greatest  maximum force of the data [N]
+        lengths   number of resting lengths that a law without an effect of the length is fitted to
+        """
         known = [each for each in (self.noise, self.repeatability) if each is not None]
         noise = known[0] if known else 0.0
         within = max(noise, 0.5 * self.branches)
         expected = max([*known, within])
         parts = ", ".join(f"{each.name} {each.value:.3g} N" for each in self.values())
-        if not known or rmse <= MAX_MISFIT * within or rmse <= MIN_MISFIT * greatest:
-            return []
-        if rmse > MAX_MISFIT * expected:
-            return [
+        least = rmse * (1.0 - MARGIN / np.sqrt(2.0 * max(rows, 2)))
+        if not known or least <= MAX_MISFIT * within or rmse <= MIN_MISFIT * greatest:
+            return None
+        if least > MAX_MISFIT * expected:
+            return Misfit(
                 f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the"
                 f" data ({parts}): the law does not follow them. "
                 + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
-                + "Compare other laws, and check the remarks on contradicting or suspicious data."
-            ]
+                + "Compare other laws, and check the remarks on contradicting or suspicious data.",
+                rmse / expected,
+            )
         if rmse <= MIN_UNREPEATABLE * greatest:
-            return []
-        return [
+            return None
+        return Misfit(
             f"The rms error, {rmse:.3g} N, is {rmse / within:.2g} times the scatter within a run"
-            f" ({parts}), although repeated runs differ by a similar amount."
-        ]
+            f" ({parts}), although repeated runs differ by a similar amount.",
+            rmse / expected,
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,9 +106,9 @@ class Remarks:
     scatter: Scatter
     delay: SensorDelay | None
     """Delay of the force after the pressure; None without one."""
-    misfit: tuple[str, ...] = ()
-    """The remark that the law does not follow the data, with the causes that explain the residuals;
-    it is among the notes."""
+    misfit: Misfit | None = None
+    """That the law does not follow the data, with the causes that explain the residuals; its text
+    is among the notes."""
 
 
 MIN_DISTANCE = 0.02
@@ -204,15 +217,15 @@ def check_data(recordings: Sequence[Recording]) -> Remarks:
         *saturation_notes(measured),
         *delay_notes(delay),
     )
-    # The noise only where the rows are in order of time.
-    timed = [run["force"] for run in measured if "time" in run and "force" in run]
-    noise = (
-        float(np.median([estimate_noise(force[np.isfinite(force)]) for force in timed]))
-        if timed
-        else 0.0
-    )
-    scatter = Scatter(noise if noise > 0 else None, repeatability(matches))
+    scatter = Scatter(force_noise(measured), repeatability(matches))
     return Remarks((*find_suspicious(recordings), *found), scatter, delay)
+
+
+def force_noise(recordings: Sequence[Recording]) -> float | None:
+    """The noise of the force [N]; None where it is not known, as of rows in no order of time."""
+    timed = [run["force"] for run in recordings if "time" in run and "force" in run]
+    noise = [estimate_noise(force[np.isfinite(force)]) for force in timed]
+    return float(np.median(noise)) or None if noise else None
 
 
 def level_text(name: str, value: float) -> str:

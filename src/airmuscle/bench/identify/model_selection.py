@@ -57,7 +57,7 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
     ]
     recommended = simplest([m for m in equivalent if not is_contradicted(m, best)])
     text = (
-        f"Recommended for {split.purpose}: {recommended.candidate.name} with"
+        f"{recommendation(split.purpose, recommended, eligible)}: {recommended.candidate.name} with"
         f" {recommended.parameter_count} parameters, rms error"
         f" {recommended.cross_validated_rmse:.4g} N in leave-one-{split.group_name}-out"
         " cross-validation"
@@ -82,7 +82,25 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
             f" rows of the fit its error is {simpler.in_sample_rmse:.4g} N against"
             f" {best.in_sample_rmse:.4g} N, more than their noise explains."
         )
-    return recommended, text + _pulling(ranking, recommended)
+    misfit = recommended.fit.misfit
+    stated = "" if misfit is None else f" {misfit}"
+    return recommended, text + _pulling(ranking, recommended) + stated
+
+
+def recommendation(purpose: str, recommended: RankedModel, eligible: Sequence[RankedModel]) -> str:
+    """The words before a recommended law for a purpose, which are conditional where the law does
+    not follow the data.
+    """
+    if recommended.fit.misfit is None:
+        return f"Recommended for {purpose}"
+    names = (
+        model.candidate.name
+        for model in eligible
+        if model.fit.scatter is not None and model.fit.misfit is None
+    )
+    follows = next(names, "")
+    missed = f"it does not follow the data as {follows} does" if follows else NONE_FOLLOWS
+    return f"Best of those compared for {purpose}, but {missed}"
 
 
 def simplest(ranking: Sequence[RankedModel]) -> RankedModel:
@@ -148,6 +166,7 @@ SHORT_LISTED = 4
 """Maximum numbers of ranked laws, besides the recommended one, and of excluded laws in the brief
 view (chosen).
 """
+NONE_FOLLOWS = "none follows the data"
 _SLACK_NOTE = (
     "Slack rows: where the muscle was measured slack. A law that pulls there more than three rms"
     " errors of the law and 2 % of the maximum force is not recommended if another law pulls less."
@@ -220,7 +239,7 @@ class Comparison(Reported):
                 *(table for table in (excluded, unavailable) if len(table)),
             ),
             notes=(
-                *self.notes,
+                *(note for note in self.notes if note not in self.reason),
                 *(f"{m.candidate.name}: {note}" for m in self.ranking for note in m.notes),
                 *(f"not compared: {', '.join(laws)}: {cause}." for cause, laws in names.items()),
             ),

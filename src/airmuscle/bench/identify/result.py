@@ -17,6 +17,7 @@ from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.shown import estimate_table
 from ..reported import Reported
 from .data_checks import Remarks, Scatter
+from .misfit import Misfit
 from .parameter_covariance import ParameterCovariance
 from .problem import FORCE, FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
@@ -94,9 +95,9 @@ class Fit(Reported):
         return self._remarks.notes
 
     @property
-    def misfit(self) -> tuple[str, ...]:
-        """The remark that the law does not follow the data, with the causes; empty if it does. It
-        is among the notes.
+    def misfit(self) -> Misfit | None:
+        """That the law does not follow the data, with the causes; None if it does. Its text is
+        among the notes.
         """
         return self._remarks.misfit
 
@@ -276,14 +277,15 @@ class Fit(Reported):
         estimates = estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS)
         tables = (estimates, Table("correlations", "Correlations", correlations, shown=False))
         plots = (Plot("errors", "Modelled against measured values, and residuals.", self.plot),)
+        misfit = "" if self.misfit is None else str(self.misfit)
         return Chapter(
             "fit",
             self._title,
-            f"Standard errors {self.error_basis}.",
+            f"{misfit} Standard errors {self.error_basis}.".lstrip(),
             values=self.goodness(),
             tables=tables,
             plots=plots,
-            notes=self.notes,
+            notes=tuple(note for note in self.notes if note != misfit),
         )
 
     def goodness(self) -> tuple[NamedValue, ...]:

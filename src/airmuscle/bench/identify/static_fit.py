@@ -20,7 +20,6 @@ from .branch_residuals import branch_distance, branch_notes
 from .data_checks import HELD, Remarks, level_text
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
-from .misfit_causes import causes_text, misfit_causes
 from .pooling import check_poolable, make_pooling, pool, population_of
 from .problem import FORCE, RESTING_LENGTH, FitProblem, evaluate
 from .result import Fit
@@ -239,7 +238,7 @@ def examine(
     own = collect_notes(problem, modelled, measured, by_recording, fit)
     notes = (*checks.notes, *map(str, points.repeated), *own, *branches)
     ranges = fit.data_ranges
-    misfit: tuple[str, ...] = ()
+    misfit = None
     notes += tuple(
         f"The {name} was measured at one level, {level_text(name, sum(ranges[name]) / 2)}: how the"
         " force depends on it follows from the form of the law, not from the data. Measure other"
@@ -261,12 +260,10 @@ def examine(
     if quantity == FORCE:
         lengths = {resting_length_of(run) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
-        by_run = np.split(residuals, ends[:-1])
-        misfit = tuple(
-            f"{note} {causes_text(misfit_causes(points.recordings, by_run))}"
-            for note in scatter.misfit_notes(fit.rmse, ranges["force"][1], count)
-        )
-        notes += misfit
+        misfit = scatter.misfit(fit.rmse, fit.degrees_of_freedom, ranges["force"][1], count)
+        if misfit is not None:
+            misfit = misfit.with_causes(points.recordings, np.split(residuals, ends[:-1]))
+            notes += (str(misfit),)
     return dataclasses.replace(checks, notes=notes, scatter=scatter, misfit=misfit)
 
 

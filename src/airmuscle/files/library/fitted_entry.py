@@ -10,6 +10,7 @@ import numpy as np
 
 from ...bench.identify import LEVEL, Fit, RankedModel, standard_candidates
 from ...bench.identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
+from ...bench.identify.misfit import misfit_warning
 from ...bench.identify.specimen_errors import (
     SpecimenErrors,
     ranked_specimen_errors,
@@ -145,7 +146,7 @@ def fitted_entry(
         title=title,
         provenance="fitted",
         note=note,
-        warning="",
+        warning=misfit_warning(result.misfit),
         characteristic=result.model,
         geometry=geometry,
         validity_range=result.validity_range,
@@ -233,6 +234,7 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         friction=None if isinstance(friction, NoFriction) else friction,
         creep=creep if creep.stiffnesses else None,
         note=f"{note} Not identified: {', '.join(left_out)}." if left_out else note,
+        warning=misfit_warning(stage.fit.misfit),
         validity_range=stage.fit.validity_range,
         uncertainty=_uncertainty(campaign, stage),
         error_band=_stated_band(campaign, stage, length),

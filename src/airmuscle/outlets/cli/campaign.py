@@ -31,6 +31,7 @@ from ..requests import (
     braid_of_length,
     check_one_length,
     many,
+    option,
     optional,
     read_braid,
     request,
@@ -56,6 +57,11 @@ class CampaignRequest:
 
     validate: tuple[Path, ...] = many(
         "Record that is kept aside and predicted; repeatable.", metavar="FILE"
+    )
+    accept_misfit: bool = option(
+        "Write the muscle although the rms error of its static law is more than ten times the"
+        " scatter of the data; the file states the misfit.",
+        default=False,
     )
     braid: Braid | None = optional(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from"
@@ -111,7 +117,8 @@ def campaign(
     result = _identify(recordings, geometry, out, execution)
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios = campaign_scenarios(result)
-    entry = _entry(result)
+    refusal = "" if request.accept_misfit else _refusal(result)
+    entry = None if refusal else _entry(result)
     named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
     chapters = [result.chapter(unread, named, validation), *campaign_chapters(result, entry)]
     notes = []
@@ -121,7 +128,11 @@ def campaign(
         notes.append(
             f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}"
         )
-    chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
+    chapters[0] = dataclasses.replace(
+        chapters[0],
+        problems=(*chapters[0].problems, *filter(None, [refusal])),
+        notes=(*chapters[0].notes, *notes),
+    )
     contents = {f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}
     if entry is not None:  # and the muscles of the other resting lengths
         lengths = {
@@ -217,6 +228,12 @@ def _validation(result: Campaign, recording: Recording) -> list[ValidationRow]:
     half = 0.5 * float(np.median(prediction.high - prediction.low))
     rms = float(np.sqrt(np.mean((prediction.force - force)[rows] ** 2)))
     return [ValidationRow(recording.origin, rms, half, float(inside[rows].mean()), int(rows.sum()))]
+
+
+def _refusal(result: Campaign) -> str:
+    """Why the muscle is not written although there is a static law; empty if it may be."""
+    misfit = result.static.fit.misfit if isinstance(result.static, StaticStage) else None
+    return "" if misfit is None else misfit.refusal
 
 
 def _entry(result: Campaign, length: float | None = None) -> Entry | None:

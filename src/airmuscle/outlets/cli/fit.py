@@ -44,7 +44,8 @@ def fit(
 
     \b
     Writes DIR/muscle.toml, which every command accepts as NAME, and DIR/report.html with figures
-    and data. FILES may also be data sets of the library (see airmuscle list).
+    and data. FILES may also be data sets of the library (see airmuscle list). A misfit of the law
+    is stated first; beyond ten times the scatter of the data DIR/muscle.toml needs --accept-misfit.
 
     \b
     Examples:
@@ -77,7 +78,7 @@ def fit(
         found = fit_requested(
             request, files, recordings, lambda _, fraction: show("", fraction), executor
         )
-    muscle = {"muscle.toml": to_toml(found.entry)}
+    muscle = {} if found.refusal else {"muscle.toml": to_toml(found.entry)}
     deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle)
 
 

@@ -232,6 +232,11 @@ class FitRequest:
     uncensored: bool = option(
         "Fit rows at zero force as measured values, not as censored data.", default=False
     )
+    accept_misfit: bool = option(
+        "Write the muscle although the rms error of its law is more than ten times the scatter of"
+        " the data; the file states the misfit.",
+        default=False,
+    )
     equal_weights: bool = option(
         "Equal weights; default: by the sensor resolution of each test rig.", default=False
     )

@@ -50,14 +50,16 @@ rankings (chosen).
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FittedMuscle:
-    """The fit, the muscle with its law, the chapters of the report, remarks on the specimens, and
-    the selection of the law, if laws were compared."""
+    """The fit, the muscle with its law, the chapters of the report, remarks on the specimens, the
+    selection of the law, if laws were compared, and why the muscle must not be written, if the
+    misfit of its law is not accepted."""
 
     fit: Fit
     entry: Entry
     chapters: list[Chapter]
     notes: Sequence[str]
     selection: LawSelection | None = None
+    refusal: str = ""
 
 
 def fit_requested(
@@ -74,8 +76,24 @@ def fit_requested(
     fit.
     """
     recordings = list(recordings)
-    if request.compare:
-        return _compare(request, names, recordings, progress, workers)
+    steps = _compare if request.compare else _fit_named
+    found = steps(request, names, recordings, progress, workers)
+    misfit = found.fit.misfit
+    refusal = "" if misfit is None or request.accept_misfit else misfit.refusal
+    if not refusal:
+        return found
+    first, *others = found.chapters
+    first = dataclasses.replace(first, problems=(*first.problems, refusal))
+    return dataclasses.replace(found, chapters=[first, *others], refusal=refusal)
+
+
+def _fit_named(
+    request: FitRequest,
+    names: Sequence[Path],
+    recordings: list[Recording],
+    progress: Progress | None,
+    workers: Workers,
+) -> FittedMuscle:
     assert request.characteristic is not None
     if not request.uncensored:  # else forces of zero and below are measured values
         support_of(recordings).check(DataUse.FIT)

@@ -99,7 +99,9 @@ def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Rep
 
     named = settings.entry or None
     split = settings.leave_out
-    request = FitRequest(compare=True, characteristic=named, leave_out=split, braid=braid)
+    request = FitRequest(  # the page shows the misfit before the muscle is taken
+        compare=True, characteristic=named, leave_out=split, braid=braid, accept_misfit=True
+    )
     try:
         found = fit_requested(request, names, recordings, progress)
     except AirmuscleError as error:

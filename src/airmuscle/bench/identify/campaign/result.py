@@ -229,7 +229,9 @@ class Campaign(Reported):
             *_next_tables(self.next_experiments),
         )
         tables = tuple(filter(len, tables))
-        return Chapter("campaign", "Overview", " ".join(sentences), tables=tables, notes=notes)
+        misfit = self.static.fit.misfit if isinstance(self.static, StaticStage) else None
+        summary = f"{'' if misfit is None else misfit} {' '.join(sentences)}".lstrip()
+        return Chapter("campaign", "Overview", summary, tables=tables, notes=notes)
 
 
 def main_length(records: Sequence[CampaignRecord]) -> float | None:

@@ -185,8 +185,8 @@ class StaticStage(ShortRepr):
     bands: tuple[ErrorBand, ...]
     """One for each purpose that the records can judge."""
     data_notes: tuple[str, ...] = ()
-    """Contradictions and suspicious values of the records, a misfit of the law with its causes, and
-    the specimen that does not follow the others.
+    """Contradictions and suspicious values of the records, and the specimen that does not follow
+    the others; a misfit of the law is in the reason of the comparison.
     """
     held_band: ErrorBand | None = None
     """For further isometric runs, if the records contain some."""
@@ -289,8 +289,7 @@ def fit_static_stage(
         )
     progress(1.0)
     odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
-    misfit = comparison.recommended.fit.misfit
-    notes = (*check_data([record.recording for record in used]).notes, *misfit, *odd)
+    notes = (*check_data([record.recording for record in used]).notes, *odd)
     return StaticStage(comparison, points, bands, notes, isometric_band)
 
 

@@ -25,8 +25,11 @@ from ....recording.columns import displayed
 from ...checks import DataUse, support_of
 from ...segment import Mask, rate_of_change
 from .. import dynamic
+from ..branch_residuals import branch_distance
 from ..campaign.friction_and_release import predicted_force
 from ..compared_points import FORCE_MARGIN
+from ..data_checks import Scatter, force_noise
+from ..misfit import Misfit
 from ..parameter_covariance import NORMAL_QUANTILE
 from ..problem import FORCE, evaluate, fitted_quantity_of
 from .result import QuantityPrediction, RecordPrediction, with_band_notes
@@ -123,10 +126,25 @@ def predict_static(
         quantity.name, measured, predicted, widths, (tension | pulling) & known, band
     )
     driving = np.column_stack([recording[name] for name in COLUMNS if name != quantity.name])
-    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), outside, driving)
+    misfit = _record_misfit(recording, result) if quantity == FORCE else None
+    prediction = RecordPrediction(
+        recording, (result,), (*remarks, *notes), outside, driving, misfit
+    )
     return with_band_notes(
         prediction, [*differences, *(["a faster motion"] if faster else [])], USUAL_OF_LAWS
     )
+
+
+def _record_misfit(recording: Recording, force: QuantityPrediction) -> Misfit | None:
+    """The misfit of a predicted force, by the rule of a fit; None where it follows the record."""
+    if not force.compared.any():
+        return None
+    residuals = [np.where(force.compared, force.errors, np.nan)]
+    distance = branch_distance([recording], residuals, force.name)
+    scatter = Scatter(force_noise([recording]), None, distance)
+    rows = int(np.count_nonzero(force.compared))
+    misfit = scatter.misfit(force.rms, rows, float(np.nanmax(recording["force"])))
+    return None if misfit is None else misfit.with_causes([recording], residuals)
 
 
 def _rows_with_tension(recording: Recording) -> tuple[Mask, Mask]:

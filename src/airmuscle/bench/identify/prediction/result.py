@@ -17,6 +17,7 @@ from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ...reported import Reported, unit_column
 from ...segment import CONTRACTION_BAND, Mask
 from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
+from ..misfit import Misfit
 
 MIN_SHARE = 0.8
 MIN_ROWS = 5
@@ -90,6 +91,8 @@ class RecordPrediction(Reported):
     """What drives the quantities at the rows (N, K) [SI]: commands of a plant, arguments of a
     law.
     """
+    misfit: Misfit | None = None
+    """That a static law does not follow the record, by the rule of a fit; None if it does."""
 
     @property
     def origin(self) -> str:
@@ -195,6 +198,16 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
     sentences = [
         f"{number} that {model} was not fitted to, predicted and compared with the measured values."
     ]
+    missed = [each for each in predictions if each.misfit is not None]
+    if missed:
+        ratios = ", ".join(
+            f"{each.origin} {each.misfit.ratio:.2g}" for each in missed if each.misfit
+        )
+        sentences.insert(
+            0,
+            f"{model} does not follow {len(missed)} of {number}: rms error over the scatter of the"
+            f" data, {ratios}.",
+        )
     sources = list(
         filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None))
     )
@@ -202,13 +215,27 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
     if not sources and all(quantity.share is None for quantity in quantities):
         reasons = dict.fromkeys(quantity.band or NO_BAND for quantity in quantities)
         sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
-    notes = tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes)
+    notes = tuple(
+        f"{each.origin}: {note}" for each in predictions for note in (*_misfit(each), *each.notes)
+    )
+    warning = getattr(thing, "warning", "")
     title = f"Prediction by {model}"
     references = tuple(cite(thing))
     tables = (_error_table(predictions),)
     return Chapter(
-        "prediction", title, " ".join(sentences), tables=tables, notes=notes, references=references
+        "prediction",
+        title,
+        " ".join(sentences),
+        tables=tables,
+        problems=(warning,) if warning else (),
+        notes=notes,
+        references=references,
     )
+
+
+def _misfit(prediction: RecordPrediction) -> list[str]:
+    """The misfit of a record with its causes, as a note; empty without one."""
+    return [] if prediction.misfit is None else [str(prediction.misfit)]
 
 
 def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
@@ -279,7 +306,8 @@ def _record(prediction: RecordPrediction) -> Chapter:
     summary = f"{errors[:1].upper()}{errors[1:]}."
     tables = (Table("prediction", "Measured and predicted values", columns, series=True),)
     plots = (Plot("prediction", caption, partial(_figure, prediction)),)
-    return Chapter("prediction", title, summary, tables=tables, plots=plots, notes=prediction.notes)
+    notes = (*_misfit(prediction), *prediction.notes)
+    return Chapter("prediction", title, summary, tables=tables, plots=plots, notes=notes)
 
 
 def _figure(prediction: RecordPrediction) -> Any:
