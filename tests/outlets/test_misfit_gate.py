@@ -22,7 +22,7 @@ from widths import widened
 
 import airmuscle as am
 from airmuscle.bench.identify.data_checks import Scatter
-from airmuscle.bench.identify.misfit import MAX_ACCEPTED, Misfit
+from airmuscle.bench.identify.misfit import MAX_ACCEPTED, LawMisfit
 from airmuscle.errors import AirmuscleWarning
 
 SMOOTH = dataclasses.replace(MUSCLE, friction=0.0)
@@ -135,8 +135,8 @@ def test_a_misfit_below_ten_times_the_scatter_is_said_and_the_muscle_is_written(
 
 
 def test_no_verdict_hangs_on_rounding_at_the_limit():
-    assert not Misfit("", MAX_ACCEPTED * (1.0 + 1e-12)).must_be_accepted
-    assert Misfit("", MAX_ACCEPTED + 0.01).must_be_accepted
+    assert not LawMisfit("", MAX_ACCEPTED * (1.0 + 1e-12)).must_be_accepted
+    assert LawMisfit("", MAX_ACCEPTED + 0.01).must_be_accepted
 
 
 def test_a_few_rows_must_exceed_the_limit_by_the_uncertainty_of_their_rms_error():

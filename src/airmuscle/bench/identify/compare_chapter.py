@@ -107,11 +107,8 @@ def select_for_both(
         within = [name for name in not_worse if not is_contradicted(each[name], each[best])]
     chosen = min(within, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
     models = tuple(ranking[chosen] for ranking in rankings)
-    opening = "One law for all purposes"
-    misfit = models[0].fit.misfit
-    if misfit is not None:
-        opening = recommendation("all purposes", models[0], [rankings[0][name] for name in names])
-    lines = [f"{opening}: {chosen} with {models[0].parameter_count} parameters."]
+    opening = recommendation("all purposes", models[0], list(rankings[0].values()))
+    lines = [f"{opening}: {chosen}, one law with {models[0].parameter_count} parameters."]
     for comparison, model, ratio in zip(comparisons, models, ratios(chosen), strict=True):
         lowest_of = eligible_models(comparison.ranking)[0]
         lines.append(
@@ -119,8 +116,12 @@ def select_for_both(
             f" {100 * (ratio - 1):.2g} % above the lowest, {lowest_of.cross_validated_rmse:.4g} N"
             f" of {lowest_of.candidate.name}."
         )
-    lines += [] if misfit is None else [str(misfit)]
-    return LawSelection(comparisons, models, "\n".join(lines))
+    return LawSelection(comparisons, models, "\n".join(lines + _misfit(models[0])))
+
+
+def _misfit(model: RankedModel) -> list[str]:
+    """The misfit of a law with its causes, as a line; empty without one."""
+    return [] if model.fit.misfit is None else [str(model.fit.misfit)]
 
 
 def select_law(

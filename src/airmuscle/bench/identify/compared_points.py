@@ -17,6 +17,7 @@ from .candidates import Candidate, evaluate_force, slack_rows
 from .cross_validation import GroupSplit, label_folds, specimen_name
 from .fit_points import FitPoints
 from .group_refits import GroupRefits, RowIndices
+from .lagging_rows import find_lagging_rows
 from .pooling import Pooling, make_pooling
 from .problem import (
     POINT_COLUMNS,
@@ -71,9 +72,15 @@ def evaluated_rows(runs: Sequence[Recording]) -> EvaluatedRows:
     index = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
     lengths = list(map(resting_length_of, runs))
     muscles = tuple(zip(lengths, map(specimen_name, runs), strict=True))
-    return EvaluatedRows(pressure, contraction, force, index, muscles).at(
-        np.isfinite(pressure + contraction + force)
-    )
+    return EvaluatedRows(pressure, contraction, force, index, muscles).at(evaluated_mask(runs))
+
+
+def evaluated_mask(runs: Sequence[Recording]) -> npt.NDArray[np.bool_]:
+    """The mask of the complete rows of recordings, without those that the force has not yet
+    reached after a jump of the pressure.
+    """
+    columns = [np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS]
+    return np.isfinite(np.stack(columns)).all(axis=0) & ~find_lagging_rows(runs).joined
 
 
 def law_of_length(law: Characteristic, length: float | None, specimen: str = "") -> Any:
@@ -159,8 +166,7 @@ class ComparedPoints:
     @functools.cached_property
     def left_out_rows(self) -> list[EvaluatedRows]:
         """The evaluated rows of each fold."""
-        columns = (self.points.joined[name] for name in POINT_COLUMNS)
-        fold = self.fold_of_rows[np.isfinite(np.stack([*columns])).all(axis=0)]
+        fold = self.fold_of_rows[evaluated_mask(self.recordings)]
         return [self.rows.at(fold == i) for i in range(len(self.folds))]
 
     def slack_pull(self, residuals: Array, rmse: float) -> SlackPull:

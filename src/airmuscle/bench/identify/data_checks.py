@@ -21,7 +21,7 @@ from ..segment import estimate_noise, estimate_sensors, find_outliers, remembere
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .matched_rows import match_rows
-from .misfit import Misfit
+from .misfit import LawMisfit
 from .weighting import Huber
 
 MAX_MISFIT = 3.0
@@ -63,7 +63,7 @@ class Scatter:
         if self.branches:
             yield NamedValue("distance of the branches", self.branches, "N", digits=3)
 
-    def misfit(self, rmse: float, rows: int, greatest: float, lengths: int = 1) -> Misfit | None:
+    def misfit(self, rmse: float, rows: int, greatest: float, lengths: int = 1) -> LawMisfit | None:
         """The misfit of a law whose residual [N] is greater than the scatter explains, without its
         causes; None of a law that follows the data, or where their scatter is not known. A static
         law follows the middle of two branches.
@@ -81,7 +81,7 @@ class Scatter:
         if not known or least <= MAX_MISFIT * within or rmse <= MIN_MISFIT * greatest:
             return None
         if least > MAX_MISFIT * expected:
-            return Misfit(
+            return LawMisfit(
                 f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the"
                 f" data ({parts}): the law does not follow them. "
                 + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
@@ -90,7 +90,7 @@ class Scatter:
             )
         if rmse <= MIN_UNREPEATABLE * greatest:
             return None
-        return Misfit(
+        return LawMisfit(
             f"The rms error, {rmse:.3g} N, is {rmse / within:.2g} times the scatter within a run"
             f" ({parts}), although repeated runs differ by a similar amount.",
             rmse / expected,
@@ -106,7 +106,7 @@ class Remarks:
     scatter: Scatter
     delay: SensorDelay | None
     """Delay of the force after the pressure; None without one."""
-    misfit: Misfit | None = None
+    misfit: LawMisfit | None = None
     """That the law does not follow the data, with the causes that explain the residuals; its text
     is among the notes."""
 

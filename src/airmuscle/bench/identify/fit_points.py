@@ -25,6 +25,7 @@ from ..segment.interval import spread
 from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
 from .data_checks import Remarks, check_data
+from .lagging_rows import find_lagging_rows
 from .parameter_covariance import Runs
 from .problem import (
     POINT_COLUMNS,
@@ -50,7 +51,8 @@ _MAX_ROWS_OF_POINTS = 2000
 class FitPoints:
     """The points of one or several recordings, for fits of any law; the sensors are estimated once.
     `joined` has all rows of the recordings in order. `missing` is the mask of the rows that are not
-    used, because they lack a value or are `repeated` from another recording."""
+    used, because they lack a value, are `repeated` from another recording, or follow a jump of the
+    pressure that the force has not yet reached (`find_lagging_rows`)."""
 
     recordings: tuple[Recording, ...]
     joined: Recording
@@ -104,6 +106,7 @@ class FitPoints:
             missing[
                 starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop
             ] = True
+        missing |= find_lagging_rows(runs).joined
         return cls(runs, joined, missing, dropped, repeated)
 
     @functools.cached_property

@@ -17,7 +17,7 @@ misfit is accepted (chosen: static laws of muscles with friction reach 3.5)."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Misfit:
+class LawMisfit:
     """A law that does not follow the data."""
 
     verdict: str
@@ -27,7 +27,9 @@ class Misfit:
     causes: tuple[MisfitCause, ...] = ()
     """What explains the residuals, the greatest share first."""
 
-    def with_causes(self, recordings: Sequence[Recording], residuals: Sequence[Array]) -> "Misfit":
+    def with_causes(
+        self, recordings: Sequence[Recording], residuals: Sequence[Array]
+    ) -> "LawMisfit":
         """The misfit with the causes of the residuals (model - measured) [N] of the rows of each
         recording, NaN for rows that are not measured.
         """
@@ -58,6 +60,6 @@ class Misfit:
         )
 
 
-def misfit_warning(misfit: Misfit | None) -> str:
+def misfit_warning(misfit: LawMisfit | None) -> str:
     """What a file with a law states of its misfit; empty of a law that follows the data."""
     return "" if misfit is None else misfit.warning

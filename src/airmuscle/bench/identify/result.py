@@ -17,7 +17,7 @@ from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.shown import estimate_table
 from ..reported import Reported
 from .data_checks import Remarks, Scatter
-from .misfit import Misfit
+from .misfit import LawMisfit
 from .parameter_covariance import ParameterCovariance
 from .problem import FORCE, FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
@@ -95,7 +95,7 @@ class Fit(Reported):
         return self._remarks.notes
 
     @property
-    def misfit(self) -> Misfit | None:
+    def misfit(self) -> LawMisfit | None:
         """That the law does not follow the data, with the causes; None if it does. Its text is
         among the notes.
         """

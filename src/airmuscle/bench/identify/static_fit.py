@@ -20,6 +20,7 @@ from .branch_residuals import branch_distance, branch_notes
 from .data_checks import HELD, Remarks, level_text
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
+from .lagging_rows import find_lagging_rows
 from .pooling import check_poolable, make_pooling, pool, population_of
 from .problem import FORCE, RESTING_LENGTH, FitProblem, evaluate
 from .result import Fit
@@ -236,7 +237,8 @@ def examine(
         points.recordings, distance, quantity.name, delayed=checks.delay is not None
     )
     own = collect_notes(problem, modelled, measured, by_recording, fit)
-    notes = (*checks.notes, *map(str, points.repeated), *own, *branches)
+    late = find_lagging_rows(points.recordings).notes()
+    notes = (*checks.notes, *map(str, points.repeated), *late, *own, *branches)
     ranges = fit.data_ranges
     misfit = None
     notes += tuple(

@@ -229,9 +229,14 @@ class Campaign(Reported):
             *_next_tables(self.next_experiments),
         )
         tables = tuple(filter(len, tables))
-        misfit = self.static.fit.misfit if isinstance(self.static, StaticStage) else None
-        summary = f"{'' if misfit is None else misfit} {' '.join(sentences)}".lstrip()
+        summary = " ".join([*_misfit(self.static), *sentences])
         return Chapter("campaign", "Overview", summary, tables=tables, notes=notes)
+
+
+def _misfit(stage: StaticStage | LeftOutStage) -> list[str]:
+    """The misfit of the static law, as sentences; empty without one."""
+    misfit = stage.fit.misfit if isinstance(stage, StaticStage) else None
+    return [] if misfit is None else [str(misfit)]
 
 
 def main_length(records: Sequence[CampaignRecord]) -> float | None:

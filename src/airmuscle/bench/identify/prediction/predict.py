@@ -29,7 +29,8 @@ from ..branch_residuals import branch_distance
 from ..campaign.friction_and_release import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..data_checks import Scatter, force_noise
-from ..misfit import Misfit
+from ..lagging_rows import find_lagging_rows
+from ..misfit import LawMisfit
 from ..parameter_covariance import NORMAL_QUANTILE
 from ..problem import FORCE, evaluate, fitted_quantity_of
 from .result import QuantityPrediction, RecordPrediction, with_band_notes
@@ -105,7 +106,9 @@ def predict_static(
             law, recording, friction or NoFriction(), creep or CreepElements(), limit
         )
         predicted = np.maximum(force, 0.0)
-        slack = complete & ~tension
+        late = find_lagging_rows([recording])
+        remarks += late.notes()
+        slack = complete & ~tension & ~late.joined
         pulling = slack & (predicted > (half_width or 0.0))
         if pulling.any():
             remarks.append(
@@ -126,7 +129,7 @@ def predict_static(
         quantity.name, measured, predicted, widths, (tension | pulling) & known, band
     )
     driving = np.column_stack([recording[name] for name in COLUMNS if name != quantity.name])
-    misfit = _record_misfit(recording, result) if quantity == FORCE else None
+    misfit = _record_misfit(recording, result)
     prediction = RecordPrediction(
         recording, (result,), (*remarks, *notes), outside, driving, misfit
     )
@@ -135,9 +138,11 @@ def predict_static(
     )
 
 
-def _record_misfit(recording: Recording, force: QuantityPrediction) -> Misfit | None:
-    """The misfit of a predicted force, by the rule of a fit; None where it follows the record."""
-    if not force.compared.any():
+def _record_misfit(recording: Recording, force: QuantityPrediction) -> LawMisfit | None:
+    """The misfit of a predicted force, by the rule of a fit; None where it follows the record, and
+    of another quantity.
+    """
+    if force.name != FORCE.name or not force.compared.any():
         return None
     residuals = [np.where(force.compared, force.errors, np.nan)]
     distance = branch_distance([recording], residuals, force.name)

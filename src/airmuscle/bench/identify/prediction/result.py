@@ -17,7 +17,7 @@ from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ...reported import Reported, unit_column
 from ...segment import CONTRACTION_BAND, Mask
 from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
-from ..misfit import Misfit
+from ..misfit import LawMisfit
 
 MIN_SHARE = 0.8
 MIN_ROWS = 5
@@ -91,7 +91,7 @@ class RecordPrediction(Reported):
     """What drives the quantities at the rows (N, K) [SI]: commands of a plant, arguments of a
     law.
     """
-    misfit: Misfit | None = None
+    misfit: LawMisfit | None = None
     """That a static law does not follow the record, by the rule of a fit; None if it does."""
 
     @property
@@ -198,16 +198,7 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
     sentences = [
         f"{number} that {model} was not fitted to, predicted and compared with the measured values."
     ]
-    missed = [each for each in predictions if each.misfit is not None]
-    if missed:
-        ratios = ", ".join(
-            f"{each.origin} {each.misfit.ratio:.2g}" for each in missed if each.misfit
-        )
-        sentences.insert(
-            0,
-            f"{model} does not follow {len(missed)} of {number}: rms error over the scatter of the"
-            f" data, {ratios}.",
-        )
+    sentences = [*_missed(model, predictions), *sentences]
     sources = list(
         filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None))
     )
@@ -215,9 +206,6 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
     if not sources and all(quantity.share is None for quantity in quantities):
         reasons = dict.fromkeys(quantity.band or NO_BAND for quantity in quantities)
         sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
-    notes = tuple(
-        f"{each.origin}: {note}" for each in predictions for note in (*_misfit(each), *each.notes)
-    )
     warning = getattr(thing, "warning", "")
     title = f"Prediction by {model}"
     references = tuple(cite(thing))
@@ -227,9 +215,26 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
         title,
         " ".join(sentences),
         tables=tables,
-        problems=(warning,) if warning else (),
-        notes=notes,
+        problems=tuple(filter(None, [warning])),
+        notes=_notes(predictions),
         references=references,
+    )
+
+
+def _missed(model: str, predictions: Sequence[RecordPrediction]) -> list[str]:
+    """The sentence on the records that the model does not follow; empty without any."""
+    ratios = [f"{p.origin} {p.misfit.ratio:.2g}" for p in predictions if p.misfit is not None]
+    text = (
+        f"{model} does not follow {len(ratios)} of {counted(len(predictions), 'record')}: rms error"
+        f" over the scatter of the data, {', '.join(ratios)}."
+    )
+    return [text] if ratios else []
+
+
+def _notes(predictions: Sequence[RecordPrediction]) -> tuple[str, ...]:
+    """The notes of all records with their names, misfits first."""
+    return tuple(
+        f"{each.origin}: {note}" for each in predictions for note in (*_misfit(each), *each.notes)
     )
 
 
