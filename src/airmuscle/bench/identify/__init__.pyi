@@ -19,6 +19,7 @@ from .cross_validation import default_split as default_split
 from .cross_validation import is_pressure_ramp as is_pressure_ramp
 from .cross_validation import label_folds as label_folds
 from .cross_validation import levels_of as levels_of
+from .data_checks import Scatter as Scatter
 from .experiment_design import BenchLimits as BenchLimits
 from .experiment_design import PlannedRun as PlannedRun
 from .experiment_design import candidate_runs as candidate_runs
@@ -34,10 +35,14 @@ from .intervals import ProfileLikelihood as ProfileLikelihood
 from .intervals import confidence_band as confidence_band
 from .intervals import profile as profile
 from .intervals import weakly_determined as weakly_determined
+from .lagging_rows import find_lagging_rows as find_lagging_rows
 from .length_errors import LengthError as LengthError
 from .length_errors import corrected_length as corrected_length
 from .length_errors import estimate_length_error as estimate_length_error
 from .length_errors import find_length_errors as find_length_errors
+from .misfit import MAX_ACCEPTED as MAX_ACCEPTED
+from .misfit import LawMisfit as LawMisfit
+from .misfit import misfit_warning as misfit_warning
 from .model_evidence import aicc as aicc
 from .model_evidence import batch_sample_size as batch_sample_size
 from .model_evidence import effective_sample_size as effective_sample_size

@@ -69,10 +69,13 @@ def evaluated_rows(runs: Sequence[Recording]) -> EvaluatedRows:
     pressure, contraction, force = (
         np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS
     )
-    index = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+    counts = [len(run) for run in runs]
+    index = np.repeat(np.arange(len(runs)), counts)
     lengths = list(map(resting_length_of, runs))
-    muscles = tuple(zip(lengths, map(specimen_name, runs), strict=True))
-    return EvaluatedRows(pressure, contraction, force, index, muscles).at(evaluated_mask(runs))
+    specimens = list(map(specimen_name, runs))
+    muscles = tuple(zip(lengths, specimens, strict=True))
+    rows = EvaluatedRows(pressure, contraction, force, index, muscles)
+    return rows.at(evaluated_mask(runs))
 
 
 def evaluated_mask(runs: Sequence[Recording]) -> npt.NDArray[np.bool_]:

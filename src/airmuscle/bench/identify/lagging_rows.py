@@ -62,14 +62,28 @@ def find_lagging_rows(recordings: Sequence[Recording]) -> LaggingRows:
     """The slack rows within the lag of a jump of the pressure; none where no lag is measured."""
     jumps = [_jumps(run) for run in recordings]
     lag_rows = _lag_rows(recordings, jumps)
-    masks = []
-    for run, jump in zip(recordings, jumps, strict=True):
-        late = np.zeros(len(run), dtype=bool)
-        for rows in range(lag_rows):
-            late[rows:] |= jump[: len(run) - rows]
-        masks.append(late & (run["force"] <= 0.0) if "force" in run else late & False)
-    steps = [float(np.median(np.diff(run["time"]))) for run in recordings if _is_timed(run)]
-    return LaggingRows(tuple(masks), lag_rows * float(np.median(steps)) if steps else 0.0)
+    masks = tuple(
+        _rows_after(jump, lag_rows) & _is_slack(run)
+        for run, jump in zip(recordings, jumps, strict=True)
+    )
+    sample_times = [float(np.median(np.diff(run["time"]))) for run in recordings if _is_timed(run)]
+    sample_time = float(np.median(sample_times)) if sample_times else 0.0
+    return LaggingRows(masks, lag_rows * sample_time)
+
+
+def _rows_after(jumps: Rows, count: int) -> Rows:
+    """The rows (N,) from each jump on, this number of them."""
+    late = np.zeros(jumps.size, dtype=bool)
+    for lag in range(count):
+        late[lag:] |= jumps[: jumps.size - lag]
+    return late
+
+
+def _is_slack(run: Recording) -> Rows:
+    """The rows (N,) without tension."""
+    if "force" not in run:
+        return np.zeros(len(run), dtype=bool)
+    return np.asarray(run["force"] <= 0.0)
 
 
 def _is_timed(run: Recording) -> bool:
@@ -92,16 +106,23 @@ def _lag_rows(recordings: Sequence[Recording], jumps: Sequence[Rows]) -> int:
     """The number of rows that the force needs to follow a jump of the pressure; 0 where this is not
     known.
     """
-    parts = [
-        _responses(run, jump) for run, jump in zip(recordings, jumps, strict=True) if jump.any()
-    ]
-    steps = np.concatenate([np.zeros((0, MAX_LAG_ROWS + 2)), *parts])
-    if len(steps) < MIN_JUMPS * (MAX_LAG_ROWS + 1):
+    tables = [np.zeros((0, MAX_LAG_ROWS + 2))]
+    for run, jump in zip(recordings, jumps, strict=True):
+        if jump.any():
+            tables.append(_responses(run, jump))
+    table = np.concatenate(tables)
+    if len(table) < MIN_JUMPS * (MAX_LAG_ROWS + 1):
         return 0
-    scale = float(np.max(np.abs(steps[:, 1:]))) or 1.0
-    response = np.cumsum(np.linalg.lstsq(steps[:, 1:] / scale, steps[:, 0], rcond=1e-9)[0])
-    settled = response[-1] > 0.0 and bool((response >= SETTLED * response[-1]).any())
-    return int(np.argmax(response >= SETTLED * response[-1])) + 1 if settled else 0
+    force_steps = table[:, 0]
+    pressure_steps = table[:, 1:]
+    scale = float(np.max(np.abs(pressure_steps))) or 1.0
+    solution = np.linalg.lstsq(pressure_steps / scale, force_steps, rcond=1e-9)
+    response = np.cumsum(solution[0])
+    total = float(response[-1])
+    if total <= 0.0:
+        return 0
+    settled = response >= SETTLED * total
+    return int(np.argmax(settled)) + 1
 
 
 def _responses(run: Recording, jumps: Rows) -> Array:
@@ -109,12 +130,15 @@ def _responses(run: Recording, jumps: Rows) -> Array:
     steps of the pressure; shape (M, 2 + `MAX_LAG_ROWS`).
     """
     force = run["force"]
-    pressure = np.diff(run["pressure"], prepend=run["pressure"][0])
-    after = np.flatnonzero(jumps)[:, None] + np.arange(MAX_LAG_ROWS + 1)
-    rows = np.unique(after[(after < len(run)) & (after > MAX_LAG_ROWS)])
     pulls = force > MIN_PULL * float(np.nanmax(force))
-    rows = rows[pulls[rows] & pulls[rows - 1]]
+    pressure_steps = np.diff(run["pressure"], prepend=run["pressure"][0])
+    near = _rows_after(jumps, MAX_LAG_ROWS + 1)
+    near[: MAX_LAG_ROWS + 1] = False
+    near[1:] &= pulls[1:] & pulls[:-1]
+    rows = np.flatnonzero(near)
     columns = [force[rows] - force[rows - 1]]
-    columns += [pressure[rows - lag] for lag in range(MAX_LAG_ROWS + 1)]
+    for lag in range(MAX_LAG_ROWS + 1):
+        columns.append(pressure_steps[rows - lag])
     table = np.stack(columns, axis=1)
-    return table[np.isfinite(table).all(axis=1)]
+    complete = np.isfinite(table).all(axis=1)
+    return np.asarray(table[complete])
