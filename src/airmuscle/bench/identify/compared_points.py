@@ -83,7 +83,8 @@ def evaluated_mask(runs: Sequence[Recording]) -> npt.NDArray[np.bool_]:
     reached after a jump of the pressure.
     """
     columns = [np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS]
-    return np.isfinite(np.stack(columns)).all(axis=0) & ~find_lagging_rows(runs).joined
+    complete = np.isfinite(np.stack(columns)).all(axis=0)
+    return np.asarray(complete & ~find_lagging_rows(runs).joined)
 
 
 def law_of_length(law: Characteristic, length: float | None, specimen: str = "") -> Any:
