@@ -156,6 +156,17 @@ class WithCommandDelay(EnclosingLaw):
             )
 
     @property
+    def irregular(self) -> str:
+        """Why the law is not linearised: its commands are late or lost at random."""
+        if not self.lost and not self.jitter:
+            return ""
+        return (
+            f"the commands of WithCommandDelay are late or lost at random (jitter {self.jitter},"
+            f" lost {self.lost:g}), so that the loop has no margins. Set jitter and lost to 0: with"
+            f" samples={self.samples + self.jitter} every command has the longest delay."
+        )
+
+    @property
     def initial_memory(self) -> dict[str, float]:
         """Whether it has started, the last commands (the newest first), those applied, generator
         and law.

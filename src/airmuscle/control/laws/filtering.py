@@ -300,8 +300,14 @@ class RepetitiveControl(EnclosingLaw):
 
         linear_loop  of the enclosed `law` at the working point, with the same sample time
 
-        Raises ParameterError where that loop is not stable.
+        Raises ParameterError where that loop is not stable, and where its law is periodic.
         """
+        if len(linear_loop.laws) > 1:
+            raise ParameterError(
+                f"RepetitiveControl: the law of this loop has a period of {len(linear_loop.laws)}"
+                " samples, its response is not that of one sample. Put RepetitiveControl inside"
+                " Multirate, and linearise its law alone at that sample time."
+            )
         if not linear_loop.is_stable:
             raise ParameterError(
                 "RepetitiveControl: the loop of the law is not stable, its pole of the greatest"

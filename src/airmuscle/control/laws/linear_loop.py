@@ -34,6 +34,13 @@ NO_GAIN = STABLE = 1e-9
 """Greatest gain of an open loop that counts as none (a closed valve), and by how much the magnitude
 of a pole of a stable loop may exceed 1: enclosed air that is not controlled, rounding (chosen)."""
 
+REST_TIME = 0.1
+REST_TOLERANCE = 0.1
+"""Time [s] over which an operating point is looked at, and by what part of its nominal value a
+state may move in it with the inputs held (chosen)."""
+REST_INSTANTS = 10
+"""Instants in that time."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Margins:
@@ -184,18 +191,31 @@ class LinearLoop:
     law.
 
     plant        linearised, with the delays of its inputs; outputs are the measured columns
-    law          linearised, with the lag and the delay of its sensors in its memory
+    laws         the law linearised at each sample of its period, with the lag and the delay of its
+                 sensors in its memory; one for a law that is the same at all samples
     sample_time  [s]
+    drift        how far each state of the plant moves within 0.1 s, with the inputs held, in the
+                 unit of the state: the residual of the operating point, 0 at an equilibrium
+
+    A law with a part at every n-th sample (Multirate) is lifted: its models describe the loop from
+    period to period, their sample time is n `sample_time`. Reference: Franklin, Powell and Workman
+    (1998), chapter 11.
     """
 
     plant: LinearModel
-    law: LinearLaw
+    laws: tuple[LinearLaw, ...]
     sample_time: float
+    drift: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+    @property
+    def period(self) -> float:
+        """The period [s] of the loop: the sample time times the samples of the law's period."""
+        return self.sample_time * len(self.laws)
 
     @property
     def closed(self) -> SampledModel:
         """The closed loop, from the set points to the measured columns."""
-        return self._model(None)
+        return self._lifted(self._steps(None))
 
     def open_loop(self, column: str | None = None) -> SampledModel:
         """The loop opened at a measured column: from the value that the law receives to minus that
@@ -204,12 +224,24 @@ class LinearLoop:
         Without a column it is the first that is measured. The loops of all other columns remain
         closed: opened at the pressure, a cascade has the open loop of its pressure control, with
         that of the position around it. With L the loop is stable where 1 + L(z) has no zero outside
-        the unit circle. Raises ParameterError for another column.
+        the unit circle. Of a periodic law L is that of the sample at which the law receives the
+        column. Raises ParameterError for another column, and for one that a periodic law receives
+        at several samples of its period.
         """
-        known = self.law.measured
+        known = self.laws[0].measured
         name = known[0] if column is None else column
         check_known("open_loop: the law does not measure", name, known, "it measures")
-        return self._model(known.index(name))
+        steps = self._steps(known.index(name))
+        received = [k for k, step in enumerate(steps) if step.B.any()]
+        if len(received) > 1 and len(steps) > 1:
+            others = self._received_once()
+            raise ParameterError(
+                f"open_loop: the law receives '{name}' at {len(received)} of the {len(steps)}"
+                " samples of its period, so that the loop opened there has no single frequency"
+                f" response. Stability is that of 'is_stable'; margins: {others}."
+            )
+        first = received[0] if received else 0
+        return self._lifted([*steps[first:], *steps[:first]])
 
     @property
     def poles(self) -> npt.NDArray[np.complex128]:
@@ -259,10 +291,11 @@ class LinearLoop:
         closed valve.
         """
         opened = self.open_loop(column)
+        name = column or self.laws[0].measured[0]
         if np.abs(opened.frequency_response(frequency_grid(opened))).max(initial=0.0) < NO_GAIN:
             raise ParameterError(
-                f"the loop that is opened at '{column or self.law.measured[0]}' has no gain at this"
-                " working point. Linearise where the valves are open by a little; a spool within"
+                f"the loop that is opened at '{name}' has no gain at this working point."
+                " Linearise where the valves are open by a little; a spool within"
                 " its overlap is a valve that is closed."
             )
         return opened
@@ -270,23 +303,39 @@ class LinearLoop:
     def step_response(self, setpoint: str, duration: float, size: float = 1.0) -> dict[str, Array]:
         """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of
         a set point.
+
+        Of a periodic law the samples are the first ones of its periods.
         """
-        known = self.law.setpoints
+        known = self.laws[0].setpoints
         check_known("step_response: the law has no set point", setpoint, known)
-        time = self.sample_time * np.arange(max(round(duration / self.sample_time), 1) + 1)
+        time = self.period * np.arange(max(round(duration / self.period), 1) + 1)
         steps = np.zeros((time.size, len(known)))
         steps[:, known.index(setpoint)] = size
         return {
             "time": time,
-            **dict(zip(self.law.measured, self.closed.response(steps).T, strict=True)),
+            **dict(zip(self.laws[0].measured, self.closed.response(steps).T, strict=True)),
         }
 
-    def _model(self, opened: int | None) -> SampledModel:
-        """From the set points to the columns, or from the received value of a column to minus its
-        own.
+    def _received_once(self) -> str:
+        """The columns at which a periodic loop can be opened, in words."""
+        known = self.laws[0].measured
+        once = [
+            f"'{name}'"
+            for i, name in enumerate(known)
+            if sum(bool(step.B.any()) for step in self._steps(i)) == 1
+        ]
+        if once:
+            return f"open the loop at {' or '.join(once)}"
+        return "linearise the loop with Multirate(law, 1) at the sample time of the slower part"
+
+    def _steps(self, opened: int | None) -> list[SampledModel]:
+        """The loop over each sample of the period: from the set points to the columns, or from the
+        received value of a column to minus its own.
         """
         plant = sampled(self.plant, self.sample_time, before=True)
-        law = self.law
+        return [self._step(plant, law, opened) for law in self.laws]
+
+    def _step(self, plant: SampledModel, law: LinearLaw, opened: int | None) -> SampledModel:
         back = np.eye(len(law.measured))
         if opened is not None:
             back[opened, opened] = 0.0
@@ -307,6 +356,15 @@ class LinearLoop:
         return SampledModel(
             a, b, c, np.zeros((len(c), b.shape[1])), self.sample_time, names, inputs, outputs
         )
+
+    def _lifted(self, steps: list[SampledModel]) -> SampledModel:
+        """The steps of a period as one, for inputs that are held over the period."""
+        a = np.eye(len(steps[0].A))
+        b = np.zeros_like(steps[0].B)
+        for step in steps:
+            a = step.A @ a
+            b = step.A @ b + step.B
+        return dataclasses.replace(steps[0], A=a, B=b, sample_time=self.period)
 
 
 def linearise_loop(
@@ -330,9 +388,12 @@ def linearise_loop(
                    of the computer
 
     Sensors have neither noise nor steps. A driver counts as its mean: the opening is the command.
+    A law with a part that is sampled at every n-th sample is lifted over its period, whatever the
+    sample is at which a run has ended.
     Set points that are measured columns are their values. Raises ParameterError for a controller
-    that is no ControlLaw, a state or input that does not fit, and a working point at a kink of the
-    law.
+    that is no ControlLaw, a state or input that does not fit, a state that moves (by more than a
+    tenth of a nominal value within 0.1 s, with the inputs held), a working point at a kink of the
+    law, and a law whose samples have no common period or differ at random.
     """
     loop = designed_loop(loop, plant)
     law = loop.controller
@@ -348,6 +409,8 @@ def linearise_loop(
     }
     model = linearise(plant, state, given)
     loop.check_columns(model.outputs, model.inputs)
+    drift = _drift(model)
+    _check_rest(plant, model, drift)
     columns = model.output_values
     measured = [columns[name] for name in law.measured_columns]
     nominal = {each.name: abs(each.nominal) for each in plant.states}
@@ -361,9 +424,45 @@ def linearise_loop(
         columns.get(name, value) for name, value in zip(law.setpoints, signal.tolist(), strict=True)
     ]
     point = Point(np.array(measured), np.array(setpoints), values, limits[:, 0], limits[:, 1])
-    linear = linearise_law(
+    laws = linearise_law(
         law, loop.sample_time, point, model.input_values, sizes, control_state is not None
     )
     return LinearLoop(
-        model.select(law.inputs, law.measured_columns).with_delay(delay), linear, loop.sample_time
+        model.select(law.inputs, law.measured_columns).with_delay(delay),
+        laws,
+        loop.sample_time,
+        drift,
     )
+
+
+def _drift(model: LinearModel) -> dict[str, float]:
+    """The greatest motion of each state within a time, with the inputs held, by the linear model
+    with the rates of its operating point.
+    """
+    from scipy.linalg import expm
+
+    n = len(model.states)
+    rates = model.rates[:, None]
+    moving = np.block([[model.A, rates], [np.zeros((1, n + 1))]]) * (REST_TIME / REST_INSTANTS)
+    step = expm(moving)
+    state = np.append(np.zeros(n), 1.0)
+    greatest = np.zeros(n)
+    for _ in range(REST_INSTANTS):
+        state = step @ state
+        greatest = np.maximum(greatest, np.abs(state[:n]))
+    return dict(zip(model.states, greatest.tolist(), strict=True))
+
+
+def _check_rest(plant: System, model: LinearModel, drift: Mapping[str, float]) -> None:
+    """Raise ParameterError for a state that moves: it has no margins."""
+    permitted = {each.name: REST_TOLERANCE * abs(each.nominal) for each in plant.states}
+    name = max(drift, key=lambda state: drift[state] / permitted[state], default="")
+    if name and not drift[name] <= permitted[name]:
+        unit = model.units[name]
+        raise ParameterError(
+            f"linearise_loop: this state is no operating point: with these inputs held, '{name}'"
+            f" moves by {drift[name]:.3g} {unit} within {REST_TIME:g} s; allowed:"
+            f" {permitted[name]:.3g} {unit}. Margins belong to a loop at rest. Give the state of"
+            " find_equilibrium(plant, pressure=...) at the pressures of the run, and the inputs"
+            " that hold it."
+        )

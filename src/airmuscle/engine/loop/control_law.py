@@ -51,6 +51,11 @@ class ControlLaw(Controller):
     def inputs(self) -> tuple[str, ...]:
         return inputs_of(self.commanded)
 
+    irregular: ClassVar[Any] = ""
+    """Why the samples of the law have no linearisation that repeats, and what to linearise in its
+    place; empty for a law that has one. A property where it depends on the fields.
+    """
+
     @property
     @abc.abstractmethod
     def initial_memory(self) -> Mapping[str, float]:
@@ -223,6 +228,10 @@ class SigmaDelta(EnclosingLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("inose-1962"),)
+    irregular: ClassVar[Any] = (
+        "SigmaDelta switches between two positions, so that its commands have no slopes. Linearise"
+        " the law inside it, its field 'law', whose commands are the mean of the positions."
+    )
 
     law: ControlLaw
     minimum: float = parameter(

@@ -195,7 +195,7 @@ def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
             reason = str(error)
             continue
         rows = [(each.name, *value_cells(each)) for each in values]
-        text = f"Open loop at {linear.law.measured[0]}, linearised {where}."
+        text = f"Open loop at {linear.laws[0].measured[0]}, linearised {where}."
         return {
             "text": text,
             "rows": rows,
