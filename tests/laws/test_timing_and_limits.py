@@ -433,7 +433,7 @@ def first_order_loop(law):
         ("pressure",),
         ("fill",),
     )
-    return LinearLoop(plant.with_delay(2 * H), linear, H)
+    return LinearLoop(plant.with_delay(2 * H), (linear,), H)
 
 
 def test_repetitive_control_leaves_the_error_that_its_filter_leaves():

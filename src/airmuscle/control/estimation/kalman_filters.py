@@ -82,7 +82,12 @@ class ExtendedKalmanFilter(StateEstimator):
         kept = [
             mean for mean, each in zip(reversed(means), passes, strict=True) if each.row is not None
         ]
-        return {"time": rows.time, **self.table(np.array(kept), rows.held)}
+        measured = [each for each in passes if each.row is not None]
+        return {
+            "time": rows.time,
+            **self.table(np.array(kept), rows.held),
+            **self.rejected_rows(rows, [each.corrected is each.predicted for each in measured]),
+        }
 
     def _kernels(self, at: SimpleNamespace) -> tuple[Any, Any]:
         functions = self._functions

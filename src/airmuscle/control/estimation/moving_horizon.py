@@ -36,8 +36,9 @@ _shortest = Kernel("shortest_vector", "predictive")
 
 class EstimationWindow(NamedTuple):
     """The samples of the window, each its inputs (m,), held before it, and measured columns (p,),
-    NaN where missing; a filter's prediction before the first one, its estimate after the last one,
-    and the noise (z,) of the last solution, from which the next search starts."""
+    NaN where missing or rejected by the gate; a filter's prediction before the first one, its
+    estimate after the last one, and the noise (z,) of the last solution, from which the next search
+    starts."""
 
     arrival: StateEstimate
     samples: tuple[tuple[Array, Array], ...]
@@ -58,7 +59,8 @@ class MovingHorizonEstimator(ShortRepr):
     its prediction before the window (arrival cost). Without bounds and for a linear plant it is the
     Kalman filter; for a nonlinear one the window is linearised anew at its best trajectory. The
     quadratic program of each Gauss-Newton step is solved by the compiled method of
-    LinearModelPredictive, with limits linearised at the last trajectory.
+    LinearModelPredictive, with limits linearised at the last trajectory. A measurement beyond the
+    gate of the filter is an outlier, which the window does not contain.
 
     filter     ExtendedKalmanFilter with model, sample time and noise
     horizon    number N of samples of the window
@@ -88,8 +90,7 @@ class MovingHorizonEstimator(ShortRepr):
         self, first: StateEstimate, values: Sequence[float], inputs: Sequence[float]
     ) -> EstimationWindow:
         """The window of the first sample, whose estimate before its measurement is `first`."""
-        sample = np.array(inputs, dtype=float), np.array(values, dtype=float)
-        filtered, _ = self.filter.correct(first, values, inputs)
+        sample, filtered = self._gated(first, values, inputs)
         return self._solved(EstimationWindow(first, (sample,), filtered, np.zeros(len(first.mean))))
 
     def update(
@@ -98,15 +99,14 @@ class MovingHorizonEstimator(ShortRepr):
         """The window one sample later, with measured columns (p,), NaN where one is missing, and
         inputs held before.
         """
-        sample = np.asarray(inputs, dtype=float), np.asarray(values, dtype=float)
-        predicted = self.filter.predict(window.filtered, sample[0].tolist())
-        filtered, _ = self.filter.correct(predicted, values, inputs)
+        predicted = self.filter.predict(window.filtered, inputs)
+        sample, filtered = self._gated(predicted, values, inputs)
         samples = (*window.samples, sample)
         arrival = window.arrival
         noise = window.noise
         if len(samples) > self.horizon:
             (held, measured), (later, _) = samples[:2]
-            corrected, _ = self.filter.correct(arrival, measured.tolist(), held.tolist())
+            corrected, _ = self.filter.corrected_by_all(arrival, measured.tolist(), held.tolist())
             arrival = self.filter.predict(corrected, later.tolist())
             samples = samples[1:]
             noise = np.zeros(0)
@@ -114,6 +114,18 @@ class MovingHorizonEstimator(ShortRepr):
         return self._solved(
             EstimationWindow(arrival, samples, filtered, np.append(noise, np.zeros(size))[:size])
         )
+
+    def _gated(
+        self, predicted: StateEstimate, values: Sequence[float], inputs: Sequence[float]
+    ) -> tuple[tuple[Array, Array], StateEstimate]:
+        """A sample of the window, without the measurements that the gate rejects, and the estimate
+        of the filter after it.
+        """
+        measured = np.array(values, dtype=float)
+        filtered, innovation = self.filter.correct(predicted, values, inputs)
+        if self.filter.rejects(innovation):
+            measured[:] = np.nan
+        return (np.array(inputs, dtype=float), measured), filtered
 
     def mean(self, window: EstimationWindow) -> Array:
         """The estimated states (n,) at the last sample of a window."""
@@ -123,13 +135,21 @@ class MovingHorizonEstimator(ShortRepr):
         """The columns (N,) of the filter's `estimate`, from a recording with such rows."""
         rows = self.filter.rows(recording)
         window = self.start(first, rows.measured[0], rows.held[0])
-        means = [self.mean(window)]
+        windows = [window]
         none = np.full(len(self.filter.measured), np.nan)
         for count, values, held in zip(rows.counts, rows.measured[1:], rows.held[1:], strict=True):
             for each in (*[none] * (count - 1), values):
                 window = self.update(window, each, held)
-            means.append(self.mean(window))
-        return {"time": rows.time, **self.filter.table(np.array(means), rows.held)}
+            windows.append(window)
+        rejected = [
+            bool(np.isnan(window.samples[-1][1]).all() and np.isfinite(values).any())
+            for window, values in zip(windows, rows.measured, strict=True)
+        ]
+        return {
+            "time": rows.time,
+            **self.filter.table(np.array([self.mean(each) for each in windows]), rows.held),
+            **self.filter.rejected_rows(rows, rejected),
+        }
 
     @property
     def _noisy(self) -> Array:

@@ -4,6 +4,7 @@ filters.
 
 import abc
 import dataclasses
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import (
+    AirmuscleWarning,
     Array,
     ParameterError,
     ShortRepr,
@@ -45,6 +47,12 @@ class StateEstimate(NamedTuple):
 
     mean: Array
     covariance: Array
+
+
+REJECTED = "rejected"
+LOCKED_OUT = 10
+"""Name of the column that states what a gate has rejected; rows that it rejects one after another
+before it warns (chosen)."""
 
 
 class Innovation(NamedTuple):
@@ -264,6 +272,22 @@ class StateEstimator(ShortRepr, abc.ABC):
         SolveError for an infinite value, and where the innovation has no positive definite
         covariance.
         """
+        corrected, innovation = self.corrected_by_all(estimate, values, inputs)
+        return (estimate if self.rejects(innovation) else corrected), innovation
+
+    def rejects(self, innovation: Innovation) -> bool:
+        """Whether an innovation is beyond the gate, so that its measurement is an outlier."""
+        count = innovation.difference.size
+        if self.gate >= 1.0 or not count:
+            return False
+        from scipy.special import chdtri
+
+        return innovation.normalised_square > float(chdtri(count, 1.0 - self.gate))
+
+    def corrected_by_all(
+        self, estimate: StateEstimate, values: Sequence[float], inputs: Sequence[float]
+    ) -> tuple[StateEstimate, Innovation]:
+        """The result of `correct` without its gate."""
         check_count(type(self).__name__, "measured values", values, self.measured)
         given = np.asarray(values, dtype=float)
         if np.isinf(given).any():
@@ -282,13 +306,7 @@ class StateEstimator(ShortRepr, abc.ABC):
         innovation = Innovation(
             bound.difference[here], bound.difference_covariance[np.ix_(here, here)]
         )
-        corrected = self._taken(bound, status, UNDEFINED)
-        if self.gate < 1.0 and here.any():
-            from scipy.special import chdtri
-
-            if innovation.normalised_square > float(chdtri(here.sum(), 1.0 - self.gate)):
-                return estimate, innovation
-        return corrected, innovation
+        return self._taken(bound, status, UNDEFINED), innovation
 
     def columns(self, estimate: StateEstimate, inputs: Sequence[float]) -> dict[str, float]:
         """All states and outputs of the plant at an estimate, such as contraction and force."""
@@ -302,17 +320,45 @@ class StateEstimator(ShortRepr, abc.ABC):
 
         The rows are whole multiples of `sample_time` apart: where samples are lost, nothing
         corrects the estimate between them, nor does a value that is NaN. Inputs are the columns of
-        their names, or the commands of a controller; an input without a column is 0. Raises
-        ParameterError for other times.
+        their names, or the commands of a controller; an input without a column is 0. With a gate,
+        `rejected` is 1 in the rows that it has rejected. Raises ParameterError for other times.
         """
         rows = self.rows(recording)
-        estimates = [
-            passed.corrected for passed in self._passes(rows, first) if passed.row is not None
-        ]
+        passes = [each for each in self._passes(rows, first) if each.row is not None]
         return {
             "time": rows.time,
-            **self.table(np.array([each.mean for each in estimates]), rows.held),
+            **self.table(np.array([each.corrected.mean for each in passes]), rows.held),
+            **self.rejected_rows(rows, [each.corrected is each.predicted for each in passes]),
         }
+
+    def rejected_rows(self, rows: MeasuredRows, rejected: Sequence[bool]) -> dict[str, Array]:
+        """The column `rejected` (N,) of an estimator with a gate: 1 where the gate has rejected the
+        measurements of a row, else 0.
+
+        Warns where it has rejected many rows one after another, as it does after a wrong start.
+        """
+        if self.gate >= 1.0:
+            return {}
+        longest = 0
+        run = 0
+        last = 0
+        for k, refused in enumerate(rejected):
+            run = run + 1 if refused else 0
+            if run > longest:
+                longest = run
+                last = k
+        if longest >= LOCKED_OUT:
+            time = float(rows.time[last - longest + 1])
+            warnings.warn(
+                f"{type(self).__name__}: the gate has rejected {sum(rejected)} of"
+                f" {len(rejected)} rows, {longest} of them one after another from"
+                f" {time:.4g} s on: the estimate was wrong there rather than the measurements."
+                " Give `start` larger deviations, states more process_noise, or a gate nearer to"
+                " 1.",
+                AirmuscleWarning,
+                stacklevel=3,
+            )
+        return {REJECTED: np.array(rejected, dtype=float)}
 
     def rows(self, recording: Recording) -> MeasuredRows:
         """The rows of a recording. Raises ParameterError for times that are no multiples of the

@@ -127,6 +127,11 @@ class EnclosingLaw(ControlLaw):
     initial_memory = forwarded("law.initial_memory")
     """That of the law, unless the enclosing law stores further values."""
 
+    def attained(
+        self, measurement: Measurement, commands: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        return self.law.attained(measurement, commands)
+
 
 def rebuilt(part: Any, change: Callable[[Any], Any]) -> Any:
     """A controller with a change of it and of all that is inside it; the same object where nothing

@@ -190,6 +190,11 @@ class WithStickSlip(ForceWrapper):
                 f"WithStickSlip: {owner} has {len(angles)} angles and {len(self.elements)} elements"
                 " are given; give one for each angle."
             )
+        if {_bristle(c) for c in angles} & {state.name for state in self.inner.inner_states}:
+            raise ParameterError(
+                f"WithStickSlip: {owner} has the bristles of a WithStickSlip already. Give one"
+                " WithStickSlip with one element for each angle, whose torques are the sums."
+            )
         if self.residual is not None and len(self.residual.angle_scales) != len(angles):
             raise ParameterError(
                 f"WithStickSlip: the residual has {len(self.residual.angle_scales)} angles, {owner}"
