@@ -234,6 +234,19 @@ def test_every_law_around_another_one_is_accepted_or_refused_here():
     }
 
 
+@pytest.mark.parametrize("kind", FORMS, ids=lambda kind: kind.__name__)
+def test_a_loop_at_rest_is_not_kicked_by_the_start_of_its_law(kind):
+    """The states of a law start at the working point, which a PID knows by its initial output."""
+    run = simulate(
+        PLANT,
+        loop_of(FORMS[kind](20.0)),
+        duration=0.5,
+        initial_state=STATE,
+        integrator=Rodas4(1e-10),
+    )
+    assert run["position"] == pytest.approx(TARGET, abs=1e-10)
+
+
 def limit_of(form):
     """The gain at which the greatest pole crosses the unit circle."""
 

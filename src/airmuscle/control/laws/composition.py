@@ -33,7 +33,7 @@ class Cascade(ControlLaw):
     `Cascade(PID("position", "pressure", ...), PID("pressure", SplitRange("fill", "discharge"),
     ...), (0.0,), (5e5,))` controls the position by the pressure. `minimum` and `maximum` are the
     ranges of the outer commands, in the order of `outer.inputs` and in SI units; the outer law sees
-    them as the ranges of its inputs, so that it does not wind up. With `tracking`, the saturation
+    them as the ranges of its inputs, so that it does not wind up. By `tracking` the saturation
     of the inner law reaches the outer one, too: while the inner law cannot attain its set point,
     because a command is at the end of its range, the outer law goes on as if it had commanded what
     is attained, so that its anti-windup acts, or its observer predicts with it. Both laws are
@@ -51,7 +51,7 @@ class Cascade(ControlLaw):
     maximum: tuple[float, ...] = parameter(
         "SI", "r_max", "maxima of the outer commands", fitted=False
     )
-    tracking: bool = False
+    tracking: bool = True
 
     def check(self) -> None:
         commanded = self.outer.inputs

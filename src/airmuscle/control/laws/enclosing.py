@@ -129,7 +129,8 @@ class WithCommandDelay(EnclosingLaw):
 
     n `samples`, m `jitter`: the age of the applied command is uniform from n to n + m samples, a
     command is lost with the probability p_l `lost`, and the last one is then held. Before the first
-    command arrives, inputs are 0. The computing time of a controller is a part of its sample time
+    command arrives, inputs are those that the law gives without an error at the first sample, such
+    as the initial output of a PID. The computing time of a controller is a part of its sample time
     where the loop is sampled faster: `WithCommandDelay(Multirate(law, 5), 2)` is a delay of 0.4 of
     the sample time of the law. Seed as in WithSensors.
     """
@@ -178,24 +179,34 @@ class WithCommandDelay(EnclosingLaw):
         return {**own, **random, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        wanted, law = self.law.step(select_prefix("law.", memory), measurement, dt)
+        inner = select_prefix("law.", memory)
+        wanted, law = self.law.step(inner, measurement, dt)
+        resting = self.law.commands_at_rest(inner, measurement, dt)
         kept = select_prefix("random.", memory)
         fresh = seeded(self.seed)
         state = {name: ops.where(memory["started"] > 0, kept[name], fresh[name]) for name in STATE}
         chance, state = drawn(state)
         turn, state = drawn(state)
         more = ops.floor(turn * (self.jitter + 1.0))
+
+        def before(stored: str, name: str) -> Value:
+            return ops.where(memory["started"] > 0, memory[stored], resting[name])
+
         commands: dict[str, Value] = {}
         later: dict[str, Value] = {"started": 1.0}
         for name in self.inputs:
             ages = [
                 wanted[name],
-                *(memory[f"late.{name}.{age}"] for age in range(1, self.samples + self.jitter + 1)),
+                *(
+                    before(f"late.{name}.{age}", name)
+                    for age in range(1, self.samples + self.jitter + 1)
+                ),
             ]
             arrived = ages[self.samples]
             for extra in range(1, self.jitter + 1):
                 arrived = ops.where(more > extra - 0.5, ages[self.samples + extra], arrived)
-            commands[name] = ops.where(chance < self.lost, memory[f"applied.{name}"], arrived)
+            last = before(f"applied.{name}", name)
+            commands[name] = ops.where(chance < self.lost, last, arrived)
             later |= {f"late.{name}.{age}": value for age, value in enumerate(ages[:-1], 1)}
         random = with_prefix("random.", state)
         return commands, {

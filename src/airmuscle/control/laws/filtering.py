@@ -147,8 +147,9 @@ class SmithPredictor(EnclosingLaw):
     y measured column, x response of the model K/(1 + T s) without the dead time of n samples, u the
     command of the law, of two inputs in split range positive less negative. Where the model is
     right, the response is that of the law without dead time, n samples later. The plant must be
-    stable: the error of an integrating one does not vanish after a disturbance. The memory starts
-    at rest with u = 0. Reference: Smith (1957).
+    stable: the error of an integrating one does not vanish after a disturbance. The model starts at
+    rest with the command that the law gives without an error, such as the initial output of a PID.
+    Reference: Smith (1957).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("smith-1957"),)
@@ -185,29 +186,38 @@ class SmithPredictor(EnclosingLaw):
 
     @property
     def initial_memory(self) -> dict[str, float]:
-        """The response of the model now and up to n samples ago (the newest first), and the values
-        of the law.
+        """Whether it has started (0 or 1), the response of the model now and up to n samples ago
+        (the newest first), and the values of the law.
         """
         response = {f"response{age}": 0.0 for age in range(self.samples + 1)}
-        return {**response, **with_prefix("law.", self.law.initial_memory)}
+        return {"started": 0.0, **response, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        now = memory["response0"]
-        before = memory[f"response{self.samples}"]
+        inner = select_prefix("law.", memory)
+        resting = self._output(self.law.commands_at_rest(inner, measurement, dt))
+        past = [
+            ops.where(memory["started"] > 0, memory[f"response{age}"], self.static_gain * resting)
+            for age in range(self.samples + 1)
+        ]
+        now = past[0]
         columns = {
             **measurement.columns,
-            self.column: measurement.columns[self.column] + now - before,
+            self.column: measurement.columns[self.column] + now - past[-1],
         }
-        commands, law = self.law.step(
-            select_prefix("law.", memory), measurement._replace(columns=columns), dt
+        commands, law = self.law.step(inner, measurement._replace(columns=columns), dt)
+        applied = self._output(
+            {name: ops.clip(commands[name], *measurement.ranges[name]) for name in commands}
         )
-        limited = {name: ops.clip(commands[name], *measurement.ranges[name]) for name in commands}
-        positive, *negative = inputs_of(self.commanded)
-        applied = limited[positive] - sum(limited[name] for name in negative)
         kept = ops.exp(-dt / self.time_constant)
-        later = {f"response{age + 1}": memory[f"response{age}"] for age in range(self.samples)}
+        later = {f"response{age + 1}": value for age, value in enumerate(past[:-1])}
         response = {"response0": kept * now + (1.0 - kept) * self.static_gain * applied}
-        return commands, {**response, **later, **with_prefix("law.", law)}
+        own = {"started": 1.0, **response, **later}
+        return commands, {**own, **with_prefix("law.", law)}
+
+    def _output(self, commands: Mapping[str, Value]) -> Value:
+        """The input of the model: of two inputs in split range positive less negative."""
+        positive, *negative = inputs_of(self.commanded)
+        return commands[positive] - sum(commands[name] for name in negative)
 
 
 @model

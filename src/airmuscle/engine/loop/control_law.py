@@ -72,6 +72,19 @@ class ControlLaw(Controller):
         sample.
         """
 
+    def commands_at_rest(
+        self, memory: Memory, measurement: Measurement, dt: Value
+    ) -> Mapping[str, Value]:
+        """The commands, within their ranges, of a sample whose set points are the measured columns:
+        those of the working point at which a law starts.
+        """
+        setpoints = {
+            name: measurement.columns.get(name, value)
+            for name, value in measurement.setpoints.items()
+        }
+        commands, _ = self.step(memory, measurement._replace(setpoints=setpoints), dt)
+        return {name: ops.clip(commands[name], *measurement.ranges[name]) for name in self.inputs}
+
     def attained(
         self, measurement: Measurement, commands: Mapping[str, Value]
     ) -> Mapping[str, Value]:
