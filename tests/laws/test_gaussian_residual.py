@@ -65,6 +65,35 @@ def test_no_closed_cycle_at_constant_pressures_gains_energy():
     assert all(np.min(factor) > 0.0 for factor in factors)
 
 
+def test_a_closed_cycle_with_shut_air_gives_the_energy_that_the_change_of_pressure_gives_the_potential():
+    """The work of the torques is the integral of dV/dp dp: zero at constant pressures, of either
+    sign where the pressures follow the angles.
+    """
+    s = 2 * np.pi * (np.arange(4000) + 0.5) / 4000
+    angles = np.array([0.5 * np.cos(s), 0.4 * np.sin(s)])
+    slopes = np.array([-0.5 * np.sin(s), 0.4 * np.cos(s)])
+    shut = np.array([2e5 * (1 - 0.1 * k + 0.2 * angles[k % 2]) ** -1.4 for k in range(4)])
+    torques, _ = RESIDUAL.evaluate(list(angles), dict(zip(PRESSURES, shut, strict=True)))
+    work = sum(np.mean(torque * slope) for torque, slope in zip(torques, slopes, strict=True))
+
+    def potential(pressures):
+        x = np.array([*angles, *pressures]) / np.array(
+            [*RESIDUAL.angle_scales, *RESIDUAL.pressure_scales]
+        ).reshape(6, 1)
+        centres = np.array(RESIDUAL.centres).reshape(COUNT, 6, 1)
+        return np.exp(-np.sum((x - centres) ** 2, axis=1) / 12).T @ RESIDUAL.energies
+
+    given = 0.0
+    for k in range(4):
+        step = np.zeros((4, 1))
+        step[k] = 1.0
+        by_pressure = (potential(shut + step) - potential(shut - step)) / 2.0
+        rate = np.gradient(np.concatenate([shut[k][-2:], shut[k], shut[k][:2]]), s[1] - s[0])[2:-2]
+        given += np.mean(by_pressure * rate)
+    assert abs(work) > 1e-3
+    assert work == pytest.approx(given, rel=1e-4)
+
+
 def test_torque_and_friction_are_those_of_the_formula():
     place = {"joint1.angle": 0.3, "joint2.angle": -0.5} | dict.fromkeys(PRESSURES, 1.2e5)
     tensions = (30.0, 20.0, 10.0, 40.0)

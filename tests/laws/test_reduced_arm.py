@@ -350,3 +350,28 @@ def test_a_driven_plant_counts_its_muscles_lags_and_pressures():
 def test_a_link_that_cannot_be_is_refused(values, message):
     with pytest.raises(ParameterError, match=message):
         SpatialLink(**{"axis": (0, 0, 1), "rotor_inertia": 0.1, **values})
+
+
+def test_friction_by_load_gives_at_most_what_the_rising_load_gives_its_bristle():
+    """Without a static excess: work given <= integral of theta_s z^2/2 over the rising level; at
+    constant load none is given. Below the sliding range some is.
+    """
+    element = StickSlip(0.3, presliding_angle=0.02)
+    omega = 2 * np.pi
+    step = 5e-4
+    amplitude, swing, phase = np.meshgrid([2e-3, 6e-3, 0.05], [0.0, 1.0], [0.0, 1.5, 3.0, 4.5])
+    bristle = np.zeros_like(amplitude)
+    given = np.zeros_like(amplitude)
+    paid = np.zeros_like(amplitude)
+    for t in np.arange(0.0, 4.0, step):
+        speed = amplitude * omega * np.cos(omega * (t + 0.5 * step))
+        load = 1.0 + swing * np.sin(2 * omega * t + phase)
+        rate = 2 * omega * swing * np.cos(2 * omega * t + phase)
+        middle = bristle + 0.5 * step * element.bristle_rate(bristle, speed)
+        if t >= 3.0:  # a period after the start has faded
+            given += element.torque(middle, load, speed) * speed * step
+            paid += 0.5 * element.presliding_angle * middle**2 * np.maximum(rate, 0.0) * step
+        bristle = bristle + step * element.bristle_rate(middle, speed)
+    assert np.all(given < paid + 1e-6)
+    assert np.all(given[swing == 0.0] < 0.0)
+    assert 1e-3 < given[amplitude == 6e-3].max() < 2e-3

@@ -242,3 +242,11 @@ def test_the_chapter_is_complete():
     assert breaks.note == f"Without violations: {MONOTONE}."
     assert all(claim.place for claim in chapter.claims if claim.kind is Kind.CLAIM)
     assert visible_words(chapter) <= 1350
+
+
+def test_the_ratio_of_the_linearised_fit_nears_one_with_the_points_of_the_curves():
+    ratios = [
+        borzikova.linearised_ratio(round_contraction(sample(CURVES, points)), False)[0]
+        for points in (15, 71)
+    ]
+    assert ratios == pytest.approx([1.038, 1.007], abs=1e-3)

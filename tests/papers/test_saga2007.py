@@ -716,6 +716,10 @@ def test_verdicts_change_with_the_rubber_line():
             low,
             high,
         ]
+    law = interpretation(LINE_A, 2.0, 1.0)
+    assert claims.claim("low start", law).reproduced == pytest.approx(0.0411, abs=5e-5)
+    assert claims.claim("high start", law).reproduced == pytest.approx(1.215, abs=5e-4)
+    assert values.initial_pressure(law) < law.threshold_pressure
     assert verdict(claims.claim("rings contract less", DEFAULT, 0.0)) == DIFFERS
     assert verdict(claims.claim("rings contract less", DEFAULT, 100.0)) == HOLDS
     assert (

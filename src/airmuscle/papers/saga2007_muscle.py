@@ -168,7 +168,7 @@ def lifting(law: am.characteristic.Characteristic) -> tuple[float, str]:
 
 def initial_pressure(law: am.characteristic.Saga2007) -> float:
     """Return the pressure [Pa] for 1 % contraction without load."""
-    return max(law.threshold_pressure, float(law.equilibrium_pressure(0.01, 0.0)))
+    return float(law.equilibrium_pressure(0.01, 0.0))
 
 
 def ring_ratio(law: am.characteristic.Saga2007, force: float) -> tuple[float, str]:

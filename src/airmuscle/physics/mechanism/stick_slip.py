@@ -26,8 +26,11 @@ class StickSlip:
     They are computed at the accelerations of the other joints without this share of friction, and
     at none of the joint's own: what holds at rest is exact, and so is a link balanced about its
     axis. Above w_1 the torque follows the sign of the speed itself, so that the rate of z is
-    bounded by 1/tau and a step of that length is stable. For constant tension and s = 0 the energy
-    T theta_s z^2/2 of the bristle never grows by more than the work done on it. The normalised form
+    bounded by 1/tau and a step of that length is stable. For constant load and s = 0 the energy
+    T theta_s z^2/2 of the bristle never grows by more than the work done on it. A load that rises
+    while the bristle is bent stiffens it, and nothing pays for that: per cycle below the sliding
+    range the joint may gain up to the integral of theta_s z^2/2 over the rising T. The energy meter
+    of a plant books it as a negative `mechanism_loss`. The normalised form
     of Dahl's model (Dahl 1968) with these additions, which are chosen.
     """
 
@@ -101,11 +104,14 @@ class GaussianResidual:
         T_j = f_j T_j,physics,   f_j = exp(sum_k g_jk phi_k)
 
     x the J angles of a mechanism and the gauge pressures `pressures` (names in a plant,
-    `m0.pressure`), d their number. Passive by construction: at constant pressures V is a bounded
+    `m0.pressure`), d their number. Passive at constant pressures: V is then a bounded
     potential of the angles, whose torques give no energy in a closed cycle, and the friction,
-    multiplied by a positive factor, takes some. Pressures that change may change V, as they change
-    the force of a muscle. Far from all centres tau is 0 and f is 1: the physics alone. A caller who
-    gives angles without pressures has the residual at the mean of its centres. The form is chosen.
+    multiplied by a positive factor, takes some. Where the pressures follow the angles, as those of
+    shut air do, a closed cycle gives the integral of dV/dp dp, of either sign, for which no air
+    pays: use it where valves hold the pressures. The energy meter of a plant books this energy as a
+    negative `mechanism_loss`. Far from all centres tau is 0 and f is 1: the physics alone. A caller
+    who gives angles without pressures has the residual at the mean of its centres. The form is
+    chosen.
     """
 
     pressures: tuple[str, ...]
