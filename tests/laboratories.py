@@ -152,6 +152,21 @@ def changed(
     return {name: {**table, column: change(table[column])} for name, table in tables.items()}
 
 
+def filtered(tables: dict[str, Table], column: str, time_constant: float) -> dict[str, Table]:
+    """The tables with a low-pass filter of first order in one column, in equilibrium at first."""
+
+    def response(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+        result = values.copy()
+        for i, share in enumerate(np.exp(-np.diff(time) / time_constant), 1):
+            result[i] = share * result[i - 1] + (1.0 - share) * values[i]
+        return result
+
+    return {
+        name: {**table, column: response(table[TIME], table[column])}
+        for name, table in tables.items()
+    }
+
+
 def every_other(tables: dict[str, Table], column: str, offset: float) -> dict[str, Table]:
     """The tables with an offset of one column in every other file."""
     return {

@@ -27,6 +27,7 @@ from laboratories import (
     by_hand,
     changed,
     every_other,
+    filtered,
     one_file,
     ramps,
     renamed,
@@ -256,6 +257,12 @@ VARIANTS: dict[str, Variant] = {
         lambda: changed(sweeps(WALLED), FORCE, lambda f: f - 0.04 * WALLED_GREATEST), "zero of the"
     ),
     "14 delay of 40 ms": Variant(lambda: fast(delay=0.04), "delay between the sensors"),
+    "14c low-pass filter of the force, 0.1 s": Variant(
+        lambda: filtered(fast(MUSCLE), FORCE, 0.1), "low-pass filter of the force"
+    ),
+    "14d low-pass filter of the pressure, 0.1 s": Variant(
+        lambda: filtered(fast(MUSCLE), PRESSURE, 0.1), "low-pass filter of the pressure"
+    ),
     "14b drift, outliers, rounding": Variant(
         lambda: with_glitches(
             drifting(changed(sweeps(), FORCE, lambda f: 2 * np.round(f / 2)), 7.0), 0.01, (100, 400)

@@ -1,6 +1,11 @@
 from .approximation import ModelApproximation as ModelApproximation
 from .approximation import approximate as approximate
 from .bootstrapping import bootstrap as bootstrap
+from .branch_residuals import DELAY as DELAY
+from .branch_residuals import EITHER as EITHER
+from .branch_residuals import FILTER as FILTER
+from .branch_residuals import delay_notes as delay_notes
+from .branch_residuals import find_delay as find_delay
 from .candidate_scores import FoldScore as FoldScore
 from .candidates import Candidate as Candidate
 from .candidates import blank_surface as blank_surface

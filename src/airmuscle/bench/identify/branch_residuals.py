@@ -3,8 +3,10 @@ delay of the sensor.
 
 A force that is read later by tau opens a loop whose width is 2 tau dF/dt, proportional to the
 speed, and its maximum follows that of the pressure by tau; a pressure that is read later gives the
-same with a negative tau. The loop of friction is independent of the speed, and its maximum is that
-of the pressure. A delay is found where the loop and the turning point give the same tau.
+same with a negative tau. A low-pass filter opens the same loop as a delay, but rounds the maximum
+and moves it less, by tau ln 2 if it is of first order. The loop of friction is independent of the
+speed, and its maximum is that of the pressure. A delay or a filter is found where the loop and the
+turning point give the same tau within a tolerance that holds both.
 """
 
 import itertools
@@ -38,6 +40,17 @@ DWELL_ROWS = 4
 """
 
 
+ROUNDED = 1.5
+MIN_TOP_ROWS = 4
+"""Rows at the maximum of the later quantity, over those of the earlier, from which a filter has
+rounded it, and minimum number of the latter by which this can be told (chosen)."""
+TOP = 0.02
+"""Distance from the maximum of the rows at it, as a fraction of the range (chosen)."""
+DELAY = "a delay between the sensors"
+FILTER = "a low-pass filter"
+EITHER = "a delay or a low-pass filter"
+
+
 class SensorDelay(NamedTuple):
     """The delay of the force after the pressure [s], from the loops and from their turning points;
     negative where the pressure is later."""
@@ -47,6 +60,19 @@ class SensorDelay(NamedTuple):
     width: float
     """Median width of the loops [N]."""
     loops: int
+    rows_at_top: float = 0.0
+    """Rows at the maximum of the earlier quantity."""
+    rounding: float = 1.0
+    """Rows at the maximum of the later quantity over these."""
+
+    @property
+    def kind(self) -> str:
+        """A delay, a low-pass filter, which rounds the maximum, or either where the rows are too
+        few to tell.
+        """
+        if self.rows_at_top < MIN_TOP_ROWS:
+            return EITHER
+        return FILTER if self.rounding > ROUNDED else DELAY
 
 
 def find_delay(recordings: Sequence[Recording]) -> SensorDelay | None:
@@ -54,32 +80,42 @@ def find_delay(recordings: Sequence[Recording]) -> SensorDelay | None:
     turns = [turn for run in recordings for turn in _turns(run)]
     if len(turns) < MIN_LOOPS:
         return None
-    loop, peak, width, sample_time = (float(v) for v in np.median(np.array(turns), axis=0))
+    loop, peak, width, sample_time, *tops = np.median(np.array(turns), axis=0).tolist()
     least = min(abs(loop), np.sign(loop) * peak)
     if least < MIN_SAMPLES * sample_time or abs(peak - loop) > AGREEMENT * abs(loop) + sample_time:
         return None
-    return SensorDelay(loop, peak, width, len(turns))
+    earlier, later = tops if loop > 0.0 else reversed(tops)
+    return SensorDelay(loop, peak, width, len(turns), earlier, later / earlier)
 
 
 def delay_notes(delay: SensorDelay | None) -> list[str]:
-    """The remark that loops are those of a delay; empty without one."""
+    """The remark that loops are those of a delay or of a filter; empty without one."""
     if delay is None:
         return []
     later, earlier = ("force", "pressure") if delay.loop > 0 else ("pressure", "force")
-    times = [f"{1e3 * abs(each):.3g} ms" for each in (delay.loop, delay.turning_point)]
+    times = [f"{1e3 * abs(value):.3g} ms" for value in (delay.loop, delay.turning_point)]
+    loops = f"The loops of the ramps, {abs(delay.width):.3g} N wide, are those of"
+    slower = "ramp the pressure more slowly."
+    if delay.kind == FILTER:
+        return [
+            f"{loops} a low-pass filter of the {later}: it follows the {earlier} by {times[0]} on a"
+            f" ramp, its maxima are {delay.rounding:.2g} times as long and {times[1]} later"
+            f" ({delay.loops} turning points). A delay rounds no maximum, and friction has no delay"
+            f" there. Do not take them for friction: turn the filter off, or {slower} A shift in"
+            " time does not undo it."
+        ]
+    remedy = f"shift the {later} by this time" if delay.kind == DELAY else "sample faster to tell"
     return [
-        f"The loops of the ramps, {abs(delay.width):.3g} N wide, are those of a delay between the"
-        f" sensors: the {later} follows the {earlier} by {times[0]}, and so do its maxima"
-        f" ({times[1]}, {delay.loops} turning points), while friction has no delay there. Do not"
-        f" take them for friction: shift the {later} by this time, or ramp the pressure more"
-        " slowly."
+        f"{loops} {delay.kind}: the {later} follows the {earlier} by {times[0]}, and so do its"
+        f" maxima ({times[1]}, {delay.loops} turning points), while friction has no delay there."
+        f" Do not take them for friction: {remedy}, or {slower}"
     ]
 
 
 def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
     """At each maximum of the pressure of a recording with time: delays [s] of the loop of its
-    branches and of its turning point, width of the loop [N], sample time [s]; none where the
-    pressure dwells there or the force is flat.
+    branches and of its turning point, width of the loop [N], sample time [s], and the rows at the
+    maximum of pressure and force; none where both dwell there or the force is flat.
     """
     if (
         any(name not in recording for name in ("time", "pressure", "force"))
@@ -101,12 +137,19 @@ def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
         force = running_median(recording["force"][rows], 3)
         top = int(np.argmax(pressure))
         step = float(np.median(np.diff(time)))
-        dwell = int(np.count_nonzero(pressure > pressure[top] - 0.02 * float(np.ptp(pressure))))
+        # A filter rounds one of them, a dwell both.
+        dwell = min(_rows_at_top(pressure), _rows_at_top(force))
         if step <= 0 or dwell > DWELL_ROWS + 0.06 * time.size:
             continue
         loop = _loop_delay(time, pressure, force, top)
         if loop is not None:
-            yield loop[0], float(time[int(np.argmax(force))] - time[top]), loop[1], step
+            peak = float(time[int(np.argmax(force))] - time[top])
+            yield loop[0], peak, loop[1], step, _rows_at_top(pressure), _rows_at_top(force)
+
+
+def _rows_at_top(values: Array) -> int:
+    """The number of rows at the maximum of a ramp."""
+    return int(np.count_nonzero(values > np.max(values) - TOP * float(np.ptp(values))))
 
 
 def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[float, float] | None:

@@ -278,10 +278,11 @@ class Fit(Reported):
         tables = (estimates, Table("correlations", "Correlations", correlations, shown=False))
         plots = (Plot("errors", "Modelled against measured values, and residuals.", self.plot),)
         misfit = "" if self.misfit is None else str(self.misfit)
+        counted = "; the misfit counts as scatter, which is too wide for a repeat" if misfit else ""
         return Chapter(
             "fit",
             self._title,
-            f"{misfit} Standard errors {self.error_basis}.".lstrip(),
+            f"{misfit} Standard errors {self.error_basis}{counted}.".lstrip(),
             values=self.goodness(),
             tables=tables,
             plots=plots,
