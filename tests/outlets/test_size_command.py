@@ -4,6 +4,7 @@ reaches both ends.
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import re
@@ -21,6 +22,7 @@ from airmuscle.design import (
     SizingConditions,
     choose,
     scenario_text,
+    size_muscles,
 )
 from airmuscle.design.sizing import MOVING, RESTING, air_path
 from airmuscle.files import load_scenario
@@ -286,6 +288,19 @@ def test_an_equal_force_at_both_ends_is_one_number():
     assert result.exit_code == 0, result.output
     assert "392" in result.stdout
     assert "392 to 392" not in result.stdout
+
+
+@pytest.mark.parametrize(("factor", "agree"), [(1.2, True), (2.5, False)])
+def test_laws_that_contradict_one_another_are_listed_and_not_called_an_uncertainty(factor, agree):
+    sized = size_muscles(LiftRequirement(0.04, 15.0), CONDITIONS, [am.load("dmsp-20-300")])
+    best = sized.choices[0]
+    other = dataclasses.replace(best, length=factor * best.length)
+    chapter = dataclasses.replace(sized, choices=(best, other)).chapter()
+    summary = " ".join([chapter.summary] if isinstance(chapter.summary, str) else chapter.summary)
+    assert ("uncertainty of the models" in summary) is agree
+    assert ("contradict one another" in summary) is not agree
+    assert f"{1e3 * other.length:.4g} mm" in summary
+    assert "the first of the ranking" in summary
 
 
 def test_the_laws_of_one_product_are_one_product_with_the_spread_of_its_models():

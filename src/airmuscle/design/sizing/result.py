@@ -25,6 +25,9 @@ BISECTIONS = 7
 """Bisections of the fraction of a load or a stroke that can be reached, for a message (chosen)."""
 SHORT_UNSUITABLE = 3
 """Rows of the brief view (chosen)."""
+DISAGREEMENT = 2.0
+"""Ratio of the lengths by the laws of one product from which they are said to contradict one
+another (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,19 +151,12 @@ class SizingResult(Reported):
             for each in self.choices[1:]
             if product_of(each) == product and each.count == best.count
         ]
-        spread = ""
         by_law = "" if product == best.entry.name else f" by the law {best.entry.name}"
-        if others:
-            lengths = [1e3 * each.length for each in others]
-            ends = " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(lengths), max(lengths))))
-            spread = (
-                f" The other published laws of this product give {ends} mm: the spread is the"
-                " uncertainty of the models, not a choice between muscles."
-            )
+        spread = _spread(best, others)
         return (
             f"The best choice is {best.total_count} x {product}{side}, nominal length"
-            f" {1e3 * best.length:.4g} mm{by_law}: the shortest that reaches both end"
-            f" points.{spread}"
+            f" {1e3 * best.length:.4g} mm{by_law}: the first of the ranking, at the shortest"
+            f" length with which it reaches both end points.{spread}"
         )
 
     def _unsuitable(self) -> tuple[Table, ...]:
@@ -204,6 +200,27 @@ class SizingResult(Reported):
         }
         supply = "supply pressure", f"{conditions.supply / 1e5:.4g} bar", "given"
         return (supply, *((*row, sources[name]) for name, row in rows.items()))
+
+
+def _spread(best: MuscleChoice, others: list[MuscleChoice]) -> str:
+    """The lengths by the other laws of a product, in words: an uncertainty where they agree
+    within DISAGREEMENT, each with its law where they do not.
+    """
+    if not others:
+        return ""
+    lengths = [each.length for each in (best, *others)]
+    if max(lengths) < DISAGREEMENT * min(lengths):
+        among = [1e3 * each.length for each in others]
+        ends = " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(among), max(among))))
+        return (
+            f" The other published laws of this product give {ends} mm: the spread is the"
+            " uncertainty of the models, not a choice between muscles."
+        )
+    each_law = ", ".join(f"{each.entry.name} {1e3 * each.length:.4g} mm" for each in others)
+    return (
+        f" The published laws of this product contradict one another: {each_law}. This is no"
+        " uncertainty of one model; measure a muscle at its end points before you order."
+    )
 
 
 def catalogue() -> tuple[Entry, ...]:
