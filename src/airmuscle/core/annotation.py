@@ -68,28 +68,31 @@ def _conforms_to_parts(value: Any, kind: Any, arguments: tuple[Any, ...], *, lis
         return hasattr(value, "__array__") or isinstance(value, tuple | list)
     if kind is Mapping:
         return isinstance(value, Mapping) and all(
-            conforms(part, of_part, lists=lists)
-            for item in value.items()
-            for part, of_part in zip(item, arguments, strict=True)
+            _conform(item, arguments, lists=lists) for item in value.items()
         )
-    if kind in (tuple, Sequence):
-        kinds = (Sequence,) if kind is Sequence else (tuple, list) if lists else (tuple,)
-        if not isinstance(value, kinds) or isinstance(value, str | bytes):
-            return False
-        of_items = (
-            arguments if kind is tuple and arguments[1:] != (...,) else arguments[:1] * len(value)
-        )
-        return len(value) == len(of_items) and all(
-            conforms(item, of_item, lists=lists)
-            for item, of_item in zip(value, of_items, strict=True)
-        )
-    if kind in (Collection, Iterable) and isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
-        return all(conforms(item, arguments[0], lists=lists) for item in value)
+    if kind is tuple:
+        kinds = (tuple, list) if lists else (tuple,)
+        return isinstance(value, kinds) and _conform(value, arguments, lists=lists)
+    if kind is Sequence:
+        is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        return is_sequence and _conform(value, (arguments[0], ...), lists=lists)
+    if kind in (Collection, Iterable):
+        if isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
+            return all(conforms(item, arguments[0], lists=lists) for item in value)
+        return isinstance(value, kind) and not isinstance(value, np.ndarray)
     if kind is Callable:
         return callable(value) and _takes(value, arguments[0])
-    if kind in (Collection, Iterable):
-        return isinstance(value, kind) and not isinstance(value, np.ndarray)
     return True
+
+
+def _conform(items: Sequence[Any], arguments: tuple[Any, ...], *, lists: bool) -> bool:
+    """Whether items conform to as many annotations, or all to the one before an ellipsis."""
+    if arguments[1:] == (...,):
+        arguments = arguments[:1] * len(items)
+    if len(items) != len(arguments):
+        return False
+    pairs = zip(items, arguments, strict=True)
+    return all(conforms(item, of_item, lists=lists) for item, of_item in pairs)
 
 
 def is_model(obj: Any) -> bool:
@@ -147,8 +150,8 @@ def _described(hint: Any, levels: int) -> str:
         return _NAMES.get(hint) or f"an instance of {getattr(hint, '__name__', hint)}"
     described = functools.partial(describe, levels=levels - 1)
     if kind is Callable:
-        taken = arguments[0] if isinstance(arguments[0], list) else []
-        words = " and ".join(map(described, taken))
+        parameters = arguments[0] if isinstance(arguments[0], list) else []
+        words = " and ".join(map(described, parameters))
         return f"a function of {words}" if words else "a function"
     if kind in (Collection, Iterable):
         return f"several values, each of which is {described(arguments[0])}"
@@ -156,16 +159,13 @@ def _described(hint: Any, levels: int) -> str:
         return "an array of numbers"
     if kind is Mapping:
         return f"a mapping, from {described(arguments[0])} to {described(arguments[1])}"
-    if kind is Sequence or (kind is tuple and arguments[1:] == (...,)):
-        return (
-            f"a {'tuple' if kind is tuple else 'sequence'}, each element of which is"
-            f" {described(arguments[0])}"
-        )
+    if kind is Sequence:
+        return f"a sequence, each element of which is {described(arguments[0])}"
+    if kind is tuple and arguments[1:] == (...,):
+        return f"a tuple, each element of which is {described(arguments[0])}"
     if kind is tuple:
-        return (
-            f"a tuple of {len(arguments)} values"
-            f" ({', '.join(described(argument) for argument in arguments)})"
-        )
+        words = ", ".join(map(described, arguments))
+        return f"a tuple of {len(arguments)} values ({words})"
     return "anything"
 
 

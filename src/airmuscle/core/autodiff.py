@@ -28,7 +28,9 @@ class RecordedMethod:
         with nodes.recording():
             model, self.parameters = symbolic(obj)
             self.arguments = nodes.symbols("x", count)
-            self.value = nodes.as_node(getattr(model, method)(*self.arguments))
+            recorded = getattr(model, method)
+            value = recorded(*self.arguments)
+            self.value = nodes.as_node(value)
         check_finite([self.value], f"{type(obj).__name__}.{method}")
         self._functions: dict[Any, Recorded] = {}
 
@@ -99,25 +101,30 @@ def _at_points(
     points (N,), and the shape of the points. Parameters of the model may be arrays, too.
     """
     leaves = [leaf.value for leaf in tree.leaves(obj)]
-    varied = [i for i, value in enumerate(leaves) if isinstance(value, np.ndarray) and value.ndim]
-    arrays = [leaves[i] for i in varied]
-    broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *arrays)))
+    arrays = {
+        i: leaf for i, leaf in enumerate(leaves) if isinstance(leaf, np.ndarray) and leaf.ndim
+    }
+    numeric = [np.asarray(x, dtype=float) for x in (*arguments, *arrays.values())]
+    broadcast = np.broadcast_arrays(*numeric)
     shape = broadcast[0].shape
     points = [np.ascontiguousarray(x).reshape(-1) for x in broadcast]
     size = points[0].size
-    parameters: list[Any] = [
-        None if i in varied else float(value) for i, value in enumerate(leaves)
-    ]
-    for i, column in zip(varied, points[len(arguments) :], strict=True):
-        parameters[i] = column
     at = points[: len(arguments)]
+    columns = dict(zip(arrays, points[len(arguments) :], strict=True))
     if size == 1:  # numbers take a tenth of the time of arrays
-        numbers = [x.item() for x in at]
-        single = [value.item() if i in varied else value for i, value in enumerate(parameters)]
+        numbers = [column.item() for column in at]
+        single = [
+            columns[i].item() if i in columns else float(leaf) for i, leaf in enumerate(leaves)
+        ]
         results: list[list[Any]] = function.at_numbers(numbers, single)
     else:
+        parameters = [columns[i] if i in columns else float(leaf) for i, leaf in enumerate(leaves)]
         results = function.at_points(at, parameters)
-    return [[_column(value, size) for value in vector] for vector in results], shape
+    return [_columns(vector, size) for vector in results], shape
+
+
+def _columns(values: Sequence[Any], size: int) -> list[Array]:
+    return [_column(value, size) for value in values]
 
 
 def _column(value: Any, size: int) -> Array:
@@ -206,9 +213,9 @@ def value_and_derivative(
 
     def evaluate(*arguments: Any) -> tuple[Any, Any]:
         if several or any(isinstance(x, np.ndarray) for x in arguments):
-            (pair,), shape = _at_points(function, obj, arguments)
-            return pair[0].reshape(shape), pair[1].reshape(shape)
-        value, slope = function.at_numbers(arguments, parameters)[0]
+            [(values, slopes_at)], shape = _at_points(function, obj, arguments)
+            return values.reshape(shape), slopes_at.reshape(shape)
+        [(value, slope)] = function.at_numbers(arguments, parameters)
         return value, slope
 
     return evaluate

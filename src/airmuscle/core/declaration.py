@@ -199,38 +199,28 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     Raises ParameterError if it is not finite or out of bounds, UnitError if the unit has another
     dimension."""
     low, high = declared.bounds
-    if (
-        type(value) is float
-        and low <= value <= high
-        and (value == 0.0 or declared.plausible <= abs(value) < math.inf)
-    ):
+    if type(value) is float and low <= value <= high and _is_plausible(declared, value):
         return value
     if _is_list(value):
         return tuple(_check_value(owner, declared, v) for v in value)
     unit = "" if declared.unit == "1" else f" {declared.unit}"
     label = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
+    allowed = f"allowed range: {low:g} to {high:g}{unit}."
     if isinstance(value, str) and is_known_unit(declared.unit):
         value = quantity(value, declared.unit, where=label)
     if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-        raise ParameterError(
-            f"{label} is {abridged(value)}; it must be a number{unit and ' in' + unit}."
-        )
+        in_unit = f" in{unit}" if unit else ""
+        raise ParameterError(f"{label} is {abridged(value)}; it must be a number{in_unit}.")
     try:
         value = value if isinstance(value, AbsolutePressure) else float(value)
     except OverflowError:
-        raise ParameterError(
-            f"{label} is too large a number; allowed range: {low:g} to {high:g}{unit}."
-        ) from None
+        raise ParameterError(f"{label} is too large a number; {allowed}") from None
     if not math.isfinite(value):
         raise ParameterError(f"{label} is {value}; it must be finite.")
     if not low <= value <= high:
-        hint = " Values are in SI units; check the unit." if unit else ""
-        if not unit and 0 < value / 100 <= high <= 1 < value:
-            hint = f" Is it in per cent? As a ratio it is {value / 100:g}."
-        raise ParameterError(
-            f"{label} is {value:g}{unit}; allowed range: {low:g} to {high:g}{unit}.{hint}"
-        )
-    if 0.0 < abs(value) < declared.plausible:
+        hint = _hint_on_unit(declared, value)
+        raise ParameterError(f"{label} is {value:g}{unit}; {allowed}{hint}")
+    if not _is_plausible(declared, value):
         warnings.warn(
             f"{label} is {value:g}{unit}, which is implausibly small: values without a unit are in"
             f" SI units. Check the unit, or write it, such as '{value:g}"
@@ -239,6 +229,20 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
             stacklevel=5,
         )
     return value
+
+
+def _is_plausible(declared: Parameter, value: float) -> bool:
+    """Whether a value is zero, or finite and not as small as one in a wrong unit."""
+    return value == 0.0 or declared.plausible <= abs(value) < math.inf
+
+
+def _hint_on_unit(declared: Parameter, value: float) -> str:
+    """The probable cause of a value out of bounds."""
+    if declared.unit != "1":
+        return " Values are in SI units; check the unit."
+    _, high = declared.bounds
+    is_per_cent = 0 < value / 100 <= high <= 1 < value
+    return f" Is it in per cent? As a ratio it is {value / 100:g}." if is_per_cent else ""
 
 
 def as_float(label: str, value: Any) -> float:

@@ -281,7 +281,9 @@ def _names() -> dict[str, Any]:
     """The functions that a printed text calls: `a_` those of arrays, `n_` those of numbers."""
     space: dict[str, Any] = {"inf": math.inf, "nan": math.nan}
     for prefix, table in (("a_", OF_ARRAYS), ("n_", _FAST_NUMBERS)):
-        space |= {prefix + operation.name.lower(): of for operation, of in table.items()}
+        for operation, function in table.items():
+            name = operation.name.lower()
+            space[f"{prefix}{name}"] = function
     return space
 
 
@@ -293,14 +295,18 @@ def _text(node: Node, names: Mapping[int, str]) -> str:
 
 def _line(node: Node, texts: Sequence[str], of_arrays: bool) -> str:
     """The right side of the assignment of a node."""
-    if node.operation in _INFIX:
-        return f"{texts[0]} {_INFIX[node.operation]} {texts[1]}"
-    if node.operation in _FORMS:
-        return _FORMS[node.operation].format(*texts)
-    if not of_arrays and node.operation in _NUMBER_FORMS:
-        return _NUMBER_FORMS[node.operation].format(*texts)
+    operation = node.operation
+    if operation in _INFIX:
+        left, right = texts
+        return f"{left} {_INFIX[operation]} {right}"
+    form = _FORMS.get(operation)
+    if form is None and not of_arrays:
+        form = _NUMBER_FORMS.get(operation)
+    if form is not None:
+        return form.format(*texts)
     prefix = "a_" if of_arrays else "n_"
-    return f"{prefix}{node.operation.name.lower()}({', '.join(texts)})"
+    arguments = ", ".join(texts)
+    return f"{prefix}{operation.name.lower()}({arguments})"
 
 
 def _printed(function: Recorded, beside: set[int]) -> Callable[[Sequence[Vector]], Sequence[Any]]:

@@ -64,11 +64,14 @@ def _value(value: Any) -> str:
 def _sequence(value: tuple[Any, ...] | list[Any]) -> str:
     """A short sequence of numbers or texts, otherwise the number of its items and their class."""
     if all(isinstance(item, float | int | str) for item in value):
-        text = f"({', '.join(_value(item) for item in value)})"
-        if len(text) <= MAX_VALUE:
-            return text
+        texts = ", ".join(map(_value, value))
+        if len(texts) + 2 <= MAX_VALUE:
+            return f"({texts})"
     classes = list(dict.fromkeys(type(item).__name__ for item in value))
-    return f"({len(value)} of {' and '.join(classes[:2])}{' ...' if len(classes) > 2 else ''})"
+    kinds = " and ".join(classes[:2])
+    if len(classes) > 2:
+        kinds += " ..."
+    return f"({len(value)} of {kinds})"
 
 
 def describe_model(model: Any) -> str:

@@ -80,7 +80,8 @@ def _of_quotient(x: Node, y: Node, r: Node) -> tuple[Node, ...]:
 
 def _of_power(x: Node, y: Node, r: Node) -> tuple[Node, ...]:
     if y.operation == CONSTANT:
-        return times(y, nodes.power(x, nodes.constant(y.value - 1.0))), ZERO
+        constant = nodes.constant(y.value - 1.0)
+        return times(y, nodes.power(x, constant)), ZERO
     lower = plus(y, _MINUS_ONE)
     by_base = times(y, binary(Operation.POWER, x, lower))
     return by_base, times(r, unary(Operation.LOG, x))
@@ -217,18 +218,21 @@ def weighted_gradient(
 def jacobian(roots: Sequence[Node], symbols: Sequence[Node]) -> list[list[Node]]:
     """The derivatives of each root by each symbol; ZERO where there is no dependence."""
     if len(symbols) <= min(len(roots), _FORWARD_COLUMNS):
-        columns = [
-            tangents(roots, symbols, [ONE if k == i else ZERO for i in range(len(symbols))])
-            for k in range(len(symbols))
-        ]
+        columns = []
+        for k in range(len(symbols)):
+            direction = [ONE if i == k else ZERO for i in range(len(symbols))]
+            column = tangents(roots, symbols, direction)
+            columns.append(column)
         return [[column[i] for column in columns] for i in range(len(roots))]
     dependent, moving = _dependent(roots, symbols)
     rank = {id(node): k for k, node in enumerate(dependent)}
     rows = []
     for root in roots:
-        needed = _needed([root], rank)
-        adjoint = _swept([(root, ONE)], [dependent[k] for k in sorted(needed)], moving)
-        rows.append([adjoint.get(id(symbol), ZERO) for symbol in symbols])
+        needed = sorted(_needed([root], rank))
+        of_root = [dependent[k] for k in needed]
+        adjoint = _swept([(root, ONE)], of_root, moving)
+        row = [adjoint.get(id(symbol), ZERO) for symbol in symbols]
+        rows.append(row)
     return rows
 
 

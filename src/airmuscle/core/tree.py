@@ -156,8 +156,9 @@ def _fields(cls: type[Any]) -> tuple[tuple[str, Parameter | None], ...] | None:
     """The fields of a model class, each with its declaration or None; None for any other class."""
     if not dataclasses.is_dataclass(cls):
         return None
-    declared = {p.name: p for p in parameters(cls)}
-    return tuple((field.name, declared.get(field.name)) for field in dataclasses.fields(cls))
+    declared = {parameter.name: parameter for parameter in parameters(cls)}
+    names = [field.name for field in dataclasses.fields(cls)]
+    return tuple((name, declared.get(name)) for name in names)
 
 
 def _unflatten(obj: Any, values: Iterator[Any]) -> Any:

@@ -306,16 +306,7 @@ def conversion(
             f" {_MAX_CHARACTERS} are allowed. Write it like 'mm', 'kPa' or 'N'."
         )
     if target == ABSOLUTE:
-        if (match := _GAUGE_OR_ABSOLUTE.match(unit.strip())) and match["kind"].lower().startswith(
-            "g"
-        ):
-            raise UnitError(
-                f"{where}: unit '{unit}' is gauge, but this pressure is absolute; write kPa(a) or"
-                " bara."
-            )
-        return dataclasses.replace(
-            conversion(unit, "Pa", ambient=0.0, where=where), assumed_gauge=False
-        )
+        return _to_absolute(unit, where)
     unit = unit.strip()
     where = f"{where}: " if where else ""
     if unit == target and target != "Pa":
@@ -326,17 +317,28 @@ def conversion(
             raise UnitError(
                 f"{where}unit '{unit}' is a pressure; a quantity in '{target}' was expected."
             )
-        bare = _SPELLING.get(match["unit"].lower(), match["unit"].lower())
-        return UnitConversion(
-            conversion(bare, "Pa").factor, -ambient if _is_absolute(unit) else 0.0
-        )
+        name = match["unit"].lower()
+        bare = _SPELLING.get(name, name)
+        offset = -ambient if _is_absolute(unit) else 0.0
+        return UnitConversion(conversion(bare, "Pa").factor, offset)
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
         return UnitConversion(factor, assumed_gauge=target == "Pa")
-    found_by_pint = _convert_with_pint(
+    to_target = _convert_with_pint(
         unit or "dimensionless", "dimensionless" if target == "1" else target, where
     )
-    return dataclasses.replace(found_by_pint, assumed_gauge=target == "Pa")
+    return dataclasses.replace(to_target, assumed_gauge=target == "Pa")
+
+
+def _to_absolute(unit: str, where: str) -> UnitConversion:
+    """The conversion to an absolute pressure, of a unit that is absolute or does not say."""
+    match = _GAUGE_OR_ABSOLUTE.match(unit.strip())
+    if match and match["kind"].lower().startswith("g"):
+        raise UnitError(
+            f"{where}: unit '{unit}' is gauge, but this pressure is absolute; write kPa(a) or bara."
+        )
+    to_gauge = conversion(unit, "Pa", ambient=0.0, where=where)
+    return dataclasses.replace(to_gauge, assumed_gauge=False)
 
 
 @functools.cache
@@ -392,35 +394,42 @@ def quantity(
         with contextlib.suppress(OverflowError):
             return float(value)
         raise UnitError(f"{prefix}the number is too large.")
-    if isinstance(value, str) and len(value) > _MAX_CHARACTERS:
-        raise UnitError(
-            f"{prefix}a text of {len(value)} characters is not a number with a unit; at most"
-            f" {_MAX_CHARACTERS} are allowed. Write it like '{_example(target)}'."
-        )
-    match = _NUMBER.match(value) if isinstance(value, str) else None
-    if not isinstance(value, str) or not match:
-        raise UnitError(
-            f"{prefix}{abridged(value)} is not a number with a unit; write it like"
-            f" '{_example(target)}'."
-        )
-    if re.match(r",\s*\d", match["unit"]):
-        corrected = value.replace(",", ".", 1)
-        raise UnitError(
-            f"{prefix}'{value}' contains a comma; write a decimal point, '{corrected}'."
-        )
-    if not match["unit"] and target != "1":
-        unit = usual_unit(float(match["number"]), target)
-        raise UnitError(f"{prefix}'{value}' has no unit; write it like '{match['number']} {unit}'.")
-    number = float(match["number"])
-    if not math.isfinite(number):
-        raise UnitError(f"{prefix}'{value}' is too large.")
+    number, unit = _number_and_unit(value, target, prefix)
     of_text = ambient_of_texts() if ambient is None else ambient
     try:
-        value = float(conversion(match["unit"], target, ambient=of_text, where=where)(number))
+        to_target = conversion(unit, target, ambient=of_text, where=where)
+        gauge = float(to_target(number))
     except UnitError as error:
-        raise UnitError(f"{error}{_suggest_unit(match['unit'], target)}") from None
-    is_absolute = ambient is None and target == "Pa" and _is_absolute(match["unit"])
-    return AbsolutePressure(value + of_text, of_text) if is_absolute else value
+        raise UnitError(f"{error}{_suggest_unit(unit, target)}") from None
+    if ambient is None and target == "Pa" and _is_absolute(unit):
+        return AbsolutePressure(gauge + of_text, of_text)
+    return gauge
+
+
+def _number_and_unit(text: object, target: str, prefix: str) -> tuple[float, str]:
+    """The finite number and the unit of a text; UnitError for anything else."""
+    if isinstance(text, str) and len(text) > _MAX_CHARACTERS:
+        raise UnitError(
+            f"{prefix}a text of {len(text)} characters is not a number with a unit; at most"
+            f" {_MAX_CHARACTERS} are allowed. Write it like '{_example(target)}'."
+        )
+    match = _NUMBER.match(text) if isinstance(text, str) else None
+    if not isinstance(text, str) or not match:
+        raise UnitError(
+            f"{prefix}{abridged(text)} is not a number with a unit; write it like"
+            f" '{_example(target)}'."
+        )
+    number = float(match["number"])
+    unit = match["unit"]
+    if re.match(r",\s*\d", unit):
+        corrected = text.replace(",", ".", 1)
+        raise UnitError(f"{prefix}'{text}' contains a comma; write a decimal point, '{corrected}'.")
+    if not unit and target != "1":
+        usual = usual_unit(number, target)
+        raise UnitError(f"{prefix}'{text}' has no unit; write it like '{match['number']} {usual}'.")
+    if not math.isfinite(number):
+        raise UnitError(f"{prefix}'{text}' is too large.")
+    return number, unit
 
 
 def _is_absolute(unit: str) -> bool:

@@ -11,7 +11,7 @@ import importlib
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -70,15 +70,16 @@ class _Encoder:
         if kind in _PLAIN or kind is float:
             return value
         if kind is list:
-            return [self.node(item) for item in value]
+            return self._nodes(value)
         if kind is tuple:
-            return {"tuple": [self.node(item) for item in value]}
+            return {"tuple": self._nodes(value)}
         if kind is AbsolutePressure:
             return {"absolute": [value.absolute, value.ambient]}
         if kind is HintedText:
-            return {"hinted": [self.node(part) for part in value.parts]}
-        if name := next((name for name, known in _CONSTANTS.items() if value is known), None):
-            return {"constant": name}
+            return {"hinted": self._nodes(value.parts)}
+        constant = _name_of_constant(value)
+        if constant:
+            return {"constant": constant}
         if kind is Counter:
             return {"counts": self._pairs(value)}
         if kind is dict or (isinstance(value, Mapping) and kind.__module__ == "builtins"):
@@ -93,19 +94,27 @@ class _Encoder:
             return {"class": _class_name(value)}
         return self._shared(value)
 
+    def _nodes(self, values: Iterable[Any]) -> list[Any]:
+        return [self.node(value) for value in values]
+
     def _pairs(self, table: Mapping[Any, Any]) -> list[Any]:
         return [[self.node(key), self.node(item)] for key, item in table.items()]
 
     def _shared(self, value: Any) -> dict[str, int]:
-        if id(value) not in self._places:
+        identity = id(value)
+        if identity not in self._places:
             if type(value) is np.ndarray:
-                self._places[id(value)] = {"array": self._array(value)}
+                place = {"array": self._array(value)}
             else:
-                fields = {name: self.node(item) for name, item in _fields(value).items()}
-                self.records.append([_class_name(type(value)), fields])
-                self._places[id(value)] = {"record": len(self.records) - 1}
+                place = {"record": self._record(value)}
+            self._places[identity] = place
             self._alive.append(value)  # so that no other object has its identity
-        return self._places[id(value)]
+        return self._places[identity]
+
+    def _record(self, value: Any) -> int:
+        fields = {name: self.node(item) for name, item in _fields(value).items()}
+        self.records.append([_class_name(type(value)), fields])
+        return len(self.records) - 1
 
     def _array(self, array: Any) -> int:
         if array.dtype.kind not in _ARRAY_KINDS:
@@ -174,7 +183,8 @@ class _Decoder:
         if issubclass(kind, tuple):
             return kind._make(values[name] for name in kind._fields)
         made = {field.name: field.default_factory for field in _derived_fields(kind)}
-        if set(values) | set(made) != {field.name for field in dataclasses.fields(kind)}:
+        declared = {field.name for field in dataclasses.fields(kind)}
+        if values.keys() | made.keys() != declared:
             raise ValueError(f"the fields of {kind.__name__} are not those stored")
         record = object.__new__(kind)
         for name, make in made.items():
@@ -182,6 +192,13 @@ class _Decoder:
         for name, value in values.items():
             object.__setattr__(record, name, value)
         return record
+
+
+def _name_of_constant(value: Any) -> str | None:
+    for name, known in _CONSTANTS.items():
+        if value is known:
+            return name
+    return None
 
 
 def _named_value(kind: str, content: Any) -> Any:

@@ -230,8 +230,11 @@ class EventIndicators:
 
     def values(self, x: Array, u: Array, p: Array) -> list[float]:
         """The event indicators at a state under inputs, by interpretation of the instructions."""
-        block = InterpretedBody(dict(zip(POINT, (x.tolist(), u.tolist(), p.tolist()), strict=True)))
-        for (_, index), value in emission.computed(block, self.code, POINT).items():
+        point = [x.tolist(), u.tolist(), p.tolist()]
+        arrays = dict(zip(POINT, point, strict=True))
+        block = InterpretedBody(arrays)
+        results = emission.computed(block, self.code, POINT)
+        for (_, index), value in results.items():
             block.store("z", index, value)
         return [block.stored["z", i] for i in range(self.count)]
 

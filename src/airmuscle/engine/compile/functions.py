@@ -154,20 +154,27 @@ class Printer:
         parameters = self._prepare.loaded  # type: ignore[attr-defined]
         named: dict[str, tuple[str, int]] = {}
         if self.quantities and set(map(self._argument, self.quantities[0])) <= set(inputs):
-            trial = copy.copy(
-                block
-            )  # it prints the quantities, too: those that have values already have their names
-            trial.lines, trial.known, trial.read, trial.loaded = [], dict(block.known), set(), {}
+            # a trial prints the quantities, too: those that have values already have their names
+            trial = copy.copy(block)
+            trial.lines = []
+            trial.known = dict(block.known)
+            trial.read = set()
+            trial.loaded = {}
             code, precomputed, items = self._quantity_code
             values = emission.Emission(trial, list(self.quantities[0]), precomputed, {})
             values.run(items)
             computed = set(block.known.values())
-            results = ((values.value_of(operand), index) for _, index, operand in code.outputs)
-            named = {value: ("o", index) for value, index in results if value in computed}
-        of_c = [
-            labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL
-            for v in self._places
-        ]
+            for _, index, operand in code.outputs:
+                value = values.value_of(operand)
+                if value in computed:
+                    named[value] = ("o", index)
+        of_c = []
+        for value in self._places:
+            label = NO_LABEL
+            if value in parameters:
+                _, index = parameters[value]
+                label = labels[PARAMETERS][index]
+            of_c.append(label)
         block.name_values({**labels, "c": of_c}, named, {*inputs, *outputs})
 
     @functools.cached_property
@@ -254,12 +261,16 @@ def _add_implicit(printer: Printer, t: TracedSystem) -> tuple[int, int]:
     a = nodes.symbols("A", len(lu.values))
     g = nodes.symbols("g", size)
     b = nodes.symbols("b", size)
-    stage = lu.solved(a, [rate + more for rate, more in zip(t.f, g, strict=True)])
+    right = [rate + further for rate, further in zip(t.f, g, strict=True)]
+    stage = lu.solved(a, right)
     printer.add("jac", t.point, {"f": t.f, "J": values})
-    printer.add("factor", {"J": lu.j, "d": [lu.d]}, {"A": lu.values}, ["d"])
-    printer.add("solve", {"A": a, "b": b}, {"y": lu.solved(a, b)})
+    matrix = {"J": lu.j, "d": [lu.d]}
+    printer.add("factor", matrix, {"A": lu.values}, ["d"])
+    solution = lu.solved(a, b)
+    printer.add("solve", {"A": a, "b": b}, {"y": solution})
     printer.add("stage", {**t.point, "A": a, "g": g}, {"k": stage})
-    printer.add("df_dt", {**t.point, "w": t.w}, {"f": slopes.tangents(t.f, t.u, t.w)})
+    along_inputs = slopes.tangents(t.f, t.u, t.w)
+    printer.add("df_dt", {**t.point, "w": t.w}, {"f": along_inputs})
     return len(lu.j), len(lu.values)
 
 

@@ -38,10 +38,11 @@ def row_outputs(t: TracedSystem) -> Extension:
     """
 
     def add(printer: Printer) -> None:
-        block = _RowsBody({"x": len(t.x), "u": len(t.u), "o": len(t.o)})
-        for (_, index), value in printer.compute(
-            block, instructions(list(t.point.values()), [t.o]), POINT
-        ).items():
+        widths = {"x": len(t.x), "u": len(t.u), "o": len(t.o)}
+        block = _RowsBody(widths)
+        code = instructions(list(t.point.values()), [t.o])
+        results = printer.compute(block, code, POINT)
+        for (_, index), value in results.items():
             block.store("o", index, value)
         text = emit.function("row_outputs", ["x", "u", "c", "o"], block)
         printer.text.append(vector_math.declarations({ROWS}) + text)
@@ -72,10 +73,12 @@ class _RowsBody(FunctionBody):
 
     def store(self, array: str, index: int, value: str) -> None:
         """Write an array element in each row."""
+        width = self._widths[array]
+        kind = ROWS.element
         for row in range(ROWS.lanes):
             element = self.put(f"extractelement {ROWS.text} {value}, i32 {row}")
-            place = self._place(array, index + row * self._widths[array])
-            self.lines.append(f"  store {ROWS.element} {element}, ptr {place}, align 8")
+            place = self._place(array, index + row * width)
+            self.lines.append(f"  store {kind} {element}, ptr {place}, align 8")
 
     def call_library(self, function: str, x: Sequence[str]) -> str:
         """A call of the C library for each row; vectorised functions would take longer to compile
@@ -152,13 +155,21 @@ class _Step:
 
     def printed(self, a: Sequence[Sequence[float]], b: Sequence[float]) -> str:
         """The text of the step and of its stages."""
-        rows = [(), *a]
-        stages = [self._stage(f"stage{number}", row) for number, row in enumerate(rows)]
-        parts = {f"stage{number}": OF_STAGE for number in range(len(rows))} | {"finish": OF_END}
-        room = {SLOPES: len(rows) * self.states}
-        by_group = self._cached_by_group(room[SLOPES])
-        sequence = self.groups.sequence("step", list("xucwhy"), parts, room, by_group=by_group)
-        return "".join([*stages, self._finish("finish", b), sequence])
+        texts = []
+        parts: dict[str, Sequence[str]] = {}
+        for number, row in enumerate([(), *a]):
+            name = f"stage{number}"
+            texts.append(self._stage(name, row))
+            parts[name] = OF_STAGE
+        slopes = len(parts) * self.states
+        texts.append(self._finish("finish", b))
+        parts["finish"] = OF_END
+        by_group = self._cached_by_group(slopes)
+        arguments = list("xucwhy")
+        sequence = self.groups.sequence(
+            "step", arguments, parts, {SLOPES: slopes}, by_group=by_group
+        )
+        return "".join([*texts, sequence])
 
     def _cached_by_group(self, slopes: int) -> bool:
         """Whether the first-level cache holds what the step reads and writes for one group, but not
@@ -172,14 +183,17 @@ class _Step:
         """The function of one stage, which computes its slopes."""
         block = self.groups.body()
         values = _Moved(block, row, self.states)
-        values_of_inputs: dict[Operand, str] = {
-            ("in", 0, i): values.state(i) for i in range(self.states)
-        }
-        values_of_inputs |= {("in", 1, i): values.input(i) for i in range(self.inputs)}
-        at = emission.Emission(block, POINT, self.held, values_of_inputs)
+        point: dict[Operand, str] = {}
+        for i in range(self.states):
+            point["in", 0, i] = values.state(i)
+        for i in range(self.inputs):
+            point["in", 1, i] = values.input(i)
+        at = emission.Emission(block, POINT, self.held, point)
         at.run(self.items)
+        first = len(row) * self.states
         for _, i, operand in self.outputs:
-            block.store(SLOPES, len(row) * self.states + i, at.value_of(operand))
+            slope = at.value_of(operand)
+            block.store(SLOPES, first + i, slope)
         self.needed |= block.needed
         return self.groups.part(name, OF_STAGE, block)
 

@@ -60,13 +60,16 @@ class PiecewiseLinear(ShortRepr):
         shape = (times.size, self.values.shape[1])
         values = np.empty(shape)
         slopes = np.empty(shape)
-        begins = [start, *self.ends[:-1].tolist()]
-        rows = [0, *times.searchsorted(self.ends[:-1]).tolist(), times.size]
-        for i, (first, last) in enumerate(itertools.pairwise(rows)):
-            slope = slopes[first:last] = self.slopes[i]
-            values[first:last] = self.values[i]
+        begins = self.starts(start)
+        first_rows = times.searchsorted(begins[1:]).tolist()
+        for i, (first, last) in enumerate(itertools.pairwise([0, *first_rows, times.size])):
+            rows = slice(first, last)
+            slope = self.slopes[i]
+            slopes[rows] = slope
+            values[rows] = self.values[i]
             if slope.any():
-                values[first:last] += (times[first:last] - begins[i])[:, None] * slope
+                elapsed = times[rows] - begins[i]
+                values[rows] += elapsed[:, None] * slope
         return values, slopes
 
     def starts(self, start: float) -> Array:
@@ -121,29 +124,40 @@ class PiecewiseLinear(ShortRepr):
 
 def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> PiecewiseLinear:
     """Common segments for several inputs, one or more: split wherever one of them is."""
-    width = len(columns)
     if max(map(len, columns)) == 1:
         ends, levels, rates = zip(*(column[0] for column in columns), strict=True)
-        values = [value + 0.0 * slope for value, slope in zip(levels, rates, strict=True)]
-        return PiecewiseLinear(np.array(ends[:1]), np.array([values]), np.array([rates]))
-    starts = sorted({start, *(end for column in columns for end, _, _ in column[:-1])})
-    values = [0.0] * (len(starts) * width)
-    slopes = [0.0] * (len(starts) * width)
+        levels_at_start = [level + 0.0 * rate for level, rate in zip(levels, rates, strict=True)]
+        return PiecewiseLinear(np.array(ends[:1]), np.array([levels_at_start]), np.array([rates]))
+    instants = {start}
+    for column in columns:
+        instants.update(end for end, _, _ in column[:-1])
+    starts = sorted(instants)
+    shape = len(starts), len(columns)
+    values = np.empty(shape)
+    slopes = np.empty(shape)
     for i, column in enumerate(columns):
-        begin = start
-        k = 0
-        last = len(column) - 1
-        for row, time in enumerate(starts):
-            while k < last and column[k][0] <= time:
-                begin = column[k][0]
-                k += 1
-            _, value, slope = column[k]
-            values[row * width + i] = value + (time - begin) * slope
-            slopes[row * width + i] = slope
-    shape = len(starts), width
-    table = np.array(values).reshape(shape)
-    rising = np.array(slopes).reshape(shape)
-    return PiecewiseLinear(np.array([*starts[1:], columns[0][-1][0]]), table, rising)
+        values[:, i], slopes[:, i] = _at_instants(column, starts)
+    end, _, _ = columns[0][-1]
+    return PiecewiseLinear(np.array([*starts[1:], end]), values, slopes)
+
+
+def _at_instants(
+    column: Sequence[Segment], instants: list[float]
+) -> tuple[list[float], list[float]]:
+    """The values and slopes of one input at rising instants, from its start on."""
+    values = []
+    slopes = []
+    begin = instants[0]
+    k = 0
+    last = len(column) - 1
+    for time in instants:
+        while k < last and column[k][0] <= time:
+            begin = column[k][0]
+            k += 1
+        _, value, slope = column[k]
+        values.append(value + (time - begin) * slope)
+        slopes.append(slope)
+    return values, slopes
 
 
 class InputSignal(abc.ABC):
@@ -268,16 +282,17 @@ class Schedule(InputSignal):
         changes: dict[str, tuple[list[float], list[float]]] = self._changes  # type: ignore[attr-defined]
         check_input_names(changes, inputs)
         end = start + duration
-        starts = [
-            start,
-            *sorted({t for times, _ in changes.values() for t in times if start < t < end}),
-        ]
+        instants: set[float] = set()
+        for times, _ in changes.values():
+            instants.update(time for time in times if start < time < end)
+        starts = [start, *sorted(instants)]
         values = np.zeros((len(starts), len(inputs)))
         for i, name in enumerate(inputs):
             if name in changes:
                 times, levels = changes[name]
-                values[:, i] = [levels[bisect.bisect_right(times, t)] for t in starts]
-        return PiecewiseLinear(np.array([*starts[1:], end]), values, np.zeros(values.shape))
+                values[:, i] = [levels[bisect.bisect_right(times, time)] for time in starts]
+        ends = np.array([*starts[1:], end])
+        return PiecewiseLinear(ends, values, np.zeros(values.shape))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -313,15 +328,17 @@ class Periodic(InputSignal):
         begins = self.period * np.arange(first, last)
         size = (int(last - first), 1)
         starts = (begins[:, None] + once.starts(0.0)).ravel()
+        # 3 * 0.1 is more than 0.3: no segment of 1e-17 s
         rounding = 4 * np.spacing(max(abs(start), self.period))
-        starts[np.abs(starts - start) <= rounding] = (
-            start  # 3 * 0.1 is more than 0.3: no segment of 1e-17 s
-        )
-        repeated = PiecewiseLinear(
-            np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size)
-        )
-        within = starts[(starts > start) & (starts < end)]
-        return repeated.split_at(np.append(start, within), float(starts[0]))
+        is_start = np.abs(starts - start) <= rounding
+        starts[is_start] = start
+        ends = np.append(starts[1:], end)
+        values = np.tile(once.values, size)
+        slopes = np.tile(once.slopes, size)
+        repeated = PiecewiseLinear(ends, values, slopes)
+        is_within = (starts > start) & (starts < end)
+        within = np.append(start, starts[is_within])
+        return repeated.split_at(within, float(starts[0]))
 
 
 @dataclasses.dataclass(frozen=True)

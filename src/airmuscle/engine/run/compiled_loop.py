@@ -155,28 +155,25 @@ class CompiledRun:
         intervals = self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
         self._memory = np.empty((2, 0 if law is None else len(law.initial_memory)))
-        self._measured, self._command = (
-            np.empty(len(controller.measured_columns)),
-            np.empty(len(controller.inputs)),
-        )
+        self._measured = np.empty(len(controller.measured_columns))
+        self._command = np.empty(len(controller.inputs))
         self._views = flat_view(self._measured), flat_view(self._command)
-        self._applied, self._kept_inputs, self.state = np.empty(m), np.empty(m), np.empty(n)
+        self._applied = np.empty(m)
+        self._kept_inputs = np.empty(m)
+        self.state = np.empty(n)
         """The state (n,) at the end of the last completed interval."""
         self._samples = np.empty((intervals, self._measured.size))
         self._commands = np.empty((intervals, self._command.size))
         self._inputs = inputs.ends, inputs.values.copy(), inputs.slopes
+        self._segments: Any = self._inputs
+        self._times = prepared.times
         if self._drivers.kinds.size:
-            segments = FIRST_SEGMENTS + self.loop.capacity * m
-            rows = FIRST_SEGMENTS + 2 * self.loop.capacity * m
-            self._segments: Any = (
-                np.empty(segments),
-                np.empty((segments, m)),
-                np.empty((segments, m)),
-            )
-            self._times, self._rows = np.empty(rows), np.empty((rows, n))
-        else:
-            self._segments = self._inputs
-            self._times, self._rows = prepared.times, np.empty((prepared.times.size, n))
+            changes = self.loop.capacity * m
+            segments = FIRST_SEGMENTS + changes
+            table = (segments, m)
+            self._segments = np.empty(segments), np.empty(table), np.empty(table)
+            self._times = np.empty(FIRST_SEGMENTS + 2 * changes)
+        self._rows = np.empty((self._times.size, n))
 
     def _arguments(self, compiled: CompiledSystem, parameters: Array) -> tuple[Any, ...]:
         loop = self.loop

@@ -81,12 +81,16 @@ def loop_in_jax(
             tree.unflatten(law, list(law_parameters)),
         )
         memory = {name: _number(value) for name, value in commanding.initial_memory.items()}
-        before = start, memory, {name: _number(0.0) for name in law.inputs}
+        applied = {name: _number(0.0) for name in law.inputs}
+        before = start, memory, applied
         interval = functools.partial(_interval, varied, commanding, prepared)
         (final, _, _), (states, commands) = jax.lax.scan(interval, before, rows)
-        columns = {name: jnp.append(states[name], final[name]) for name in start}
-        named = {f"{COMMAND}{name}": values for name, values in commands.items()}
-        return {"time": jnp.asarray(prepared.instants), **columns, **named}
+        columns = {"time": jnp.asarray(prepared.instants)}
+        for name in start:
+            columns[name] = jnp.append(states[name], final[name])
+        for name, values in commands.items():
+            columns[f"{COMMAND}{name}"] = values
+        return columns
 
     return run
 
@@ -106,13 +110,14 @@ def _interval(plant: System, law: ControlLaw, prepared: SampledLoop, carry: Any,
     measurement = Measurement(measured, dict(zip(law.setpoints, setpoints, strict=True)), ranges)
     commands, later = law.step(memory, measurement, prepared.loop.sample_time)
     applied_now = {name: ops.clip(_number(commands[name]), *ranges[name]) for name in law.inputs}
-    after, _ = jax.lax.scan(
-        lambda x, h: (runge_kutta4(plant, x, {**constant, **applied_now}, h), None), state, steps
-    )
-    return (after, {name: _number(later[name]) for name in memory}, applied_now), (
-        state,
-        applied_now,
-    )
+    inputs = {**constant, **applied_now}
+
+    def step(x: Any, h: Any) -> tuple[Any, None]:
+        return runge_kutta4(plant, x, inputs, h), None
+
+    after, _ = jax.lax.scan(step, state, steps)
+    memory = {name: _number(later[name]) for name in memory}
+    return (after, memory, applied_now), (state, applied_now)
 
 
 def _number(value: Any) -> Any:

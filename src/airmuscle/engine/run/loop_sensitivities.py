@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -220,23 +220,13 @@ class LawWithSensitivities(ControlLaw):
         law = self.law
         names = law.measured_columns
         remembered = tuple(law.initial_memory)
-        limited = [
-            nodes.limited(command, low, high)
-            for command, low, high in zip(
-                sample.commands, sample.minimum, sample.maximum, strict=True
-            )
-        ]
+        bounds = zip(sample.commands, sample.minimum, sample.maximum, strict=True)
+        limited = [nodes.limited(command, low, high) for command, low, high in bounds]
         variables = [*sample.measured, *sample.memory, *sample.parameters]
         parts = [[*sample.commands, *sample.later]]
         for k in range(len(self.columns)):
-            seed = [
-                *(measurement.columns[sensitivity(name, k)] for name in names),
-                *(memory[sensitivity(name, k)] for name in remembered),
-                *self._direction(k),
-            ]
-            parts.append(
-                slopes.tangents([*limited, *sample.later], variables, nodes.as_nodes(seed))
-            )
+            seed = nodes.as_nodes(self._seed(k, memory, measurement))
+            parts.append(slopes.tangents([*limited, *sample.later], variables, seed))
         ranges = [measurement.ranges[name] for name in law.inputs]
         point = [
             *(measurement.columns[name] for name in names),
@@ -248,11 +238,25 @@ class LawWithSensitivities(ControlLaw):
             *(leaf.value for leaf in tree.leaves(law)),
         ]
         symbols = [symbol for vector in sample[:-2] for symbol in vector]
-        columns = evaluated(parts, symbols, point)
+        values, *columns = evaluated(parts, symbols, point)
         count = len(law.inputs)
-        commands = dict(zip(law.inputs, columns[0], strict=False))
-        later = dict(zip(remembered, columns[0][count:], strict=True))
-        for k, column in enumerate(columns[1:]):
-            commands |= {sensitivity(name, k): column[i] for i, name in enumerate(law.inputs)}
-            later |= {sensitivity(name, k): column[count + i] for i, name in enumerate(remembered)}
+        commands = dict(zip(law.inputs, values, strict=False))
+        later = dict(zip(remembered, values[count:], strict=True))
+        for k, column in enumerate(columns):
+            commands |= _named_column(law.inputs, k, column[:count])
+            later |= _named_column(remembered, k, column[count:])
         return commands, later
+
+    def _seed(self, column: int, memory: Memory, measurement: Measurement) -> list[Value]:
+        """The derivatives along a column of what a sample is computed from."""
+        measured = self.law.measured_columns
+        return [
+            *(measurement.columns[sensitivity(name, column)] for name in measured),
+            *(memory[sensitivity(name, column)] for name in self.law.initial_memory),
+            *self._direction(column),
+        ]
+
+
+def _named_column(names: Iterable[str], k: int, values: Sequence[Value]) -> dict[str, Value]:
+    """The derivatives of named quantities along column `k`."""
+    return {sensitivity(name, k): value for name, value in zip(names, values, strict=True)}

@@ -113,11 +113,13 @@ class Problem(ShortRepr):
     def references(self) -> tuple[Reference, ...]:
         """Sources of the models, of the integrator and of the controller, sorted by key."""
         known = self.compiled.description.cache.sources
-        if self.integrator not in known:
-            known[self.integrator] = tuple(cite((self.system, self.integrator)))
+        integrator = self.integrator
+        if integrator not in known:
+            known[integrator] = tuple(cite((self.system, integrator)))
         if type(self.input) is Schedule or not cite((self.input,)):
-            return known[self.integrator]
-        return tuple(cite((self.system, self.input, self.integrator)))
+            return known[integrator]
+        with_input = (self.system, self.input, integrator)
+        return tuple(cite(with_input))
 
     @functools.cached_property
     def compiled(self) -> CompiledSystem:
@@ -263,9 +265,10 @@ def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:
 def _raise_for_input(compiled: CompiledSystem, column: int, value: float, when: str) -> None:
     variable = compiled.system.input_variables[column]
     unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
+    allowed = f"{variable.minimum:g} to {variable.maximum:g}{unit}"
     raise ParameterError(
-        f"the input '{variable.name}' is {value:g}{unit} {when}; allowed "
-        f"range: {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
+        f"the input '{variable.name}' is {value:g}{unit} {when};"
+        f" allowed range: {allowed} ({variable.meaning})."
     )
 
 

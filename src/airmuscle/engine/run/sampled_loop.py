@@ -206,18 +206,22 @@ def snapped(
     start = float(edges[0])
     segments = signal.segments(names, start, float(edges[-1]) - start)
     ends = segments.ends
-    behind = np.minimum(np.maximum(edges.searchsorted(ends), 1), edges.size - 1)
+    behind = np.maximum(edges.searchsorted(ends), 1)
+    behind = np.minimum(behind, edges.size - 1)
     before = edges.take(behind - 1)
     after = edges.take(behind)
     nearest = np.where(ends - before < after - ends, before, after)
-    ends = np.where(np.abs(nearest - ends) <= close, nearest, ends)
+    distance = np.abs(nearest - ends)
+    ends = np.where(distance <= close, nearest, ends)
     if ends[0] > start and (ends[1:] > ends[:-1]).all():
         return PiecewiseLinear(ends, segments.values, segments.slopes)
-    is_after_previous = ends > np.concatenate([edges[:1], ends[:-1]])
+    # of two segments that end at one instant the first has no length
+    starts = np.concatenate([edges[:1], ends[:-1]])
+    has_length = ends > starts
     return PiecewiseLinear(
-        ends[is_after_previous],
-        segments.values[is_after_previous],
-        segments.slopes[is_after_previous],
+        ends[has_length],
+        segments.values[has_length],
+        segments.slopes[has_length],
     )
 
 

@@ -236,10 +236,12 @@ def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnos
 
 def reason_of_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> str:
     """Time, reason and state of an early end of a run, without a full stop."""
-    units = ["" if s.unit in ("", "1") else f" {s.unit}" for s in compiled.system.states]
-    state = zip(compiled.description.state_names, raw.state.tolist(), units, strict=True)
-    at = ", ".join(f"{name} {value:.4g}{unit}" for name, value, unit in state)
-    why = f"{raw.status.message}, after {raw.steps} steps, at {at}"
+    texts = []
+    for variable, value in zip(compiled.system.states, raw.state.tolist(), strict=True):
+        unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
+        texts.append(f"{variable.name} {value:.4g}{unit}")
+    state = ", ".join(texts)
+    why = f"{raw.status.message}, after {raw.steps} steps, at {state}"
     return f"the run ended at {raw.time:.6g} of {end:.6g} s because {why}"
 
 

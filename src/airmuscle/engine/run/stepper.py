@@ -297,26 +297,30 @@ class _Limits:
         known = compiled.description
         n = compiled.sizes.states
         self.names = (*known.state_names, *known.output_names)
-        self.lower, self.upper = (
-            np.full(len(self.names), -LARGEST),
-            np.full(len(self.names), LARGEST),
-        )
+        count = len(self.names)
+        self.lower = np.full(count, -LARGEST)
+        self.upper = np.full(count, LARGEST)
         self.lower[:n] = np.maximum(known.lower_bounds, -LARGEST)
         self.lower[n + known.positive_outputs] = np.nextafter(0.0, 1.0)
         self.validity: dict[int, ColumnLimit] = {}
         for limit in compiled.system.column_limits if check_validity else ():
-            if limit.column not in self.names:
-                continue
-            i = self.names.index(limit.column)
-            low, high = limit.bounds
-            slack = 1e-9 * (high - low if np.isfinite(high - low) else 0.0)
-            if low - slack > self.lower[i] or high + slack < self.upper[i]:
-                self.lower[i], self.upper[i] = (
-                    max(self.lower[i], low - slack),
-                    min(self.upper[i], high + slack),
-                )
-                self.validity[i] = limit
+            if limit.column in self.names:
+                self._narrow(self.names.index(limit.column), limit)
         self.arrays = self.lower[:n], self.upper[:n], self.lower[n:], self.upper[n:]
+
+    def _narrow(self, i: int, limit: ColumnLimit) -> None:
+        """Take over a limit of validity of column `i` where it is narrower, with a slack for
+        rounding.
+        """
+        low, high = limit.bounds
+        width = high - low
+        slack = 1e-9 * (width if np.isfinite(width) else 0.0)
+        low -= slack
+        high += slack
+        if low > self.lower[i] or high < self.upper[i]:
+            self.lower[i] = max(self.lower[i], low)
+            self.upper[i] = min(self.upper[i], high)
+            self.validity[i] = limit
 
     def meaning(self, i: int, value: npt.ArrayLike) -> str:
         """What it means that column `i` has this value beyond its limits."""

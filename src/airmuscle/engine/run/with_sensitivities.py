@@ -148,9 +148,10 @@ class WithSensitivities(SensitivitySystem):
         t = trace_system(self.inner)
         names = [s.name for s in self.inner.states]
         rates, *along, _ = self._differentiated(t, names, t.f, state, inputs)
-        return rates | {
-            sensitivity(n, k): column[n] for k, column in enumerate(along) for n in names
-        }
+        for k, column in enumerate(along):
+            for name in names:
+                rates[sensitivity(name, k)] = column[name]
+        return rates
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The observed quantities, their derivatives by every column, and their slopes in time

@@ -44,10 +44,13 @@ ALIGNMENT = 64
 
 def aligned_array(shape: tuple[int, ...], dtype: Any = np.float64) -> Any:
     """An array of zeros that begins at a multiple of ALIGNMENT bytes."""
-    size = math.prod(shape) * np.dtype(dtype).itemsize
+    kind = np.dtype(dtype)
+    size = math.prod(shape) * kind.itemsize
     room = np.zeros(size + ALIGNMENT, np.uint8)
     begin = -room.ctypes.data % ALIGNMENT
-    return room[begin : begin + size].view(dtype).reshape(shape)
+    end = begin + size
+    aligned = room[begin:end]
+    return aligned.view(dtype).reshape(shape)
 
 
 def _kind(argument: Any) -> str:
@@ -132,7 +135,8 @@ class BoundKernel:
 
     def __init__(self, kernel: Kernel, arguments: tuple[Any, ...]) -> None:
         self._kinds = tuple(map(_kind, arguments))
-        *self._offsets, count = itertools.accumulate(map(slot_count, self._kinds), initial=0)
+        counts = map(slot_count, self._kinds)
+        *self._offsets, count = itertools.accumulate(counts, initial=0)
         self._slots = (ctypes.c_int64 * count)()
         self._floats = (ctypes.c_double * count).from_buffer(self._slots)
         self._address = ctypes.addressof(self._slots)

@@ -43,13 +43,15 @@ class _Graph:
         self.successors: list[set[int]] = [set() for _ in inputs]
         place = {id(node): number for number, node in enumerate(inputs)}
         for node in nodes.in_order(results, place):
-            if node.arguments and any(id(x) in place for x in node.arguments):
+            if any(id(argument) in place for argument in node.arguments):
                 self._append(node, place)
-        self.results = range(len(self.successors), len(self.successors) + len(results))
+        first = len(self.successors)
+        self.results = range(first, first + len(results))
         for vertex, result in zip(self.results, results, strict=True):
-            if id(result) in place:
-                self.slopes_into[vertex] = {place[id(result)]: nodes.ONE}
-                self.successors[place[id(result)]].add(vertex)
+            source = place.get(id(result))
+            if source is not None:
+                self.slopes_into[vertex] = {source: nodes.ONE}
+                self.successors[source].add(vertex)
 
     def _append(self, node: Node, place: dict[int, int]) -> None:
         if node.operation not in slopes.RULES:

@@ -12,6 +12,7 @@ finite: its product with zero would be NaN and is zero here.
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from ....core import Operation
 from .instructions import ONE, ZERO, Code, Instruction, Operand
@@ -117,6 +118,14 @@ def _cases(
     return [*(_Case((gate,)) for gate in commands), *clamps, *chosen]
 
 
+class _Clamp(NamedTuple):
+    """A maximum or minimum, and the two operands that are in order where it has no effect."""
+
+    result: Operand
+    low: Operand
+    high: Operand
+
+
 class _Comparisons:
     """Results of comparisons that follow if values lie within their clamping intervals."""
 
@@ -137,37 +146,40 @@ class _Comparisons:
         be equal: such a comparison becomes a further gate.
         """
         for number, clamped in (difference.arguments, difference.arguments[::-1]):
-            facts: dict[Operand, Operand] = {}
-            ordered: list[tuple[Operand, Operand]] = []
-            while clamped != number and number[0] != "c":
-                line = self._line.get(clamped)
-                if line is None or line.operation not in _EXTREMES:
-                    break
-                near = (
-                    [number]
-                    if number in line.arguments
-                    else [a for a in line.arguments if a in self._line]
-                )
-                if not near:
-                    break
-                inner = near[0]
-                bound = line.arguments[line.arguments[0] == inner]
-                ordered.append(
-                    (bound, inner) if line.operation == Operation.MAXIMUM else (inner, bound)
-                )
-                facts[clamped] = number
-                clamped = inner
-            if facts and clamped == number:
-                further: dict[Operand, Operand] = {}
-                for low, high in ordered:
-                    if (low, high) in self._not_above:
-                        facts[self._not_above[low, high]] = ONE
-                    if (high, low) in self._below:
-                        facts[self._below[high, low]] = ZERO
-                    if (high, low) in self._not_above:
-                        further[self._not_above[high, low]] = ZERO
-                return [_Case((difference.result, *further), facts | further)]
+            clamps = self._clamps(number, clamped)
+            if not clamps:
+                continue
+            facts: dict[Operand, Operand] = {clamp.result: number for clamp in clamps}
+            further: dict[Operand, Operand] = {}
+            for _, low, high in clamps:
+                if (low, high) in self._not_above:
+                    facts[self._not_above[low, high]] = ONE
+                if (high, low) in self._below:
+                    facts[self._below[high, low]] = ZERO
+                if (high, low) in self._not_above:
+                    further[self._not_above[high, low]] = ZERO
+            return [_Case((difference.result, *further), facts | further)]
         return []
+
+    def _clamps(self, number: Operand, clamped: Operand) -> list[_Clamp]:
+        """The clamps from a result down to a number; none if it is not that number, clamped."""
+        clamps = []
+        while clamped != number and number[0] != "c":
+            line = self._line.get(clamped)
+            if line is None or line.operation not in _EXTREMES:
+                return []
+            near = [a for a in line.arguments if a in self._line]
+            if number in line.arguments:
+                near = [number]
+            if not near:
+                return []
+            inner = near[0]
+            bound = line.arguments[line.arguments[0] == inner]
+            is_lower = line.operation == Operation.MAXIMUM
+            low, high = (bound, inner) if is_lower else (inner, bound)
+            clamps.append(_Clamp(clamped, low, high))
+            clamped = inner
+        return clamps
 
 
 class _Search:
@@ -191,15 +203,16 @@ class _Search:
         """
         if any(gate in self.apart.gates for gate in case.gates):
             return
-        needed = {
-            *case.gates,
-            *(operand for operand, value in case.facts.items() if value[0] != "c"),
-        }
-        ahead = (
-            frozenset() if self._early.issuperset(case.gates) else self._early
-        )  # they cannot wait for a gate
-        superfluous, instead = self._superfluous(self._known(case), self._kept | needed | ahead)
-        if sum(_cost(self._line[operand]) for operand in superfluous) >= case.worth:
+        needed = set(case.gates)
+        for operand, value in case.facts.items():
+            if value[0] != "c":
+                needed.add(operand)
+        # early results cannot wait for a gate that is late
+        ahead = frozenset() if self._early.issuperset(case.gates) else self._early
+        known = self._known(case)
+        superfluous, instead = self._superfluous(known, self._kept | needed | ahead)
+        saved = sum(_cost(self._line[operand]) for operand in superfluous)
+        if saved >= case.worth:
             self._kept |= needed
             self.apart.gates.update(dict.fromkeys(superfluous, case.gates))
             self.apart.instead.update(instead)
@@ -270,22 +283,37 @@ def _value(operation: Operation, x: Sequence[Operand]) -> Operand | None:
     """The result of an operation if it is a constant or an operand for any value of the others;
     else None.
     """
-    zero = ZERO in x
-    unity = ONE in x
-    if operation in (Operation.MULTIPLY, Operation.AND):
-        return ZERO if zero else x[x[0] == ONE] if unity else None
-    if operation == Operation.ADD:
-        return x[x[0] == ZERO] if zero else None
-    if operation == Operation.SUBTRACT:
-        return ZERO if x[0] == x[1] else x[0] if x[1] == ZERO else None
-    if operation == Operation.DIVIDE or operation in _KEEP_ZERO:
-        return ZERO if x[0] == ZERO else None
-    if operation == Operation.NOT:
-        return {ZERO: ONE, ONE: ZERO}.get(x[0])
-    if operation == Operation.MASK:
-        return ZERO if zero else x[1] if x[0] == ONE else None
-    if operation == Operation.SELECT:
-        return x[2] if x[0] == ZERO else x[1] if x[0] == ONE or x[1] == x[2] else None
-    if operation in _EXTREMES:
-        return x[0] if x[0] == x[1] else None
-    return None
+    first = x[0]
+    last = x[-1]
+    match operation:
+        case Operation.MULTIPLY | Operation.AND:
+            return _product(first, last)
+        case Operation.ADD if ZERO in x:
+            return last if first == ZERO else first
+        case Operation.SUBTRACT if first == last:
+            return ZERO
+        case Operation.SUBTRACT if last == ZERO:
+            return first
+        case Operation.NOT:
+            return {ZERO: ONE, ONE: ZERO}.get(first)
+        case Operation.MASK:
+            return _choice(first, last, ZERO)
+        case Operation.SELECT:
+            return _choice(*x)
+    if first == ZERO and (operation == Operation.DIVIDE or operation in _KEEP_ZERO):
+        return ZERO
+    return first if operation in _EXTREMES and first == last else None
+
+
+def _product(first: Operand, last: Operand) -> Operand | None:
+    if ZERO in (first, last):
+        return ZERO
+    if first == ONE:
+        return last
+    return first if last == ONE else None
+
+
+def _choice(condition: Operand, when_true: Operand, when_false: Operand) -> Operand | None:
+    if condition == ZERO:
+        return when_false
+    return when_true if condition == ONE or when_true == when_false else None

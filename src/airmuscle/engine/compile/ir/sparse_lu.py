@@ -40,30 +40,36 @@ class Factors:
     """
 
     def __init__(self, places: Sequence[Place], slots: Sequence[int], size: int) -> None:
-        self.j = nodes.symbols("j", max(slots, default=-1) + 1)
+        count = max(slots, default=-1) + 1
+        self.j = nodes.symbols("j", count)
         self.d = nodes.symbol("d")
-        a: dict[Place, Node] = {(i, i): self.d for i in range(size)}
+        matrix: dict[Place, Node] = {(i, i): self.d for i in range(size)}
         for slot, place in zip(slots, places, strict=True):
-            a[place] = a.get(place, nodes.ZERO) - self.j[slot]
-        self.order = _order(a, size)
-        _factorise(a, self.order)
-        self.values, slot_of_each = distinct(list(a.values()))
-        self._slots = dict(zip(a, slot_of_each, strict=True))
+            before = matrix.get(place, nodes.ZERO)
+            matrix[place] = before - self.j[slot]
+        self.order = _order(matrix, size)
+        _factorise(matrix, self.order)
+        self.values, slots_of_factors = distinct(list(matrix.values()))
+        self._slots = dict(zip(matrix, slots_of_factors, strict=True))
 
     def solved(self, factors: Any, right: Sequence[Any]) -> list[Any]:
         """x with (d I - J) x = right; `factors[k]` is the k-th of the distinct factors."""
         at = {place: factors[slot] for place, slot in self._slots.items()}
         x = list(right)
-        order = self.order
-        for n, i in enumerate(order):
-            for k in order[:n]:
-                if (i, k) in at:
-                    x[i] = x[i] - at[i, k] * x[k]
-        x = [value * at[i, i] for i, value in enumerate(x)]
-        for n, i in reversed(list(enumerate(order))):
-            for k in reversed(order[n + 1 :]):
-                if (i, k) in at:
-                    x[i] = x[i] - at[i, k] * x[k]
+
+        def subtract(i: int, columns: Iterable[int]) -> None:
+            for k in columns:
+                factor = at.get((i, k))
+                if factor is not None:
+                    x[i] = x[i] - factor * x[k]
+
+        for n, i in enumerate(self.order):
+            subtract(i, self.order[:n])
+        for i, value in enumerate(x):
+            x[i] = value * at[i, i]
+        backward = self.order[::-1]
+        for n, i in enumerate(backward):
+            subtract(i, backward[:n])
         return x
 
 
@@ -73,27 +79,40 @@ def _factorise(a: dict[Place, Node], order: Sequence[int]) -> None:
     """
     for n, k in enumerate(order):
         later = order[n + 1 :]
-        a[k, k] = 1 / a[k, k]
+        inverse = a[k, k] = 1 / a[k, k]
         row = {j: a[k, j] for j in later if (k, j) in a}
         for i in later:
             if (i, k) not in a:
                 continue
-            a[i, k] = a[i, k] * a[k, k]
+            factor = a[i, k] * inverse
+            a[i, k] = factor
             for j, value in row.items():
-                a[i, j] = a.get((i, j), nodes.ZERO) - a[i, k] * value
+                before = a.get((i, j), nodes.ZERO)
+                a[i, j] = before - factor * value
         for j, value in row.items():
-            a[k, j] = value * a[k, k]
+            a[k, j] = value * inverse
 
 
 def _order(places: Iterable[Place], size: int) -> tuple[int, ...]:
     """The order of elimination: the state with the smallest possible fill-in (Markowitz criterion),
     then with the shortest chain of eliminations before it, so that independent ones run in
     parallel."""
-    rows = [{j for i, j in places if i == k and j != k} for k in range(size)]
-    columns = [{i for i, j in places if j == k and i != k} for k in range(size)]
-    depth, left, order = [0] * size, set(range(size)), []
+    rows: list[set[int]] = [set() for _ in range(size)]
+    columns: list[set[int]] = [set() for _ in range(size)]
+    for i, j in places:
+        if i != j:
+            rows[i].add(j)
+            columns[j].add(i)
+    depth = [0] * size
+    left = set(range(size))
+    order = []
+
+    def merit(i: int) -> tuple[int, int, int]:
+        fill_in = len(rows[i]) * len(columns[i])
+        return fill_in, depth[i], i
+
     while left:
-        k = min(left, key=lambda i: (len(rows[i]) * len(columns[i]), depth[i], i))
+        k = min(left, key=merit)
         order.append(k)
         left.remove(k)
         for i in columns[k]:

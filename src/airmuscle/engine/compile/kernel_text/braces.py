@@ -80,10 +80,13 @@ class BraceKernels(KernelPrinter):
 
     def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
         left = self.expression(target)
-        if isinstance(node, ast.AugAssign):
-            counts = isinstance(node.op, ast.Add) and ast.unparse(node.value) == "1"
-            return [f"{left}++;" if counts else f"{left} = {self.expression(value)};"]
-        return [f"{self.declared(target, node)}{left} = {self.expression(value)};"]
+        declaration = ""
+        if not isinstance(node, ast.AugAssign):
+            declaration = self.declared(target, node)
+        elif isinstance(node.op, ast.Add) and ast.unparse(node.value) == "1":
+            return [f"{left}++;"]
+        right = self.expression(value)
+        return [f"{declaration}{left} = {right};"]
 
     def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
         [line] = super().call_lines(call, targets, node)
@@ -117,14 +120,18 @@ def _place(name: str, block: Sequence[ast.stmt]) -> ast.stmt | None:
     first, *further = [node for node in block if _mentions(name, node)]
     if isinstance(first, ast.Assign):
         targets = [target.id for target, _ in pairs(first) if isinstance(target, ast.Name)]
-        return first if name in targets and not _mentions(name, first.value) else None
+        is_declaration = name in targets and not _mentions(name, first.value)
+        return first if is_declaration else None
     if further or not isinstance(first, ast.If | ast.While | ast.For):
         return None
-    inner = [
-        part for part in (first.body, first.orelse) if any(_mentions(name, node) for node in part)
-    ]
     head = first.iter if isinstance(first, ast.For) else first.test
-    return None if _mentions(name, head) or len(inner) > 1 else _place(name, inner[0])
+    if _mentions(name, head):
+        return None
+    inner = []
+    for part in (first.body, first.orelse):
+        if any(_mentions(name, node) for node in part):
+            inner.append(part)
+    return _place(name, inner[0]) if len(inner) == 1 else None
 
 
 class CKernels(BraceKernels):
@@ -184,17 +191,18 @@ class CKernels(BraceKernels):
 
     def _argument(self, name: str) -> str:
         kind = self.kernel.kinds[name]
+        scalar = self._type(kind.scalar)
+        printed = self.name(name)
         if not kind.rank:
-            return f"{self._type(kind.scalar)} {self.name(name)}"
+            return f"{scalar} {printed}"
         if kind.rank == 1:
-            return (
-                f"{'' if name in self.kernel.written else 'const '}{self._type(kind.scalar)}"
-                f" *{self.name(name)}"
-            )
-        if len(self.shapes.get(name, ())) != kind.rank:
+            constant = "" if name in self.kernel.written else "const "
+            return f"{constant}{scalar} *{printed}"
+        shape = self.shapes.get(name, ())
+        if len(shape) != kind.rank:
             raise self.source.unprintable(self.source.node, f"the array '{name}' without a shape")
-        widths = "".join(f"[{width}]" for width in self.shapes[name][1:])
-        return f"{self._type(kind.scalar)} {self.name(name)}[]{widths}"
+        widths = "".join(f"[{width}]" for width in shape[1:])
+        return f"{scalar} {printed}[]{widths}"
 
     def _type(self, scalar: ElementType) -> str:
         return self.type if scalar == ElementType.NUMBER else "int"
@@ -220,8 +228,12 @@ class CKernels(BraceKernels):
         numbers = any(self.kernel.of(argument) == ElementType.NUMBER for argument in arguments)
         if name in {"min", "max"}:
             return self._extreme(name, arguments, numbers)
-        suffix = "" if name in self.kernel.calls or (name == "abs" and not numbers) else self.suffix
-        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}{suffix}({self.joined(arguments)})"  # noqa: E501
+        called = _NAMES.get(name, name)
+        suffix = "" if name in self.kernel.calls else self.suffix
+        if name == "abs" and not numbers:  # of integers
+            called = name
+            suffix = ""
+        return f"{called}{suffix}({self.joined(arguments)})"
 
     def _extreme(self, name: str, arguments: Sequence[ast.expr], numbers: bool) -> str:
         first, *further = arguments
@@ -233,15 +245,16 @@ class CKernels(BraceKernels):
         if len(further) > 1:
             raise self.source.unprintable(first, "the extreme of more than two integers")
         a, b = (self.expression(argument, 5) for argument in arguments)
-        return f"({a} {'<' if name == 'min' else '>'} {b} ? {a} : {b})"
+        comparison = "<" if name == "min" else ">"
+        return f"({a} {comparison} {b} ? {a} : {b})"
 
     def called_with(
         self, kernel: TypedKernel, texts: Mapping[str, str], results: Sequence[str]
     ) -> str:
-        values = [texts.get(name, name) for name in kernel.arguments] + [
-            f"&{name}" for name in results[1:]
-        ]
-        return f"{f'{results[0]} = ' if results else ''}{kernel.source.name}({', '.join(values)});"
+        values = [texts.get(name, name) for name in kernel.arguments]
+        values += [f"&{name}" for name in results[1:]]
+        left = f"{results[0]} = " if results else ""
+        return f"{left}{kernel.source.name}({', '.join(values)});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
         texts = [name + "".join(f"[{size}]" for size in sizes) for name, sizes in arrays.items()]

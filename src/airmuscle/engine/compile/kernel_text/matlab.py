@@ -5,7 +5,7 @@ change.
 import ast
 from collections.abc import Mapping, Sequence
 
-from .printer import KernelPrinter, used_constants
+from .printer import KernelPrinter, indented, used_constants
 from .types import TypedKernel, indices
 
 _KEYWORDS = """break case catch classdef continue do else elseif end end_try_catch end_unwind_protect endfor endfunction
@@ -68,17 +68,18 @@ class MatlabKernels(KernelPrinter):
 
     def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
         rank = self.kernel.kinds[array.id].rank
+        name = self.name(array.id)
         if self._counter and ast.unparse(at[-1]) == self._counter:
-            return (
-                self.name(array.id)
-                if rank == 1
-                else f"{self.name(array.id)}({self._place(at[0])}, :)'"
-            )
-        places = [self._place(index) for index in at]
-        if rank == 3:
-            rest = f"({', '.join([*places[1:], ':'][:2])})" if len(places) > 1 else ""
-            return f"{self.name(array.id)}{{{places[0]}}}{rest}"
-        return f"{self.name(array.id)}({', '.join([*places, ':'][:rank])})"
+            return name if rank == 1 else f"{name}({self._place(at[0])}, :)'"
+        first, *further = [self._place(index) for index in at]
+        if rank < 3:
+            places = [first, *further, ":"]
+            return f"{name}({', '.join(places[:rank])})"
+        cell = f"{name}{{{first}}}"
+        if not further:
+            return cell
+        places = [*further, ":"]
+        return f"{cell}({', '.join(places[:2])})"
 
     def _place(self, index: ast.expr, shift: int = 1) -> str:
         """An integer plus `shift`: an index that begins with 1, the end of a range with -1."""
@@ -123,11 +124,10 @@ class MatlabKernels(KernelPrinter):
             return [self._assigned_columns(target, value, node)]
         if not isinstance(value, ast.IfExp):
             return [f"{self.expression(target)} = {self.expression(value)};"]
-        branches = [
-            ["  " + line for line in self.assign(target, v, node)]
-            for v in (value.body, value.orelse)
-        ]
-        return [f"if {self.expression(value.test)}", *branches[0], "else", *branches[1], "end"]
+        when_true = indented(self.assign(target, value.body, node))
+        when_false = indented(self.assign(target, value.orelse, node))
+        test = self.expression(value.test)
+        return [f"if {test}", *when_true, "else", *when_false, "end"]
 
     def _assigned_columns(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> str:
         """An assignment to all elements of a column, or the sum of its elements."""
@@ -145,7 +145,9 @@ class MatlabKernels(KernelPrinter):
         return (names[0] if len(names) == 1 else f"[{', '.join(names)}]") + " = " if names else ""
 
     def invoke(self, name: str, arguments: Sequence[ast.expr], results: int) -> str:
-        return f"{self._left(list(map(self.expression, arguments[-results:])))}{name}({self.joined(arguments[:-results])});"  # noqa: E501
+        changed = [self.expression(argument) for argument in arguments[-results:]]
+        values = self.joined(arguments[:-results])
+        return f"{self._left(changed)}{name}({values});"
 
     # Operations on whole arrays
 
@@ -153,8 +155,11 @@ class MatlabKernels(KernelPrinter):
         if not isinstance(node, ast.For) or not self._is_elementwise(node):
             return super().compound(node)
         self._counter = ast.unparse(node.target)
-        lines = [line for inner in node.body for line in self.statement(inner)]
-        self._counter, self._columns = "", set()
+        lines = []
+        for inner in node.body:
+            lines += self.statement(inner)
+        self._counter = ""
+        self._columns = set()
         return lines
 
     def _is_elementwise(self, node: ast.For) -> bool:
@@ -190,9 +195,10 @@ class MatlabKernels(KernelPrinter):
     def called_with(
         self, kernel: TypedKernel, texts: Mapping[str, str], results: Sequence[str]
     ) -> str:
-        values = ", ".join(texts.get(name, name) for name in kernel.arguments)
+        values = [texts.get(name, name) for name in kernel.arguments]
         changed = [texts.get(name, name) for name in kernel.changed]
-        return f"{self._left([*results, *changed])}{kernel.source.name}({values});"
+        left = self._left([*results, *changed])
+        return f"{left}{kernel.source.name}({', '.join(values)});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
         first: dict[str, str] = {}  # of arrays of one size

@@ -262,32 +262,38 @@ class KernelPrinter(ExpressionPrinter):
         assert isinstance(node.iter, ast.Call)
         if len(node.iter.args) > 2:
             raise self.source.unprintable(node.iter, "a range with a step")
-        sizes = {
-            n.value
-            for n in ast.walk(node.iter)
-            if isinstance(n, ast.Attribute) and n.attr == "shape"
-        }
-        bounds = [n.id for n in ast.walk(node.iter) if isinstance(n, ast.Name) and n not in sizes]
-        if {node.target.id, *bounds} & {*stored_names(node.body)}:
+        variable = node.target.id
+        if {variable, *_bounds(node.iter)} & {*stored_names(node.body)}:
             raise self.source.unprintable(
                 node.iter, "a loop that changes its variable or its range"
             )
-        mentions = [
-            n
-            for n in ast.walk(self.source.node)
-            if isinstance(n, ast.Name) and n.id == node.target.id
-        ]
-        loops = [
-            n
-            for n in ast.walk(self.source.node)
-            if isinstance(n, ast.For) and ast.unparse(n.target) == node.target.id
-        ]
-        if len(mentions) != sum(
-            n.id == node.target.id for f in loops for n in ast.walk(f) if isinstance(n, ast.Name)
-        ):
+        if self._is_used_outside(variable):
             raise self.source.unprintable(node.target, "the variable of a loop outside it")
         first = self.expression(node.iter.args[0]) if len(node.iter.args) > 1 else "0"
-        return self.loop(self.name(node.target.id), first, node.iter.args[-1])
+        return self.loop(self.name(variable), first, node.iter.args[-1])
+
+    def _is_used_outside(self, variable: str) -> bool:
+        """Whether the function uses the variable of a loop outside of the loops over it."""
+        inside = 0
+        for node in ast.walk(self.source.node):
+            if isinstance(node, ast.For) and ast.unparse(node.target) == variable:
+                inside += _uses(variable, node)
+        return _uses(variable, self.source.node) != inside
+
+
+def _uses(name: str, root: ast.AST) -> int:
+    """How often a name stands in a part of the source."""
+    names = [node.id for node in ast.walk(root) if isinstance(node, ast.Name)]
+    return names.count(name)
+
+
+def _bounds(range_of_loop: ast.expr) -> list[str]:
+    """The variables in a range, apart from arrays whose size it states."""
+    nodes = list(ast.walk(range_of_loop))
+    sizes = [
+        node.value for node in nodes if isinstance(node, ast.Attribute) and node.attr == "shape"
+    ]
+    return [node.id for node in nodes if isinstance(node, ast.Name) and node not in sizes]
 
 
 def used_constants(kernel: TypedKernel) -> dict[str, float]:

@@ -187,34 +187,36 @@ class _Inference:
         elif isinstance(node, ast.For) and isinstance(node.iter, ast.Call):
             for bound in node.iter.args:
                 self._index(bound)
-        elif (
-            isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Name)
-            and node.func.id in self.calls
-        ):
+        elif isinstance(node, ast.Call):
+            self._call(node)
+        elif isinstance(node, ast.If | ast.While) and isinstance(node.test, ast.Name):
+            self.flags.add(node.test.id)
+
+    def _call(self, node: ast.Call) -> None:
+        if isinstance(node.func, ast.Name) and node.func.id in self.calls:
             called = self.calls[node.func.id]
             for name, argument in zip(called.source.arguments, node.args, strict=True):
                 if name in called.called:
                     self.called.add(ast.unparse(argument))
                 else:
                     self._given(argument, called.kinds[name], name in called.written)
-        elif isinstance(node, ast.Call) and (system := invoked(node)):
+        elif system := invoked(node):
             name, arrays, results = system
             self.called.add(name)
+            numbers = VariableType(ElementType.NUMBER, 1)
+            first_result = len(arrays) - results
             for i, array in enumerate(arrays):
                 if isinstance(array, ast.Name | ast.Subscript):
-                    self._given(
-                        array, VariableType(ElementType.NUMBER, 1), i >= len(arrays) - results
-                    )
-        elif isinstance(node, ast.If | ast.While) and isinstance(node.test, ast.Name):
-            self.flags.add(node.test.id)
+                    self._given(array, numbers, i >= first_result)
 
     def _given(self, node: ast.expr, kind: VariableType, written: bool) -> None:
-        inner = node.value if isinstance(node, ast.Subscript) else node
+        inner = node
+        further = 0
+        if isinstance(node, ast.Subscript):
+            inner = node.value
+            further = len(indices(node))
         if isinstance(inner, ast.Name) and kind.rank:
-            self._rank(
-                inner.id, kind.rank + (len(indices(node)) if isinstance(node, ast.Subscript) else 0)
-            )
+            self._rank(inner.id, kind.rank + further)
             if written:
                 self.written.add(inner.id)
         if kind.scalar == ElementType.INTEGER:
@@ -237,14 +239,16 @@ class _Inference:
             self._index(node.right)
 
     def _assign(self, node: ast.AST) -> None:
-        if isinstance(node, ast.For) and isinstance(node.target, ast.Name):
-            self.locals[node.target.id] = ElementType.INTEGER
-        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            self._learn(node.target.id, self.of(node.value))
-        elif isinstance(node, ast.Assign):
-            for i, (target, value) in enumerate(pairs(node)):
-                if isinstance(target, ast.Name):
-                    self._learn(target.id, self.of(value) if value else self._result(node.value, i))
+        match node:
+            case ast.For(target=ast.Name(id=name)):
+                self.locals[name] = ElementType.INTEGER
+            case ast.AugAssign(target=ast.Name(id=name), value=value):
+                self._learn(name, self.of(value))
+            case ast.Assign():
+                for i, (target, part) in enumerate(pairs(node)):
+                    if isinstance(target, ast.Name):
+                        scalar = self.of(part) if part else self._result(node.value, i)
+                        self._learn(target.id, scalar)
 
     def _learn(self, name: str, scalar: ElementType) -> None:
         self.locals[name] = max(scalar, self.locals.get(name, scalar))
