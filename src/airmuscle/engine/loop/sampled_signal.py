@@ -144,9 +144,12 @@ def approximate(
     values = _evaluate(name, function, times)
     while True:
         lengths = np.diff(times)
-        between = times[:-1] + np.array([[0.25], [0.5], [0.75]]) * lengths
-        exact = _evaluate(name, function, between.ravel()).reshape(between.shape)
-        errors = np.abs(exact - np.interp(between, times, values)).max(axis=0)
+        parts = np.array([[0.25], [0.5], [0.75]])
+        between = times[:-1] + parts * lengths
+        exact = _evaluate(name, function, between.ravel())
+        exact = exact.reshape(between.shape)
+        on_lines = np.interp(between, times, values)
+        errors = np.abs(exact - on_lines).max(axis=0)
         at = np.flatnonzero(errors > error)
         if at.size == 0:
             return tuple(zip(times.tolist(), values.tolist(), strict=True))

@@ -111,15 +111,26 @@ def seeded(seed: Value) -> dict[str, Value]:
 
 def drawn(state: Mapping[str, Value]) -> tuple[Value, dict[str, Value]]:
     """A number that is uniform in (0, 1), and the next state; L'Ecuyer (1999), Fig. I, MRG32k3a."""
-    s = state
-    first = modulo(1403580.0 * s["x1"], FIRST_MODULUS) - modulo(810728.0 * s["x0"], FIRST_MODULUS)
+    x0, x1, x2 = (state[name] for name in ("x0", "x1", "x2"))
+    y0, y1, y2 = (state[name] for name in ("y0", "y1", "y2"))
+    minuend = modulo(1403580.0 * x1, FIRST_MODULUS)
+    subtrahend = modulo(810728.0 * x0, FIRST_MODULUS)
+    first = minuend - subtrahend
     first = ops.where(first < 0.0, first + FIRST_MODULUS, first)
-    second = modulo(527612.0 * s["y2"], SECOND_MODULUS) - modulo(
-        1370589.0 * s["y0"], SECOND_MODULUS
-    )
+    minuend = modulo(527612.0 * y2, SECOND_MODULUS)
+    subtrahend = modulo(1370589.0 * y0, SECOND_MODULUS)
+    second = minuend - subtrahend
     second = ops.where(second < 0.0, second + SECOND_MODULUS, second)
-    difference = ops.where(first > second, first - second, first - second + FIRST_MODULUS)
-    later = {"x0": s["x1"], "x1": s["x2"], "x2": first, "y0": s["y1"], "y1": s["y2"], "y2": second}
+    difference = first - second
+    difference = ops.where(first > second, difference, difference + FIRST_MODULUS)
+    later = {
+        "x0": x1,
+        "x1": x2,
+        "x2": first,
+        "y0": y1,
+        "y1": y2,
+        "y2": second,
+    }
     return difference / (FIRST_MODULUS + 1.0), later
 
 

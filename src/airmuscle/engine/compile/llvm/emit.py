@@ -150,10 +150,10 @@ class FunctionBody(FunctionBlock):
 
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
         number = self.number
-        test = self.put(f"fcmp {_COMPARISONS[comparison]} {number.text} {a}, {b}")
-        return self.put(
-            f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}"
-        )
+        kind = number.text
+        condition = _COMPARISONS[comparison]
+        test = self.put(f"fcmp {condition} {kind} {a}, {b}")
+        return self.put(f"select {number.mask} {test}, {kind} {when_true}, {kind} {when_false}")
 
     def call(self, function: str, x: Sequence[str]) -> str:
         return (
@@ -165,11 +165,13 @@ class FunctionBody(FunctionBlock):
     def call_library(self, function: str, x: Sequence[str]) -> str:
         """Call of a function of the C library, or of its vectorised replacement in lanes."""
         number = self.number
-        arguments = ", ".join(f"{number.text} {a}" for a in x)
+        kind = number.text
+        arguments = ", ".join(f"{kind} {a}" for a in x)
         if number == DOUBLE:
             return self.put(f"call {FLAGS} double @{function}({arguments})")
         self.needed[function] = len(x)
-        return self.put(f"call {number.text} @{number.function(function)}({arguments})")
+        in_lanes = number.function(function)
+        return self.put(f"call {kind} @{in_lanes}({arguments})")
 
     def intrinsic(self, name: str, x: Sequence[str], flags: str = FLAGS) -> str:
         """Call of an LLVM intrinsic."""

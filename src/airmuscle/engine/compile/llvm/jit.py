@@ -198,11 +198,13 @@ def slot_count(kind: str) -> int:
 def numba_arguments(names: Sequence[str], kinds: Sequence[str]) -> Iterator[str]:
     """The argument names of a function compiled by numba."""
     for name, kind in zip(names, kinds, strict=True):
+        argument = f"arg.{name}"
         if kind in _NUMBERS:
-            yield f"arg.{name}"
+            yield argument
             continue
-        yield from (f"arg.{name}.{part}" for part in range(5))
-        yield from (f"arg.{name}.{part}.{i}" for part in (5, 6) for i in range(int(kind[1:])))
+        yield from (f"{argument}.{part}" for part in range(5))
+        for part in (5, 6):  # shape and strides
+            yield from (f"{argument}.{part}.{axis}" for axis in range(int(kind[1:])))
 
 
 def entry_point(function: str, kinds: Sequence[str]) -> str:

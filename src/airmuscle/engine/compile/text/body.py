@@ -95,8 +95,10 @@ class TextBody(FunctionBlock):
         super().__init__(scalars)
         self.syntax = syntax
         self.language = syntax.language
-        self.read, self.written = set[str](), set[str]()
-        self.loaded, self.stored = dict[str, tuple[str, int]](), dict[str, tuple[str, int]]()
+        self.read: set[str] = set()
+        self.written: set[str] = set()
+        self.loaded: dict[str, tuple[str, int]] = {}
+        self.stored: dict[str, tuple[str, int]] = {}
         self.sizes: dict[str, int] = {}
         self._defines, self._declares = syntax.defines()
 

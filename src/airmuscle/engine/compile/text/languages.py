@@ -145,9 +145,13 @@ class MatlabLanguage(TextLanguage):
     def function(
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
     ) -> str:
-        head = f"function [{', '.join(outputs)}] = {self.prefix}{name}({', '.join(inputs)})"
-        arrays = [f"  {a} = zeros({body.sizes.get(a, 0)}, 1);" for a in outputs]
-        return "\n".join([head, *arrays, *body.lines, "end", ""])
+        results = ", ".join(outputs)
+        arguments = ", ".join(inputs)
+        lines = [f"function [{results}] = {self.prefix}{name}({arguments})"]
+        for array in outputs:
+            size = body.sizes.get(array, 0)
+            lines.append(f"  {array} = zeros({size}, 1);")
+        return "\n".join([*lines, *body.lines, "end", ""])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -181,11 +185,16 @@ class TorchLanguage(TextLanguage):
     def function(
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: TextBody
     ) -> str:
-        like = next(a for a in inputs if a not in body.scalars)
-        lines = [f"def {name}({', '.join(inputs)}):", f"    like = {like}[0]"]
-        lines += [f"    {a} = [0.0] * {body.sizes.get(a, 0)}" for a in outputs]
-        returned = ", ".join(f"stacked({a}, like)" for a in outputs)
-        return "\n".join([*lines, *body.lines, f"    return {returned}", "", ""])
+        arguments = ", ".join(inputs)
+        like = next(array for array in inputs if array not in body.scalars)
+        lines = [f"def {name}({arguments}):", f"    like = {like}[0]"]
+        for array in outputs:
+            size = body.sizes.get(array, 0)
+            lines.append(f"    {array} = [0.0] * {size}")
+        lines += body.lines
+        returned = ", ".join(f"stacked({array}, like)" for array in outputs)
+        lines.append(f"    return {returned}")
+        return "\n".join([*lines, "", ""])
 
 
 @dataclasses.dataclass(frozen=True)

@@ -105,11 +105,16 @@ class BatchJob:
         run = self._integrated(index, plant, loop)
         times, rows = run.rows
         if loop.prepared.loop.drivers:  # there may be further rows
-            at = np.searchsorted(times, self.times - 1e-9 * self.duration)
-            rows = rows[at[at < times.size]]
-        at, setpoints = loop.prepared.at_times
-        more = run.columns(at[: len(rows)], setpoints[: len(rows)]) if len(run.measured) else {}
-        self._write(index, plant, self._truncate(run.raw(rows)), run.signal, more)
+            places = np.searchsorted(times, self.times - 1e-9 * self.duration)
+            places = places[places < times.size]
+            rows = rows[places]
+        of_loop: Mapping[str, Array] = {}
+        if len(run.measured):
+            count = len(rows)
+            samples, setpoints = loop.prepared.at_times
+            of_loop = run.columns(samples[:count], setpoints[:count])
+        raw = self._truncate(run.raw(rows))
+        self._write(index, plant, raw, run.signal, of_loop)
         self._runs.give_back(id(loop), run)
 
     def loop_of(self, index: int) -> CompiledLoop:

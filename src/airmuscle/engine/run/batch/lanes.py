@@ -251,15 +251,18 @@ class LoopLaneBlock(LaneArrays):
         law = loop.law
         assert law is not None
         prepared = loop.prepared
+        inputs = prepared.inputs
+        sample_time, lowest, highest, _ = loop.commanding
+        initial_memory = np.array(list(law.initial_memory.values()))
         parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
         parameters[:, places] = loop.parameters[:, None]
-        memory[:, places] = np.array(list(law.initial_memory.values()))[:, None]
+        memory[:, places] = initial_memory[:, None]
         self.setpoints[:, :, places] = prepared.setpoint_values[..., None]
-        self.values[:, :, places] = prepared.inputs.values[..., None]
-        self.slopes[:, :, places] = prepared.inputs.slopes[..., None]
-        period[:, places] = loop.commanding[0]
-        low[:, places] = loop.commanding[1][:, None]
-        high[:, places] = loop.commanding[2][:, None]
+        self.values[:, :, places] = inputs.values[..., None]
+        self.slopes[:, :, places] = inputs.slopes[..., None]
+        period[:, places] = sample_time
+        low[:, places] = lowest[:, None]
+        high[:, places] = highest[:, None]
 
     @functools.cached_property
     def kernel(self) -> BoundKernel:
@@ -323,13 +326,17 @@ class SegmentTable:
     def __init__(self, job: BatchJob) -> None:
         by_identity = {id(segments): segments for segments in job.segments}
         distinct = list(by_identity.values())
-        number = {key: i for i, key in enumerate(by_identity)}
-        self.ends = np.concatenate([s.ends for s in distinct])
-        self.values = np.ascontiguousarray(np.concatenate([s.values for s in distinct]))
-        self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in distinct]))
-        ends = np.cumsum([s.ends.size for s in distinct])
-        signal_of_plant = np.array([number[key] for key in map(id, job.segments)])
-        self.first = np.append(0, ends)[signal_of_plant]
+        number = {identity: i for i, identity in enumerate(by_identity)}
+        self.ends = np.concatenate([segments.ends for segments in distinct])
+        values = np.concatenate([segments.values for segments in distinct])
+        self.values = np.ascontiguousarray(values)
+        slopes = np.concatenate([segments.slopes for segments in distinct])
+        self.slopes = np.ascontiguousarray(slopes)
+        lengths = [segments.ends.size for segments in distinct]
+        ends = np.cumsum(lengths)
+        starts = np.append(0, ends)
+        signal_of_plant = np.array([number[id(segments)] for segments in job.segments])
+        self.first = starts[signal_of_plant]
         self.last = ends[signal_of_plant]
 
 
