@@ -31,7 +31,7 @@ from measure import (
     print_section,
     time_variants,
 )
-from ode8 import compilers
+from ode8 import compile_source, compilers
 
 import airmuscle as am
 from airmuscle.core import tree
@@ -156,8 +156,7 @@ def _stretch(braid: Any) -> tuple[Array, Array]:
 def compile_library(folder: pathlib.Path, compiler: str, lanes: int, *flags: str) -> ctypes.CDLL:
     """The C code for so many lanes, compiled with these flags and those of all variants."""
     target = folder / f"batch{len(list(folder.iterdir()))}.so"
-    options = [*OPTIMISED, *flags, f"-DLANES={lanes}", "-fPIC", "-shared"]
-    subprocess.run([compiler, *options, str(SOURCE), "-o", str(target)], check=True)
+    compile_source([compiler, *OPTIMISED, *flags, f"-DLANES={lanes}"], SOURCE, target)
     return ctypes.CDLL(str(target))
 
 

@@ -34,6 +34,17 @@ from airmuscle.design import (
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule
 from airmuscle.engine.compile import compile_system
 
+SMALLEST = 5e-324
+
+
+@pytest.fixture(autouse=True)
+def subnormal_numbers_remain():
+    """A library that gcc links with -ffast-math sets subnormal numbers to zero in the whole
+    process.
+    """
+    yield
+    assert SMALLEST * float(len("1")) > 0.0, "a loaded library has changed the arithmetic"
+
 
 def test_the_page_of_the_control_benchmark_has_the_tables_of_a_result_in_their_units():
     joint = proportional_joint((1,))
