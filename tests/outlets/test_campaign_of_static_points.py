@@ -63,10 +63,8 @@ def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no
     words = ["campaign", str(tmp_path / "fill.csv"), *braid, "--out", str(tmp_path / "out")]
     done = airmuscle(*words)
     said = " ".join(done.stdout.split())
-    assert (
-        "muscle: not written, because it needs a static law: no record is a slow run with force and"
-        " length; record" in said
-    )
+    assert "static characteristic 0 Not identified: no record is a slow run with force" in said
+    assert "muscle: not written, because it needs a static characteristic" in said
     assert "A tube between" not in (tmp_path / "out" / "report.html").read_text(
         encoding="utf-8"
     )  # the model errs

@@ -759,11 +759,9 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
 
 
 def test_a_fingerprint_leaves_out_rooms_that_exist_and_no_controllers():
-    """A study depends on the program of its controllers, the stages of a campaign on none."""
+    """A study depends on the program of its controllers."""
     from airmuscle.core.tree import EXCLUDED_ROOMS
-    from airmuscle.outlets.cli.campaign import OMITTED_ROOMS
 
     rooms = {path.parent.name for path in Path(am.__file__).parent.glob("*/__init__.py")}
-    assert {*EXCLUDED_ROOMS, *OMITTED_ROOMS} <= rooms
+    assert set(EXCLUDED_ROOMS) <= rooms
     assert not {"core", "engine", "physics", "control", "files", "design"} & set(EXCLUDED_ROOMS)
-    assert not {"core", "engine", "physics", "recording", "bench"} & set(OMITTED_ROOMS)

@@ -87,6 +87,8 @@ def test_a_comparison_of_parameters_alone_has_no_indicator():
     ready = compile_system(plants.EXAMPLES["dmsp-20-300"])
     indicators = event_indicators(ready.program.traced)
     state, inputs = printed.points_of(plants.EXAMPLES["dmsp-20-300"], 8)
+    position = ready.description.state_names.index("position")
+    state[:4, position] = [-0.03, -0.01, 0.1, 0.12]  # stretched and slack, beyond the range
     values = np.array(
         [indicators.values(x, u, ready.parameters) for x, u in zip(state, inputs, strict=True)]
     )

@@ -480,7 +480,8 @@ def test_only_parameters_that_act_on_the_run_are_tunable(tmp_path):
         text = archive.read("modelDescription.xml").decode()
     names = re.findall(r'name="parameters\.([^"]+)"', text)
     assert "mechanism.mass" in names
-    assert not [name for name in names if "validity" in name or "ratings" in name]
+    assert "muscle.validity_range.max_contraction" in names, "beyond it the muscle is slack"
+    assert not [name for name in names if "ratings" in name]
 
 
 def test_warnings_are_logged_on_request_only(fmus, tmp_path):

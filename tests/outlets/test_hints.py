@@ -481,7 +481,8 @@ def _hung(law_of_contraction: Any) -> Recording:
     pressure, force = (
         x.ravel() for x in np.meshgrid(np.linspace(1e5, 5e5, 8), np.linspace(0.0, 200.0, 8))
     )
-    contraction = law_of_contraction.contraction(pressure, force)
+    inner = np.clip(pressure, 0.0, 3.5e5), np.clip(force, 45.0, 260.0)  # the range of the surface
+    contraction = law_of_contraction.contraction(*inner)
     return Recording({"pressure": pressure, "force": force, "contraction": contraction}, "bench")
 
 

@@ -226,11 +226,12 @@ class FitProblem:
         return dataclasses.replace(problem, weights=problem.weights * np.sqrt(counts[drawn]))
 
     def predict(self, values: Array) -> Array:
-        """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
+        """The fitted quantity at every row with these parameters [SI]; shape (N,). It is that of
+        the formula: the range of a law follows from its fit.
+        """
         method = self.fitted_quantity.method
-        with np.errstate(
-            all="ignore"
-        ):  # non-finite values raise an error at the start; later the search backtracks
+        # Non-finite values raise an error at the start; later the search backtracks.
+        with np.errstate(all="ignore"), formula_alone():
             return self._join([getattr(law, method)(*x) for law, x in self._laws(values)])
 
     def _laws(self, values: Array) -> Iterator[tuple[Any, tuple[Array, ...]]]:

@@ -36,6 +36,7 @@ from ...engine.compile.text.languages import (
 )
 from ...engine.run import Integrator
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from ...physics.muscle.characteristic.calls import recorded_force
 from .c_source import c_files, csv_header, main_program
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText, solver_text
 from .identifiers import (
@@ -139,7 +140,10 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     _, method, arguments, results = next(form for form in FORMS if isinstance(law, form[0]))
     model, parameters = autodiff.symbolic(law)
     x = nodes.symbols("x", 2)
-    value = nodes.as_node(getattr(model, method)(*x))
+    if method == "force":
+        value = nodes.as_node(recorded_force(law, model, *x))
+    else:
+        value = nodes.as_node(getattr(model, method)(*x))
     autodiff.check_finite([value], f"{type(law).__name__}.{method}")
     first, second = slopes.gradient(value, x)
     if method == "force":

@@ -75,6 +75,20 @@ def stated_range(law: Any) -> ForceRange:
     return own
 
 
+def recorded_force(law: Any, model: Any, pressure: Value, contraction: Value) -> Value:
+    """The expression of what `law.force` answers at symbols; `model` is the law with symbols for
+    its parameters. A law that refuses what lies beyond its range is its formula.
+    """
+    if law.refuses_beyond:
+        return model.force(pressure, contraction)
+    limits = law.__dict__.get(_STATED) or ForceRange.of(model)
+    extended = extended_force(model, limits, pressure, contraction)
+    inside = ops.both(contraction >= limits.min_contraction, contraction <= limits.max_contraction)
+    for low, high in (limits.pressure,) if limits.pressure is not None else ():
+        inside = ops.both(inside, ops.both(pressure >= low, pressure <= high))
+    return ops.where(inside, extended, ops.maximum(extended, 0.0))
+
+
 def in_range(name: str, method: Method) -> Method:
     """A method of a law, `force`, `contraction`, `pressure` or `slopes`, with the behaviour of this
     module; symbols and arrays of JAX are passed on to the formula.
