@@ -438,6 +438,36 @@ def test_every_closed_form_law_has_its_value_and_slopes_in_c(tmp_path):
             assert np.isnan(row).all(), f"{name} gives a value at a missing argument"
 
 
+def test_a_printed_force_law_has_the_force_beyond_its_range(tmp_path):
+    """A stretched sleeve, a slack muscle, and the limit of the force, as in calls with numbers."""
+    laws = {
+        name: law
+        for name, law in closed_form_laws().items()
+        if law_points(law)[0] == "force" and not law.refuses_beyond
+    }
+    sources = []
+    for i, law in enumerate(laws.values()):
+        write_law(law, tmp_path, C99(), name=f"law{i}")
+        sources.append(f'#include "law{i}.c"')
+    library = printed.shared_library("\n".join([*sources, ""]), tmp_path, "beyond", "-O0")
+    rng = np.random.default_rng(7)
+    pressure = rng.uniform(0.0, 12e5, 60)
+    contraction = rng.uniform(-0.05, 0.45, 60)
+    assert len(laws) > 3
+    for i, (name, law) in enumerate(laws.items()):
+        c = np.zeros(500)
+        defaults = (ctypes.c_double * 500).in_dll(library, f"law{i}_defaults")
+        getattr(library, f"law{i}_prepare")(defaults, ctypes.c_void_p(c.ctypes.data))
+        rows = np.empty((pressure.size, 3))
+        for row, x, y in zip(rows, pressure.tolist(), contraction.tolist(), strict=True):
+            printed.call(getattr(library, f"law{i}_evaluate"), x, y, c, row)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AirmuscleWarning)
+            expected = law.force(pressure, contraction)
+        assert expected.max() > 0.0
+        np.testing.assert_allclose(rows[:, 0], expected, rtol=1e-11, atol=1e-8, err_msg=name)
+
+
 def test_a_law_in_octave_takes_arrays(tmp_path):
     law = load_law("dmsp-20-300").characteristic
     write_law(law, tmp_path, Octave(), name="festo")
