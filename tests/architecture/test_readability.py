@@ -107,7 +107,7 @@ def figures() -> dict[str, float]:
     thousands = sum(isinstance(node, ast.stmt) for node in nodes) / 1000
     vague = sum(isinstance(node, ast.Name) and node.id in VAGUE_NAMES for node in nodes)
     return {
-        "nodes in all": 860_000len(nodes),
+        "nodes in all": len(nodes),
         "nodes per line of code": len(nodes) / len(code),
         "% of the lines of code beyond column 100": 100
         * sum(len(line) > COLUMNS for line in code)
