@@ -139,8 +139,8 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
         torque = arm * tension
         stiffness = -_slope(torque, angle)
         by_pressure = _slope(torque, pressure)
-        own: Values = muscle.steady_state(pressure, contraction)
-        volume = muscle.volume(contraction, own)
+        steady_states: Values = muscle.steady_state(pressure, contraction)
+        volume = muscle.volume(contraction, steady_states)
         content = plant.gas.state_at(
             absolute_pressure(pressure, plant.ambient), volume, plant.ambient
         )

@@ -116,15 +116,15 @@ class LinearModel:
 
         Raises ParameterError for an unknown input, and for a delay that is negative or not finite.
         """
-        given = delay if isinstance(delay, Mapping) else dict.fromkeys(self.inputs, delay)
-        _places("input", tuple(given), self.inputs)
-        for name, value in given.items():
+        further = delay if isinstance(delay, Mapping) else dict.fromkeys(self.inputs, delay)
+        _places("input", tuple(further), self.inputs)
+        for name, value in further.items():
             if not 0 <= value < math.inf:
                 raise ParameterError(
                     f"with_delay: the delay of '{name}' is {value!r} s; it must be finite and not"
                     " negative."
                 )
-        total = {name: self.delays.get(name, 0.0) + float(value) for name, value in given.items()}
+        total = {name: self.delays.get(name, 0.0) + float(value) for name, value in further.items()}
         return dataclasses.replace(self, delays={**self.delays, **total})
 
     def pade(self, order: int = 3) -> "LinearModel":
@@ -321,10 +321,12 @@ def _kinks(
     def rates(x: Array) -> Array:
         return derivatives(compiled, x[:n].tolist(), x[n:].tolist()).rates
 
-    found = one_sided(rates, point, slopes, sizes, KINK)
-    names = (*(state.name for state in plant.states), *(each.name for each in inputs))
+    kinked = one_sided(rates, point, slopes, sizes, KINK)
+    names = (*(state.name for state in plant.states), *(variable.name for variable in inputs))
     return tuple(
-        names[i] for i in found if i < n or inputs[i - n].minimum < point[i] < inputs[i - n].maximum
+        names[i]
+        for i in kinked
+        if i < n or inputs[i - n].minimum < point[i] < inputs[i - n].maximum
     )
 
 

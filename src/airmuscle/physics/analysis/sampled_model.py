@@ -198,7 +198,7 @@ def control_names(model: Any) -> dict[str, list[str]]:
         "inputs": model.inputs,
         "outputs": model.outputs,
     }
-    return {kind: [name.replace(".", "_") for name in given] for kind, given in kinds.items()}
+    return {kind: [name.replace(".", "_") for name in dotted] for kind, dotted in kinds.items()}
 
 
 def held(a: Array, b: Array, duration: float) -> tuple[Array, Array]:
@@ -238,8 +238,8 @@ def sampled(model: Any, sample_time: float, *, before: bool = False) -> SampledM
     n = len(model.states)
     columns = []
     for name in model.inputs:
-        whole, rest = divided(float(model.delays.get(name, 0.0)), sample_time)
-        columns.append((whole, rest, whole + (1 if rest > 0 or before else 0)))
+        samples, rest = divided(float(model.delays.get(name, 0.0)), sample_time)
+        columns.append((samples, rest, samples + (1 if rest > 0 or before else 0)))
     total = n + sum(length for *_, length in columns)
     a = np.zeros((total, total))
     b = np.zeros((total, len(columns)))
@@ -249,17 +249,17 @@ def sampled(model: Any, sample_time: float, *, before: bool = False) -> SampledM
     c[:, :n] = model.C
     names = list(model.states)
     place = n
-    for j, (whole, rest, length) in enumerate(columns):
+    for j, (samples, rest, length) in enumerate(columns):
         # where the values of each age stand: age 0 is the present input
         at = {0: b[:, j], **{age: a[:, place + age - 1] for age in range(1, length + 1)}}
         feed = {0: d[:, j], **{age: c[:, place + age - 1] for age in range(1, length + 1)}}
         (_, late), (moved, early) = (
             held(model.A, model.B[:, j : j + 1], t) for t in (rest, sample_time - rest)
         )
-        at[whole][:n] += early[:, 0]
+        at[samples][:n] += early[:, 0]
         if rest > 0:
-            at[whole + 1][:n] += (moved @ late)[:, 0]
-        feed[whole + (1 if rest > 0 or before else 0)][:] += model.D[:, j]
+            at[samples + 1][:n] += (moved @ late)[:, 0]
+        feed[samples + (1 if rest > 0 or before else 0)][:] += model.D[:, j]
         for age in range(1, length + 1):
             at[age - 1][place + age - 1] += 1.0
         names += [f"{model.inputs[j]}.{age}" for age in range(1, length + 1)]
@@ -269,9 +269,9 @@ def sampled(model: Any, sample_time: float, *, before: bool = False) -> SampledM
 
 def divided(delay: float, sample_time: float) -> tuple[int, float]:
     """Whole samples of a delay and the rest [s], which is 0 within rounding."""
-    whole = math.floor(delay / sample_time + 1e-9)
-    rest = delay - whole * sample_time
-    return whole, rest if rest > 1e-9 * sample_time else 0.0
+    samples = math.floor(delay / sample_time + 1e-9)
+    rest = delay - samples * sample_time
+    return samples, rest if rest > 1e-9 * sample_time else 0.0
 
 
 def pade(delay: float, order: int) -> tuple[Array, Array, Array, float]:

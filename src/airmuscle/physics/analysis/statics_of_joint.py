@@ -179,13 +179,13 @@ class JointStatics(ShortRepr):
         limits = np.full((2, angle.size), np.nan)
         for row in range(angle.size):
             sums = []
-            for (own, own_k), (other, other_k) in (pairs, pairs[::-1]):
-                order = np.argsort(other[row])
-                x = other[row][order]
-                k = other_k[row][order]
-                needed = torque[row] - own[row]
+            for (first, first_k), (second, second_k) in (pairs, pairs[::-1]):
+                order = np.argsort(second[row])
+                x = second[row][order]
+                k = second_k[row][order]
+                needed = torque[row] - first[row]
                 inside = (needed >= x[0]) & (needed <= x[-1])
-                sums.append(own_k[row][inside] + np.interp(needed[inside], x, k))
+                sums.append(first_k[row][inside] + np.interp(needed[inside], x, k))
             if (both := np.concatenate(sums)).size:
                 limits[:, row] = both.min(), both.max()
         return limits[0], limits[1]

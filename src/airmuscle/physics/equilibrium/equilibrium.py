@@ -36,10 +36,10 @@ def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[
     """Every input of a system, 0 unless given. Raises ParameterError for an unknown name or one
     beyond its range.
     """
-    given = dict(inputs or {})
-    check_input_names(list(given), system.inputs)
+    stated = dict(inputs or {})
+    check_input_names(list(stated), system.inputs)
     for variable in system.input_variables:
-        value = given.get(variable.name, 0.0)
+        value = stated.get(variable.name, 0.0)
         if isinstance(value, str) or not np.ndim(value) == 0 or not np.isfinite(value):
             raise ParameterError(
                 f"the input '{variable.name}' is {value!r}; it must be one finite number, in SI"
@@ -51,7 +51,7 @@ def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[
                 f"the input '{variable.name}' is {value:g}{unit}; allowed range:"
                 f" {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
             )
-    return {name: float(given.get(name, 0.0)) for name in system.inputs}
+    return {name: float(stated.get(name, 0.0)) for name in system.inputs}
 
 
 TABLE_SIZE = 500_000
@@ -97,22 +97,22 @@ def find_equilibria(
     mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every position
     is an equilibrium.
     """
-    one = _statics(plant, pressure, air_mass, inputs)
-    rows, x = _balances(one)
-    count = len(one.plants.mechanism.coordinates)
+    statics = _statics(plant, pressure, air_mass, inputs)
+    rows, x = _balances(statics)
+    count = len(statics.plants.mechanism.coordinates)
     if not rows.size and count < 2:
-        everywhere = grid(one) if count else None
+        everywhere = grid(statics) if count else None
         f = (
             np.empty(0)
             if everywhere is None
-            else one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None])
+            else statics.accelerations(everywhere[:, np.isfinite(everywhere[0]), None])
         )
         if (
             not f.size or (f == 0.0).any()
         ):  # without a permitted position, or in equilibrium everywhere
-            raise no_equilibrium(one)
-    states, stable = _judged(one, rows, x)
-    named = (dict(zip(one.names, state.tolist(), strict=True)) for state in states)
+            raise no_equilibrium(statics)
+    states, stable = _judged(statics, rows, x)
+    named = (dict(zip(statics.names, state.tolist(), strict=True)) for state in states)
     return tuple(Equilibrium(state, bool(s)) for state, s in zip(named, stable, strict=True))
 
 
@@ -130,9 +130,9 @@ def find_equilibrium(
     the muscles whose law is outside its range there. Raises EquilibriumError, with the muscles and
     their forces, if no stable equilibrium is found.
     """
-    one = _statics(plant, pressure, air_mass, inputs)
-    state = _nearest_state(one)
-    if texts := _range_excesses(plant, one, state):
+    statics = _statics(plant, pressure, air_mass, inputs)
+    state = _nearest_state(statics)
+    if texts := _range_excesses(plant, statics, state):
         warnings.warn(
             f"find_equilibrium: {' '.join(texts)} The equilibrium is extrapolated.",
             AirmuscleWarning,
@@ -151,22 +151,22 @@ def nearest_equilibrium(
     return _nearest_state(_statics(plant, pressure, None, inputs))
 
 
-def _nearest_state(one: Statics) -> dict[str, float]:
-    state = _nearest(one)[0]
+def _nearest_state(statics: Statics) -> dict[str, float]:
+    state = _nearest(statics)[0]
     if not np.isfinite(state).all():
-        raise no_equilibrium(one)
-    return dict(zip(one.names, state.tolist(), strict=True))
+        raise no_equilibrium(statics)
+    return dict(zip(statics.names, state.tolist(), strict=True))
 
 
-def _range_excesses(plant: StaticPlant, one: Statics, state: Mapping[str, float]) -> list[str]:
+def _range_excesses(plant: StaticPlant, statics: Statics, state: Mapping[str, float]) -> list[str]:
     """Sentences on the muscles whose contractile element is outside its range at a state."""
     texts = []
     contractions = plant.mechanism.contractions(state, plant.resting_lengths)
     for prefix, muscle, air, contraction in zip(
-        plant.prefixes, plant.muscles, one.air, contractions, strict=True
+        plant.prefixes, plant.muscles, statics.air, contractions, strict=True
     ):
         pressure = air
-        if one.shut:
+        if statics.shut:
             pressure = float(shut_air_pressure(plant, muscle, air, np.array(contraction)))
         inner = muscle.inner_contraction(contraction, select_prefix(prefix, state))
         excess = muscle.range_excess(float(pressure), float(inner))
@@ -215,12 +215,12 @@ def _statics(
         raise ParameterError(
             "find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles."
         )
-    name, given, unit = (
+    name, stated, unit = (
         ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
     )
     where = f"find_equilibrium: {name}"
     several: Sequence[Any] = (
-        given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
+        stated if isinstance(stated, tuple | list) else (stated,) * len(plant.muscles)
     )
     ambient = plant.ambient.pressure
     values = [
@@ -247,13 +247,15 @@ def _statics(
     air = tuple(float(value) for value in values if value is not None)
     commands = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
     compiled = compile_system(plant)
-    one = Statics.of_plants(compiled, compiled.parameters[None], air, commands, pressure is None)
-    if not one.shut and not one.allowed().all():
+    statics = Statics.of_plants(
+        compiled, compiled.parameters[None], air, commands, pressure is None
+    )
+    if not statics.shut and not statics.allowed().all():
         plant.state_at(pressure=air)
         raise EquilibriumError(
             f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed."
         )
-    return one
+    return statics
 
 
 def _balances(statics: Statics) -> tuple[Rows, Array]:

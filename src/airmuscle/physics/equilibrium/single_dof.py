@@ -72,9 +72,9 @@ def _ends_if_linear(plants: Statics) -> tuple[Array, Array, npt.NDArray[np.bool_
     size, low, high = plants.limits(0)
     linear = np.ones(size.shape, dtype=bool)
     at = [plants.contractions(_places(k * size)) for k in (0.0, 1.0, -3.0)]
-    for zero, one, other, reach in zip(*at, plants.contraction_limits, strict=True):
-        rate = (one - zero) / size
-        linear &= np.abs(other - (zero - 3.0 * size * rate)) <= 1e-12
+    for zero, unit, opposite, reach in zip(*at, plants.contraction_limits, strict=True):
+        rate = (unit - zero) / size
+        linear &= np.abs(opposite - (zero - 3.0 * size * rate)) <= 1e-12
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = [(end - zero) / rate for end in reach]
         low = np.where(rate == 0.0, low, np.maximum(low, np.minimum(*ends)))
@@ -149,10 +149,10 @@ def _roots(plants: Statics, f: Array, rows: Rows, low: Array, high: Array) -> tu
     root = between(there, low, high)
     left = np.abs(_accelerations(there, root))
     size = np.abs(f)[rows]
-    kept = left <= JUMP * np.nanmin(size, axis=1)
-    doubtful = np.flatnonzero(~kept)
-    kept[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
-    return rows[kept], root[kept]
+    continuous = left <= JUMP * np.nanmin(size, axis=1)
+    doubtful = np.flatnonzero(~continuous)
+    continuous[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
+    return rows[continuous], root[continuous]
 
 
 def between(plants: Statics, low: Array, high: Array) -> Array:
@@ -189,11 +189,13 @@ def between(plants: Statics, low: Array, high: Array) -> Array:
         high = np.where(replaces_low, high, middle)
         last = middle
         if 2 * ended.sum() > ended.size:  # continue with the unfinished rows only
-            kept = np.flatnonzero(~ended)
-            plants = plants.of(kept)
-            rows = rows[kept]
-            ended = ended[kept]
-            low, high, at_low, at_high, last = (v[kept] for v in (low, high, at_low, at_high, last))
+            unfinished = np.flatnonzero(~ended)
+            plants = plants.of(unfinished)
+            rows = rows[unfinished]
+            ended = ended[unfinished]
+            low, high, at_low, at_high, last = (
+                v[unfinished] for v in (low, high, at_low, at_high, last)
+            )
     return roots
 
 
@@ -228,10 +230,10 @@ def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: A
         left = values[0] < values[1]
         low = np.where(left, low, inner[0])
         high = np.where(left, inner[1], high)
-        kept = np.where(left, inner[0], inner[1])
+        retained = np.where(left, inner[0], inner[1])
         of_kept = np.where(left, values[0], values[1])
         asked = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
         at = sign * function(asked)
-        inner = np.stack([np.where(left, asked, kept), np.where(left, kept, asked)])
+        inner = np.stack([np.where(left, asked, retained), np.where(left, retained, asked)])
         values = np.stack([np.where(left, at, of_kept), np.where(left, of_kept, at)])
     return turn

@@ -58,8 +58,8 @@ def are_stable(
     if not shut:
         for k, prefix in enumerate(plant.prefixes):
             growth = growths[:, k, free] / volumes[:, k, None]
-            held = [i for i, n in enumerate(names) if n in air and n.startswith(prefix)]
-            pushed = np.einsum("rij,rj->ri", by_state[:, :, held], states[:, held])
+            masses = [i for i, n in enumerate(names) if n in air and n.startswith(prefix)]
+            pushed = np.einsum("rij,rj->ri", by_state[:, :, masses], states[:, masses])
             matrix = matrix + pushed[:, :, None] * growth[:, None, :]
     stable = np.array(np.isfinite(matrix).all(axis=(1, 2)))
     eigenvalues = np.linalg.eigvals(matrix[stable])
@@ -107,26 +107,26 @@ def _function(compiled: CompiledSystem, free: list[int]) -> Recorded:
     return _functions[program]
 
 
-def no_equilibrium(one: Statics) -> PhysicsError:
+def no_equilibrium(statics: Statics) -> PhysicsError:
     """The error for one plant without a stable equilibrium, with the forces at both ends of its
     range.
 
     GeometryLimitError if no position is within the limits of all muscles, EquilibriumError
     otherwise.
     """
-    kind = type(one.plants.mechanism).__name__
-    count = len(one.plants.mechanism.coordinates)
+    kind = type(statics.plants.mechanism).__name__
+    count = len(statics.plants.mechanism.coordinates)
     if count == 0:
-        return EquilibriumError(_without_coordinates(one))
-    x = grid(one)[0][:, None] if count == 1 else starts(one)
+        return EquilibriumError(_without_coordinates(statics))
+    x = grid(statics)[0][:, None] if count == 1 else starts(statics)
     x = x[np.isfinite(x).all(axis=1)]
     if count == 1 and not len(x):
-        muscles = ", ".join(m.name for m in one.separate[0].muscles)
+        muscles = ", ".join(m.name for m in statics.separate[0].muscles)
         return GeometryLimitError(
             f"{kind} has no position within the contraction limits of {muscles}; change offsets,"
             " radius or arms."
         )
-    f = one.accelerations(x[None])[0] if len(x) else x
+    f = statics.accelerations(x[None])[0] if len(x) else x
     x = x[np.isfinite(f).all(axis=1)]
     f = f[np.isfinite(f).all(axis=1)]
     if not len(x):
@@ -137,70 +137,70 @@ def no_equilibrium(one: Statics) -> PhysicsError:
         return EquilibriumError(
             f"{kind} is in equilibrium at every position: no force acts on it under these inputs."
             " Choose an initial state by plant.state_at(pressure=...,"
-            f" {one.plants.mechanism.coordinates[0].name}=...)."
+            f" {statics.plants.mechanism.coordinates[0].name}=...)."
         )
     if count == 1:
         places = [x[0], x[-1]]
-        load = _required_tension(one, x[0])
+        load = _required_tension(statics, x[0])
     else:
         places = [x[int(np.argmin(np.abs(f).max(axis=1)))]]
         load = ""
-    lines = "; ".join(_line(one, place) for place in places)
+    lines = "; ".join(_line(statics, place) for place in places)
     return EquilibriumError(
         f"{kind} has no stable equilibrium: {lines}.{load} Change the load, the pressure or the"
         " parallel spring."
     )
 
 
-def _without_coordinates(one: Statics) -> str:
-    plant = one.separate[0]
+def _without_coordinates(statics: Statics) -> str:
+    plant = statics.separate[0]
     contractions = plant.mechanism.contractions({}, plant.resting_lengths)
-    if one.shut:
+    if statics.shut:
         texts = ", ".join(
             f"{m.name} cannot hold {mass:g} kg of air at a contraction of {100 * float(eps):.1f} %"
-            for m, mass, eps in zip(plant.muscles, one.air, contractions, strict=True)
+            for m, mass, eps in zip(plant.muscles, statics.air, contractions, strict=True)
         )
         return f"{texts}: no pressure below {MAX_PRESSURE:g} Pa belongs to it."
-    plant.state_at(pressure=one.air)
+    plant.state_at(pressure=statics.air)
     return (
         f"{type(plant.mechanism).__name__} has no stable equilibrium: a muscle in series or its"
         " wall is unstable."
     )
 
 
-def _line(one: Statics, x: Array) -> str:
-    plant = one.separate[0]
-    states = plant.muscle_states(one.state(x))
+def _line(statics: Statics, x: Array) -> str:
+    plant = statics.separate[0]
+    states = plant.muscle_states(statics.state(x))
     pulls = ", ".join(
         f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at"
         f" {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa and a contraction of"
         f" {100 * float(state.contraction):.1f} %"
         for m, state in zip(plant.muscles, states, strict=True)
     )
-    accelerations = one.accelerations(x[None, None])[0, 0]
+    accelerations = statics.accelerations(x[None, None])[0, 0]
     if len(x) == 1:
-        unit = one.plants.mechanism.coordinates[0].unit
+        unit = statics.plants.mechanism.coordinates[0].unit
         return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {unit}/s2"
-    named = zip(one.plants.mechanism.coordinates, accelerations, strict=True)
+    named = zip(statics.plants.mechanism.coordinates, accelerations, strict=True)
     moving = ", ".join(f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in named)
     return f"{pulls}, and the accelerations are {moving}"
 
 
-def _required_tension(one: Statics, x: Array) -> str:
+def _required_tension(statics: Statics, x: Array) -> str:
     """The tension of a single muscle that would hold the load; empty for several muscles."""
-    plant = one.separate[0]
+    plant = statics.separate[0]
     if len(plant.muscles) > 1:
         return ""
-    state = one.state(x)
+    state = statics.state(x)
     mechanism = plant.mechanism
-    inputs = dict(zip(plant.inputs, one.inputs.tolist(), strict=True))
+    inputs = dict(zip(plant.inputs, statics.inputs.tolist(), strict=True))
     accelerations = []
     for tension in (0.0, 1.0):
         forces = mechanism.generalised_forces(state, [tension], plant.resting_lengths)
         accelerations.append(
             float(
                 mechanism.acceleration(state, state, forces, inputs)[
-                    one.plants.mechanism.coordinates[0].name
+                    statics.plants.mechanism.coordinates[0].name
                 ]
             )
         )
@@ -226,15 +226,17 @@ def equilibria_of_several_coordinates(statics: Statics) -> tuple[Rows, Array]:
     rows = list[int]()
     places = list[Array]()
     for row in range(len(statics.parameters)):
-        one = statics.of(np.array([row]))
+        single = statics.of(np.array([row]))
         equilibria = list[Array]()
-        x = starts(one)
-        sizes = one.nominal_sizes()
-        f = one.accelerations(x[None])[0]
+        x = starts(single)
+        sizes = single.nominal_sizes()
+        f = single.accelerations(x[None])[0]
         for place in (
-            _newton(one, x, f, sizes, RESIDUAL_TOLERANCE * np.abs(f).max()) if len(x) else ()
+            _newton(single, x, f, sizes, RESIDUAL_TOLERANCE * np.abs(f).max()) if len(x) else ()
         ):
-            if all(np.abs((place - other) / sizes).max() > DISTINCT for other in equilibria):
+            if all(
+                np.abs((place - equilibrium) / sizes).max() > DISTINCT for equilibrium in equilibria
+            ):
                 equilibria.append(place)
         rows += [row] * len(equilibria)
         places += sorted(equilibria, key=tuple)
@@ -243,11 +245,13 @@ def equilibria_of_several_coordinates(statics: Statics) -> tuple[Rows, Array]:
     )
 
 
-def starts(one: Statics) -> Array:
+def starts(statics: Statics) -> Array:
     """Start points (K, d) within the permitted range of one plant: evenly spread contractions
     (additive recurrence).
     """
-    limits = [[float(np.asarray(end).flat[0]) for end in ends] for ends in one.contraction_limits]
+    limits = [
+        [float(np.asarray(end).flat[0]) for end in ends] for ends in statics.contraction_limits
+    ]
     low, high = np.array(limits).T
     high = np.minimum(high, 0.5)  # at greater contractions a muscle is beyond its maximum volume
     root = 2.0
@@ -255,24 +259,26 @@ def starts(one: Statics) -> Array:
         root = (1.0 + root) ** (1.0 / (low.size + 1))
     steps = root ** -np.arange(1.0, low.size + 1)
     targets = low + (high - low) * ((0.5 + np.arange(STARTS)[:, None] * steps) % 1.0)
-    x = _coordinates_of(one, targets)
-    inside = one.within_reach(x[None])[0] & np.isfinite(one.accelerations(x[None])[0]).all(axis=1)
+    x = _coordinates_of(statics, targets)
+    inside = statics.within_reach(x[None])[0] & np.isfinite(statics.accelerations(x[None])[0]).all(
+        axis=1
+    )
     permitted: Array = x[inside]
     return permitted
 
 
-def _contractions(one: Statics, x: Array) -> Array:
+def _contractions(statics: Statics, x: Array) -> Array:
     """Contractions (K, muscles) at coordinates (K, d)."""
-    return np.stack([eps[0] for eps in one.contractions(x[None])], axis=-1)
+    return np.stack([eps[0] for eps in statics.contractions(x[None])], axis=-1)
 
 
-def _coordinates_of(one: Statics, targets: Array) -> Array:
+def _coordinates_of(statics: Statics, targets: Array) -> Array:
     """Coordinates (K, d) whose contractions are nearest to the targets (K, muscles)."""
-    sizes: Array = one.nominal_sizes()
+    sizes: Array = statics.nominal_sizes()
     x: Array = np.zeros((len(targets), sizes.size))
     for _ in range(4):
-        at = _contractions(one, x)
-        perturbed = [_contractions(one, x + 1e-6 * step) for step in np.diag(sizes)]
+        at = _contractions(statics, x)
+        perturbed = [_contractions(statics, x + 1e-6 * step) for step in np.diag(sizes)]
         slopes = np.stack([(value - at) / 1e-6 for value in perturbed], axis=-1)
         x = np.add(x, sizes * _least_squares(slopes, targets - at, 1e-15))
     return x
@@ -290,14 +296,14 @@ def _least_squares(matrices: Array, right: Array, rcond: float) -> Array:
     return solution
 
 
-def _newton(one: Statics, x: Array, f: Array, sizes: Array, tolerance: float) -> list[Array]:
+def _newton(statics: Statics, x: Array, f: Array, sizes: Array, tolerance: float) -> list[Array]:
     """Equilibria that Newton's method finds from x (K, d); its steps are halved until the residual
     decreases.
     """
     equilibria = []
     for _ in range(ITERATIONS):
-        step = _steps(one, x, f, sizes)
-        following, after, decreased = _descend(one, x, f, step)
+        step = _steps(statics, x, f, sizes)
+        following, after, decreased = _descend(statics, x, f, step)
         ended = (np.abs(step / sizes).max(axis=1) < 1e-13) | ~decreased
         equilibria += list(
             x[ended & np.isfinite(step).all(axis=1) & (np.abs(f).max(axis=1) <= tolerance)]
@@ -310,7 +316,7 @@ def _newton(one: Statics, x: Array, f: Array, sizes: Array, tolerance: float) ->
 
 
 def _descend(
-    one: Statics, x: Array, f: Array, step: Array
+    statics: Statics, x: Array, f: Array, step: Array
 ) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Next points, their residuals, and for which of them a fraction of the step decreases the
     residual.
@@ -323,10 +329,10 @@ def _descend(
         if not waiting.size:
             break
         trial = x[waiting] + part * step[waiting]
-        at = one.accelerations(trial[None])[0]
+        at = statics.accelerations(trial[None])[0]
         with np.errstate(invalid="ignore"):
             better = np.abs(at).max(axis=1) < np.abs(f[waiting]).max(axis=1)
-        better &= one.within_reach(trial[None])[0]
+        better &= statics.within_reach(trial[None])[0]
         rows = waiting[better]
         following[rows] = trial[better]
         after[rows] = at[better]
@@ -335,18 +341,20 @@ def _descend(
     return following, after, decreased
 
 
-def _steps(one: Statics, x: Array, f: Array, sizes: Array) -> Array:
+def _steps(statics: Statics, x: Array, f: Array, sizes: Array) -> Array:
     """Newton's step (K, d) by central differences, one-sided at the ends of the range; NaN if it
     does not exist.
     """
     slopes = np.empty((len(x), f.shape[1], x.shape[1]))
     for k, perturbation in enumerate(np.diag(1e-5 * sizes)):
         ends = [
-            np.where(one.within_reach(p[None])[0][:, None], p, x)
+            np.where(statics.within_reach(p[None])[0][:, None], p, x)
             for p in (x + perturbation, x - perturbation)
         ]
         span = (ends[0] - ends[1])[:, k] / sizes[k]
-        difference = one.accelerations(ends[0][None])[0] - one.accelerations(ends[1][None])[0]
+        difference = (
+            statics.accelerations(ends[0][None])[0] - statics.accelerations(ends[1][None])[0]
+        )
         with np.errstate(divide="ignore", invalid="ignore"):
             slopes[:, :, k] = difference / span[:, None]
     scale = np.abs(slopes).max(axis=2)

@@ -38,10 +38,10 @@ def shut_air_pressure(
         mass.
         """
         p = gauge_pressure(np.exp(x), plant.ambient)
-        own = muscle.steady_state(p, contraction)
-        volume = muscle.volume(muscle.inner_contraction(contraction, own), own)
-        held: Any = np.asarray(plant.gas.state_at(np.exp(x), volume, plant.ambient)["air_mass"])
-        return np.where(held > 0, np.log(np.where(held > 0, held, 1.0) / air_mass), -np.inf)
+        steady_states = muscle.steady_state(p, contraction)
+        volume = muscle.volume(muscle.inner_contraction(contraction, steady_states), steady_states)
+        mass: Any = np.asarray(plant.gas.state_at(np.exp(x), volume, plant.ambient)["air_mass"])
+        return np.where(mass > 0, np.log(np.where(mass > 0, mass, 1.0) / air_mass), -np.inf)
 
     with np.errstate(all="ignore"):
         start = np.log(np.asarray(absolute_pressure(0.0, plant.ambient), dtype=float))

@@ -134,8 +134,15 @@ def limits_of(
             "speed",
             identified.speed,
         )
-    own = INNER_CONTRACTION if isinstance(muscle.series, ElasticSeriesElement) else "contraction"
-    yield DiagnosticCode.GEOMETRY_LIMIT, f"{prefix}{own}", own, muscle.geometry.contraction_range
+    limited_column = (
+        INNER_CONTRACTION if isinstance(muscle.series, ElasticSeriesElement) else "contraction"
+    )
+    yield (
+        DiagnosticCode.GEOMETRY_LIMIT,
+        f"{prefix}{limited_column}",
+        limited_column,
+        muscle.geometry.contraction_range,
+    )
 
 
 def percent_of_rows(share: float) -> str:

@@ -68,7 +68,8 @@ class MuscleShapes:
         self.length = max(g.resting_length for g in geometries)
         self.fitting_radii = [0.5 * float(muscle_outline(g, 0.0)[:, 0].max()) for g in geometries]
         pressures, contractions = (
-            [recording[f"{p}{each}"] for p in prefixes] for each in ("pressure", "contraction")
+            [recording[f"{p}{quantity}"] for p in prefixes]
+            for quantity in ("pressure", "contraction")
         )
         self.pressure = max(float(pressure.max(initial=0.0)) for pressure in pressures)
         """Maximum gauge pressure [Pa], 0 or more."""
@@ -87,15 +88,15 @@ class MuscleShapes:
         other end.
         """
         geometry = self.geometries[index]
-        own = select_prefix(self.prefixes[index], row)
+        muscle_row = select_prefix(self.prefixes[index], row)
         fitting = FITTING * geometry.resting_length
-        length = geometry.resting_length * (1.0 - own["contraction"])
-        outline = muscle_outline(geometry, own["contraction"])
+        length = geometry.resting_length * (1.0 - muscle_row["contraction"])
+        outline = muscle_outline(geometry, muscle_row["contraction"])
         middle = y + upwards * (fitting + length / 2)
         end = y + upwards * (2 * fitting + length)
         ends = [(y, y + upwards * fitting), (end - upwards * fitting, end)]
         boxes = [_box(x, self.fitting_radii[index], *pair) for pair in ends]
-        return [Shape(outline + np.array([x, middle]), own["pressure"]), *boxes], end
+        return [Shape(outline + np.array([x, middle]), muscle_row["pressure"]), *boxes], end
 
 
 class Scene(NamedTuple):

@@ -70,14 +70,14 @@ class Plant(PlantDisplay, StaticPlant):
             air += states_of_muscle(prefix, muscle, air_states(muscle, self.gas, self.ambient))
             inner += states_of_muscle(prefix, muscle, muscle.states)
         moving = [state for coordinate in self.mechanism.coordinates for state in coordinate.states]
-        own = [
+        circuit_states = [
             (prefix, s)
             for prefix, circuit in self._circuits()
             for s in circuit.states(self.ambient)
         ]
         circuits = [
             replace(s, name=name)
-            for prefix, s in own
+            for prefix, s in circuit_states
             for name in self._outside(prefix, {s.name: s})
         ]
         return (*air, *moving, *self.mechanism.inner_states, *inner, *circuits)
@@ -190,19 +190,19 @@ class Plant(PlantDisplay, StaticPlant):
         for part, prefix, muscle, flow in zip(
             self.muscles, self.prefixes, at.muscles, at.flows, strict=True
         ):
-            own = {
+            columns = {
                 "pressure": muscle.pressure,
                 "contraction": muscle.contraction,
                 "force": muscle.tension,
             }
-            own |= {"volume": muscle.volume, "mass_flow": flow.mass}
+            columns |= {"volume": muscle.volume, "mass_flow": flow.mass}
             if not isinstance(part.friction, NoFriction):
-                own["friction"] = muscle.friction
+                columns["friction"] = muscle.friction
             if part.friction.identified_range is not None:
-                own["shortening_speed"] = muscle.inner_speed
+                columns["shortening_speed"] = muscle.inner_speed
             if "internal_energy" in muscle.states:
-                own["temperature"] = muscle.air.temperature
-            outputs |= with_prefix(prefix, own)
+                columns["temperature"] = muscle.air.temperature
+            outputs |= with_prefix(prefix, columns)
         for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
             outputs |= self._outside(prefix, circuit.outputs)
         return outputs | {
@@ -238,9 +238,9 @@ class Plant(PlantDisplay, StaticPlant):
         for muscle, prefix, contraction in zip(
             self.muscles, self.prefixes, contractions, strict=True
         ):
-            own = select_prefix(prefix, state)
-            inner = muscle.inner_contraction(contraction, own)
-            enclosures.append((muscle, contraction, inner, muscle.volume(inner, own)))
+            muscle_states = select_prefix(prefix, state)
+            inner = muscle.inner_contraction(contraction, muscle_states)
+            enclosures.append((muscle, contraction, inner, muscle.volume(inner, muscle_states)))
         return enclosures
 
     def describe(self) -> tuple[Diagnostic, ...]:

@@ -80,20 +80,22 @@ class PressureDriven(MuscleSystem):
         for prefix, muscle, eps, v in zip(
             self.prefixes, self.muscle, contractions, speeds, strict=True
         ):
-            own = select_prefix(prefix, state)
+            muscle_states = select_prefix(prefix, state)
             pressure = state[f"{prefix}pressure"]
-            force = muscle.compute_force(pressure, muscle.inner_contraction(eps, own), eps, v, own)
-            pulls.append((eps, force, own))
+            force = muscle.compute_force(
+                pressure, muscle.inner_contraction(eps, muscle_states), eps, v, muscle_states
+            )
+            pulls.append((eps, force, muscle_states))
         return pulls
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         rates = dict[str, Value]()
         pulls = self._pulls(state)
-        for prefix, muscle, lag, (_, pull, own) in zip(
+        for prefix, muscle, lag, (_, pull, muscle_states) in zip(
             self.prefixes, self.muscle, self.lags, pulls, strict=True
         ):
             pressure = state[f"{prefix}pressure"]
-            rates |= with_prefix(prefix, muscle.rates(own, pressure, pull.inner_speed))
+            rates |= with_prefix(prefix, muscle.rates(muscle_states, pressure, pull.inner_speed))
             rates[f"{prefix}pressure"] = (inputs[f"{prefix}measured_pressure"] - pressure) / lag
         tensions = [pull.tension for _, pull, _ in pulls]
         forces = self.mechanism.generalised_forces(state, tensions, self.resting_lengths)

@@ -172,13 +172,13 @@ class StaticPlant(MuscleSystem):
         for muscle, prefix, contraction, v in zip(
             self.muscles, self.prefixes, contractions, speeds, strict=True
         ):
-            own = select_prefix(prefix, state)
-            inner = muscle.inner_contraction(contraction, own)
-            volume = muscle.volume(inner, own)
-            air = self.gas.air(own, volume, self.ambient)
+            states = select_prefix(prefix, state)
+            inner = muscle.inner_contraction(contraction, states)
+            volume = muscle.volume(inner, states)
+            air = self.gas.air(states, volume, self.ambient)
             pressure = gauge_pressure(air.pressure, self.ambient)
-            tension, friction, speed = muscle.compute_force(pressure, inner, contraction, v, own)
-            rates = muscle.rates(own, pressure, speed)
+            tension, friction, speed = muscle.compute_force(pressure, inner, contraction, v, states)
+            rates = muscle.rates(states, pressure, speed)
             growth = (
                 muscle.geometry.volume_derivative(inner) * speed / muscle.geometry.resting_length
             )
@@ -195,7 +195,7 @@ class StaticPlant(MuscleSystem):
                     inner,
                     speed,
                     growth,
-                    own,
+                    states,
                     rates,
                 )
             )
@@ -218,22 +218,22 @@ class StaticPlant(MuscleSystem):
         air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
         units = {s.name: s.unit for s in self.states if s.name not in air}
         check_known("Plant: no coordinate", values, list(units))
-        given = {
+        stated = {
             n: as_quantity(f"Plant: the {n} of a state", v, units[n], self.ambient)
             for n, v in values.items()
         }
         state: dict[str, Value] = {
             n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)
-        } | given
+        } | stated
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, contraction in zip(self.muscles, contractions, strict=True):
             muscle.geometry.check_contraction(contraction)
         state, volumes = self.settle_muscles(pressures, state)
-        for muscle, each, volume in zip(self.muscles, pressures, volumes, strict=True):
+        for muscle, level, volume in zip(self.muscles, pressures, volumes, strict=True):
             if not volume > 0.0:
                 raise ParameterError(
-                    f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at {each:.4g} Pa;"
-                    " its wall deforms too far."
+                    f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at"
+                    f" {level:.4g} Pa; its wall deforms too far."
                 )
         state = self.fill_muscles(pressures, volumes, state)
         return {s.name: float(state[s.name]) for s in self.states}
@@ -252,9 +252,11 @@ class StaticPlant(MuscleSystem):
         for muscle, prefix, pressure, eps in zip(
             self.muscles, self.prefixes, pressures, contractions, strict=True
         ):
-            own = {**muscle.steady_state(pressure, eps), **select_prefix(prefix, state)}
-            volumes.append(muscle.volume(muscle.inner_contraction(eps, own), own))
-            settled = {**with_prefix(prefix, own), **settled}
+            muscle_states = {**muscle.steady_state(pressure, eps), **select_prefix(prefix, state)}
+            volumes.append(
+                muscle.volume(muscle.inner_contraction(eps, muscle_states), muscle_states)
+            )
+            settled = {**with_prefix(prefix, muscle_states), **settled}
         return settled, volumes
 
     def fill_muscles(

@@ -52,7 +52,7 @@ def check_parts(plant: Any) -> None:
     ranged = (
         m.contractile
         for m in plant.muscles
-        if all(hasattr(m.contractile, each.name) for each in limits)
+        if all(hasattr(m.contractile, limit.name) for limit in limits)
     )
     for law, declared in itertools.product(ranged, limits):
         limit = getattr(law, declared.name)
@@ -87,9 +87,9 @@ def convert_pressures(plant: Any) -> None:
         if part is not getattr(plant, name):
             object.__setattr__(plant, name, part)
             plant.__dict__.pop(f"{name}s", None)  # derived from the part before
-    for each in plant.circuits:
-        check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
-        each.supply.check_ambient(plant.ambient)
+    for circuit in plant.circuits:
+        check_not_shared(f"Plant: its {type(circuit).__name__}", circuit.supply)
+        circuit.supply.check_ambient(plant.ambient)
 
 
 def _check_counts(
@@ -130,10 +130,10 @@ def check_pressures(
     Raises UnitError, and ParameterError for a pressure that is not above absolute vacuum and for
     another number than of muscles.
     """
-    given = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
-    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient) for p in given]
+    stated = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
+    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient) for p in stated]
     if len(pressures) != muscles:
         raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
-    for each in pressures:
-        check_above_vacuum(each, ambient.pressure)
+    for value in pressures:
+        check_above_vacuum(value, ambient.pressure)
     return pressures

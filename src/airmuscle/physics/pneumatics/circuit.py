@@ -293,9 +293,9 @@ class Manifold(Circuit):
     ) -> CircuitFlows:
         total = CircuitFlows(())
         for name, branch, branch_air in self._branch_air(muscles):
-            own = select_prefix(name, state)
+            branch_state = select_prefix(name, state)
             commands = select_prefix(name, inputs)
-            part = branch.supplied_flow(inlet, branch_air, own, commands, ambient)
+            part = branch.supplied_flow(inlet, branch_air, branch_state, commands, ambient)
             rates = with_prefix(name, part.rates)
             outputs = with_prefix(name, part.outputs)
             total += dataclasses.replace(part, rates=rates, outputs=outputs)

@@ -136,7 +136,9 @@ class ProportionalRegulator(ValvePair):
         setpoint = state["lagged_setpoint"]
         setpoint_rate = state["lagged_setpoint_rate"]
         error = absolute_pressure(setpoint, ambient) - air.pressure
-        opened, vented = (proportional_opening(each, self.band) for each in (error, -error))
+        opened, vented = (
+            proportional_opening(difference, self.band) for difference in (error, -error)
+        )
         first, second = self.lag.rates(setpoint, setpoint_rate, inputs["setpoint"])
         rates = {"lagged_setpoint": first, "lagged_setpoint_rate": second}
         return dataclasses.replace(
