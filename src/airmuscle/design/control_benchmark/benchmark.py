@@ -96,14 +96,14 @@ def benchmark_contender(
               that one is tuned here
     """
     progress = progress or (lambda text, done, total: None)
-    tunings = [(each.tuning, each.restarts) for each in tuned_as] or search_gains(
+    tunings = [(result.tuning, result.restarts) for result in tuned_as] or search_gains(
         joint, contender.tuned_as or contender, seeds, sets_per_gain, progress
     )
     results = []
     for seed, (tuning, restarts) in zip(seeds, tunings, strict=True):
         law = tuned_law(joint, contender, seed, tuning)
         bounds = complete(joint, contender).commissioned
-        found: dict[str, Commissioning] = {}
+        commissionings: dict[str, Commissioning] = {}
         runs: dict[RunKey, BenchmarkRun] = {}
         for i, truth in enumerate(joint.truths):
             progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
@@ -112,17 +112,22 @@ def benchmark_contender(
                 made = commission(
                     joint, truth, law, bounds, joint.commissioning_tasks, runs=commissioning_runs
                 )
-                found[truth.name], laws[Group.COMMISSIONED] = made, with_gains(law, made.gains)
-            for group, each in laws.items():
+                commissionings[truth.name], laws[Group.COMMISSIONED] = (
+                    made,
+                    with_gains(law, made.gains),
+                )
+            for group, group_law in laws.items():
                 for task in tasks:
-                    run = run_task(joint, truth, each, task)
-                    kept = (
+                    run = run_task(joint, truth, group_law, task)
+                    retained = (
                         run
                         if truth is joint.truths[0]
                         else dataclasses.replace(run, recording=None)
                     )
-                    runs[RunKey(group, truth.name, task.name)] = kept
-        results.append(ContenderResult(contender, seed, law, tuning, found, runs, restarts))
+                    runs[RunKey(group, truth.name, task.name)] = retained
+        results.append(
+            ContenderResult(contender, seed, law, tuning, commissionings, runs, restarts)
+        )
     return tuple(results)
 
 

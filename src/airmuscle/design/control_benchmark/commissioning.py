@@ -61,10 +61,10 @@ def search_gains(
     result: until all agree, at most RESTARTS times. A restart knows nothing of the gains that
     another seed has found.
     """
-    found = [find_gains(joint, contender, seed, sets_per_gain, progress) for seed in seeds]
+    tunings = [find_gains(joint, contender, seed, sets_per_gain, progress) for seed in seeds]
     restarts = [0 for _ in seeds]
-    while sum(restarts) < RESTARTS and all(found):
-        objectives = [tuning.objective for tuning in found if tuning]
+    while sum(restarts) < RESTARTS and all(tunings):
+        objectives = [tuning.objective for tuning in tunings if tuning]
         worst = int(np.argmax(objectives))
         if objectives[worst] <= (1.0 + SEARCH_SPREAD) * min(objectives):
             break
@@ -72,10 +72,10 @@ def search_gains(
         again = find_gains(
             joint, contender, seeds[worst] + 1_000_000 * restarts[worst], sets_per_gain, progress
         )
-        found[worst] = min(
-            found[worst], again, key=lambda each: each.objective if each else math.inf
+        tunings[worst] = min(
+            tunings[worst], again, key=lambda tuning: tuning.objective if tuning else math.inf
         )
-    return list(zip(found, restarts, strict=True))
+    return list(zip(tunings, restarts, strict=True))
 
 
 def tuned_law(
@@ -158,14 +158,19 @@ def commission(
     ranges = [GainRange(path, *pair) for path, pair in bounds.items()]
     known = {leaf.path: leaf.value for leaf in leaves(law)}
     start = np.array(
-        [float(each.to_unit(np.clip(known[each.path], each.low, each.high))) for each in ranges]
+        [
+            float(
+                gain_range.to_unit(np.clip(known[gain_range.path], gain_range.low, gain_range.high))
+            )
+            for gain_range in ranges
+        ]
     )
     spent, complete = 0, list[tuple[float, Array]]()
 
     def gains(point: Array) -> dict[str, float]:
         return {
-            each.path: float(each.from_unit(value))
-            for each, value in zip(ranges, point, strict=True)
+            gain_range.path: float(gain_range.from_unit(value))
+            for gain_range, value in zip(ranges, point, strict=True)
         }
 
     def errors(point: Array) -> Array | None:
@@ -177,9 +182,9 @@ def commission(
             raise _Spent
         spent += len(tasks)
         changed = with_gains(law, gains(point))
-        found = [tracking_errors(joint, truth, changed, task) for task in tasks]
-        done = [each for each in found if each is not None]
-        if len(done) < len(found):
+        outcomes = [tracking_errors(joint, truth, changed, task) for task in tasks]
+        done = [outcome for outcome in outcomes if outcome is not None]
+        if len(done) < len(outcomes):
             return None
         complete.append((_rms(np.concatenate(done)), point))
         return np.concatenate(done)
@@ -207,9 +212,9 @@ def _descend(measure: Callable[[Array], Array | None], point: Array, errors: Arr
             for i in range(point.size):
                 probe = point.copy()
                 probe[i] += PROBE if point[i] + PROBE <= 1.0 else -PROBE
-                found = measure(probe)
+                perturbed = measure(probe)
                 change = (
-                    np.zeros_like(errors) if found is None else found - errors
+                    np.zeros_like(errors) if perturbed is None else perturbed - errors
                 )  # none where the run fails
                 columns.append(change / (probe[i] - point[i]))
             slopes = np.array(columns).T
@@ -222,13 +227,13 @@ def _descend(measure: Callable[[Array], Array | None], point: Array, errors: Arr
         ).x
         tried = np.clip(point + step, 0.0, 1.0)
         step = tried - point
-        found = measure(tried)
-        better = -1.0 if found is None else 1.0 - _rms(found) / _rms(errors)
-        if found is not None and np.any(step):
-            slopes = slopes + np.outer(found - errors - slopes @ step, step) / (step @ step)
-        if found is not None and better > 0.0:
+        errors_after = measure(tried)
+        better = -1.0 if errors_after is None else 1.0 - _rms(errors_after) / _rms(errors)
+        if errors_after is not None and np.any(step):
+            slopes = slopes + np.outer(errors_after - errors - slopes @ step, step) / (step @ step)
+        if errors_after is not None and better > 0.0:
             point = tried
-            errors = found
+            errors = errors_after
             region = 1.5 * region
             measured = False
             slopes = slopes if better >= LEAST_GAIN else None
@@ -248,13 +253,13 @@ def alike(law: Controller, gains: Mapping[str, float]) -> dict[str, float]:
     common.
     """
     known = [leaf.path for leaf in leaves(law)]
-    found = dict[str, float]()
+    renamed = dict[str, float]()
     for name, value in gains.items():
         ends = (name.split(".", i)[-1] for i in range(name.count(".") + 1))
-        found[next(path for end in ends for path in known if f".{path}".endswith(f".{end}"))] = (
+        renamed[next(path for end in ends for path in known if f".{path}".endswith(f".{end}"))] = (
             value
         )
-    return found
+    return renamed
 
 
 def run_loop(
@@ -278,7 +283,7 @@ def on_truth(law: SensedLaw, delay: int) -> SensedLaw:
     if isinstance(law, SensedController):
         return dataclasses.replace(law, sensors=on_truth(law.sensors, delay))
     assert isinstance(law, WithSensors)
-    late = tuple(dataclasses.replace(each, delay=each.delay + delay) for each in law.sensors)
+    late = tuple(dataclasses.replace(sensor, delay=sensor.delay + delay) for sensor in law.sensors)
     return dataclasses.replace(law, sensors=late)
 
 

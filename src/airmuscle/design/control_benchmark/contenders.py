@@ -126,7 +126,7 @@ class SensedController(Controller):
         sensors, before, actuation = memory
         readings, sensors = sense.step(sensors, measurement, dt)
         seen = Measurement(readings, measurement.setpoints, {**measurement.ranges, **self.ranges})
-        commands, own = self.controller.step(before, seen, dt)
+        commands, controller_memory = self.controller.step(before, seen, dt)
         points = {**measurement.setpoints, **with_prefix(COMMANDED, commands)}
         valves, actuation = act.step(actuation, seen._replace(setpoints=points), dt)
         memories = zip(self.actuation.initial_memory, actuation, strict=True)
@@ -136,13 +136,13 @@ class SensedController(Controller):
         attained = {name: applied[name] for name in commands}
         if any(abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()):
             only = {**seen.ranges, **{name: (value, value) for name, value in attained.items()}}
-            _, own = self.controller.step(before, seen._replace(ranges=only), dt)
-        return valves, (sensors, own, actuation)
+            _, controller_memory = self.controller.step(before, seen._replace(ranges=only), dt)
+        return valves, (sensors, controller_memory, actuation)
 
     def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the controller."""
-        _, own, _ = memory
-        return self.controller.notes(own)
+        _, controller_memory, _ = memory
+        return self.controller.notes(controller_memory)
 
 
 BAR = 1e5
@@ -214,23 +214,23 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     ranges = (contender.bounds, contender.commissioned)
     known = {sensor.column: sensor for sensor in joint.sensors}
     if isinstance(contender.law, ControlLaw):
-        law, prefix, own = _actuated(joint, contender.law, contender.name)
+        law, prefix, actuation_bounds = _actuated(joint, contender.law, contender.name)
         sensors = tuple(known[name] for name in law.measured_columns)
         tuned, commissioned = (with_prefix(f"law.{prefix}", bounds) for bounds in ranges)
         return CompleteLaw(
             WithSensors(law, sensors, float(seed)),
-            {**tuned, **with_prefix("law.", own)},
+            {**tuned, **with_prefix("law.", actuation_bounds)},
             commissioned,
         )
     inputs = contender.law.inputs
-    law, _, own = _actuated(joint, PassedSignals((), inputs), contender.name)
+    law, _, actuation_bounds = _actuated(joint, PassedSignals((), inputs), contender.name)
     tuned, commissioned = (with_prefix("controller.", bounds) for bounds in ranges)
     span = joint.pressure_span
     limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {
         DIFFERENCE: (-span, span)
     }
     limited = {name: limits[name] for name in inputs if name in limits}
-    tuned = {**tuned, **with_prefix("actuation.", own)} if tuned else {}
+    tuned = {**tuned, **with_prefix("actuation.", actuation_bounds)} if tuned else {}
     columns = united(contender.law.measured_columns, law.measured_columns)
     sense = WithSensors(PassedSignals(columns), tuple(known[name] for name in columns), float(seed))
     return CompleteLaw(SensedController(sense, contender.law, law, limited), tuned, commissioned)

@@ -316,7 +316,7 @@ class AlongMotion(Controller):
     def step(
         self, memory: Memories, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], Memories]:
-        forward, passed, own = memory
+        forward, passed, design_memory = memory
         ahead, forward = self.feed_forward.step(forward, measurement, dt)
         deviations, passed = self.deviation.step(passed, measurement, dt)
         low, high = measurement.ranges[DIFFERENCE]
@@ -324,10 +324,10 @@ class AlongMotion(Controller):
         seen = Measurement(
             deviations, {READING: 0.0}, {DIFFERENCE: (low - command, high - command)}
         )
-        back, own = self.design.predictive.step(own, seen, dt)
-        return {DIFFERENCE: command + back[DIFFERENCE]}, (forward, passed, own)
+        back, design_memory = self.design.predictive.step(design_memory, seen, dt)
+        return {DIFFERENCE: command + back[DIFFERENCE]}, (forward, passed, design_memory)
 
     def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the designed controller."""
-        *_, own = memory
-        return self.design.predictive.notes(own)
+        *_, design_memory = memory
+        return self.design.predictive.notes(design_memory)

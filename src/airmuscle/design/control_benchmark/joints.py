@@ -107,8 +107,8 @@ class BenchmarkJoint(ShortRepr):
         """The kinds of a truth, and its numbers relative to the model."""
         plants = (self.model, truth.plant)
         ours, theirs = (
-            {".".join(leaf.path.split(".")[-2:]): leaf.value for leaf in leaves(each)}
-            for each in plants
+            {".".join(leaf.path.split(".")[-2:]): leaf.value for leaf in leaves(plant)}
+            for plant in plants
         )
         ratios = {
             name: f"{value / ours[name]:.2f}" for name, value in theirs.items() if ours.get(name)

@@ -38,11 +38,11 @@ def error_figure(names: Sequence[str], errors: Mapping[str, Array]) -> Any:
     """The rms error of every controller in every task (tasks, 3): median, smallest and largest."""
     figure, axis = new_figure(height=1.2 + 0.32 * len(names))
     rows = np.arange(len(names))
-    for i, (contender, found) in enumerate(errors.items()):
+    for i, (contender, values) in enumerate(errors.items()):
         style = marker_style(i)
         shift = 0.08 * (i - (len(errors) - 1) / 2)
-        axis.plot(found[:, 0], rows + shift, linestyle="none", label=contender, **style)
-        axis.hlines(rows + shift, found[:, 1], found[:, 2], color=style["color"], linewidth=0.7)
+        axis.plot(values[:, 0], rows + shift, linestyle="none", label=contender, **style)
+        axis.hlines(rows + shift, values[:, 1], values[:, 2], color=style["color"], linewidth=0.7)
     axis.set(xscale="log", xlabel="rms error [degree]")
     axis.set_yticks(rows, names)
     axis.set_ylim(len(names) - 0.5, -0.5)
@@ -65,16 +65,16 @@ def run_figure(
         # a little before the event and what is judged
         limit = 0.0
         begin = max(0.0, first - 0.2)
-        for i, each in enumerate(results):
-            run = each.runs[RunKey(group, truth, task.name)]
+        for i, result in enumerate(results):
+            run = result.runs[RunKey(group, truth, task.name)]
             if run.recording is None or run.metrics is None:
                 continue
             time = np.asarray(run.recording["time"])
-            kept = time >= begin
+            shown = time >= begin
             wanted = np.degrees(task.motion.at(time)[0])
             angle = np.degrees(np.asarray(run.recording["angle"]))
-            upper.plot(time[kept], angle[kept], label=each.name, **line_style(i))
-            lower.plot(time[kept], (wanted - angle)[kept], **line_style(i))
+            upper.plot(time[shown], angle[shown], label=result.name, **line_style(i))
+            lower.plot(time[shown], (wanted - angle)[shown], **line_style(i))
             limit = max(limit, run.metrics.rmse)
         time = np.linspace(begin, task.duration, 500)
         upper.plot(

@@ -89,7 +89,7 @@ class BenchmarkResult(Reported):
     @property
     def seeds(self) -> tuple[int, ...]:
         """The seeds of the searches."""
-        return tuple(dict.fromkeys(each.seed for each in self.results))
+        return tuple(dict.fromkeys(result.seed for result in self.results))
 
     @property
     def truths(self) -> tuple[str, ...]:
@@ -108,14 +108,16 @@ class BenchmarkResult(Reported):
 
     def contenders(self, group: Group) -> tuple[str, ...]:
         """The names of the contenders of a group."""
-        names = (each.name for each in self.results if group is Group.MODELS or each.commissionings)
+        names = (
+            result.name for result in self.results if group is Group.MODELS or result.commissionings
+        )
         return tuple(dict.fromkeys(names))
 
     def values(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Array:
         """A metric of a contender in a task, (searches, truths); infinite where a run ended
         early.
         """
-        of_seeds = {each.seed: each.runs for each in self.results if each.name == contender}
+        of_seeds = {result.seed: result.runs for result in self.results if result.name == contender}
         runs = [
             [of_seeds[seed][RunKey(group, truth, task)].metrics for truth in self.truths]
             for seed in self.seeds
@@ -185,7 +187,7 @@ class BenchmarkResult(Reported):
         plots.append(self.run_plot(list(dict.fromkeys(drawn))[:MAX_PANELS], self.groups[-1]))
         if curves:
             plots.append(Plot("learning", LEARNING, partial(learning_figure, curves)))
-        errors = [each.errors for each in curves]
+        errors = [curve.errors for curve in curves]
         learned = [
             f"learning: {e[0]:.3g} degrees in trial 1, {e[-1]:.3g} in trial {e.size}"
             for e in errors
@@ -194,14 +196,14 @@ class BenchmarkResult(Reported):
             (
                 joint.model,
                 *(truth.plant for truth in joint.truths),
-                *(each.law for each in self.results),
+                *(result.law for result in self.results),
             )
         )
         tuned = [
             reference
-            for each in self.results
-            if each.tuning
-            for reference in each.tuning.references
+            for result in self.results
+            if result.tuning
+            for reference in result.tuning.references
         ]
         return Chapter(
             "benchmark",
@@ -239,10 +241,10 @@ class BenchmarkResult(Reported):
             f"Ranking, {group}",
             {
                 "controller": list(scores),
-                "score": [each.median for each in scores.values()],
-                "lowest": [each.low for each in scores.values()],
-                "highest": [each.high for each in scores.values()],
-                "air, mean": metric_column("air", [sum(each) / len(each) for each in air]),
+                "score": [score.median for score in scores.values()],
+                "lowest": [score.low for score in scores.values()],
+                "highest": [score.high for score in scores.values()],
+                "air, mean": metric_column("air", [sum(values) / len(values) for values in air]),
                 "strokes at rest": metric_column("strokes", strokes),
                 "valve life at rest": metric_column("valve_life", life, short="life at rest"),
                 "runs completed": TableColumn(
@@ -300,8 +302,8 @@ class BenchmarkResult(Reported):
         """
         names = self._task_names
         errors = {
-            each: np.array([self.metric(each, name, "rmse", group) for name in names])
-            for each in self.contenders(group)
+            contender: np.array([self.metric(contender, name, "rmse", group) for name in names])
+            for contender in self.contenders(group)
         }
         caption = (
             f"Error in each task with {self.joint.name}, {group}: median and range over"
@@ -312,7 +314,7 @@ class BenchmarkResult(Reported):
     def run_plot(self, names: Sequence[str], group: Group = Group.MODELS) -> Plot:
         """Angle and error over time of some tasks on the first truth, one column for each."""
         truth = self.truths[0]
-        shown = {each.name: each for each in reversed(self.results)}
+        shown = {result.name: result for result in reversed(self.results)}
         results = [shown[name] for name in self.contenders(group)]
         tasks = {task.name: task for task in self.tasks}
         figure = partial(run_figure, results, [tasks[name] for name in names], group, truth)
@@ -324,7 +326,7 @@ class BenchmarkResult(Reported):
 
     def _summary(self) -> tuple[str, str]:
         joint = self.joint
-        number = len({each.name for each in self.results})
+        number = len({result.name for result in self.results})
         best = (
             f"Smallest score, {group}: {next(iter(self.scores(group)))}." for group in self.groups
         )
@@ -372,10 +374,10 @@ def benchmark_controllers(
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does
     not suit the joint.
     """
-    check_names("benchmark_controllers", "contender", [each.name for each in contenders])
-    check_names("benchmark_controllers", "task", [each.name for each in tasks])
+    check_names("benchmark_controllers", "contender", [contender.name for contender in contenders])
+    check_names("benchmark_controllers", "task", [task.name for task in tasks])
     show = progress or (lambda text, done, total: None)
-    found: dict[str, tuple[ContenderResult, ...]] = {}
+    completed: dict[str, tuple[ContenderResult, ...]] = {}
     with process_pool(workers) as executor:
         options = {
             "joint": joint,
@@ -386,22 +388,27 @@ def benchmark_controllers(
         }
         shown = {**options, "progress": show if executor is None else None}
         distribution = DistributedCalls(executor, _benchmark_task, shown, content=options)
-        other = {
-            each.name: known.name
-            for each in contenders
+        source_names = {
+            contender.name: known.name
+            for contender in contenders
             for known in contenders
-            if each.tuned_as is known
+            if contender.tuned_as is known
         }
         for later in (False, True):  # those that take the gains of the others
-            due = [each for each in contenders if (each.name in other) == later]
+            due = [
+                contender for contender in contenders if (contender.name in source_names) == later
+            ]
             for i, results in distribution.completed(
-                [(each, found.get(other.get(each.name, ""), ())) for each in due]
+                [
+                    (contender, completed.get(source_names.get(contender.name, ""), ()))
+                    for contender in due
+                ]
             ):
-                found[due[i].name] = tuple(
+                completed[due[i].name] = tuple(
                     dataclasses.replace(result, contender=due[i]) for result in results
                 )
-                show(due[i].name, len(found), len(contenders))
-    ordered = (found[contender.name][i] for i in range(len(seeds)) for contender in contenders)
+                show(due[i].name, len(completed), len(contenders))
+    ordered = (completed[contender.name][i] for i in range(len(seeds)) for contender in contenders)
     return BenchmarkResult(joint, tuple(tasks), tuple(ordered))
 
 

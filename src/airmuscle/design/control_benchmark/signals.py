@@ -114,7 +114,7 @@ def angular_acceleration(
     a pressure difference [Pa] about the mean pressure."""
     torque = _torque(plant, angle, speed, joint.mean_pressure + half, joint.mean_pressure - half)
     coordinate = plant.mechanism.coordinates[0]
-    inputs = {each.name: 0.0 for each in plant.mechanism.inputs}
+    inputs = {variable.name: 0.0 for variable in plant.mechanism.inputs}
     q = {coordinate.name: angle}
     v = {coordinate.speed: speed}
     forces = {coordinate.name: torque}

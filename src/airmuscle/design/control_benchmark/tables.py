@@ -31,25 +31,32 @@ def search_table(joint: BenchmarkJoint, results: Sequence[ContenderResult]) -> T
     spread.
     """
     tuned = [
-        each for each in results if each.tuning is not None and each.contender.tuned_as is None
+        result
+        for result in results
+        if result.tuning is not None and result.contender.tuned_as is None
     ]
-    names = list(dict.fromkeys(each.name for each in tuned))
+    names = list(dict.fromkeys(result.name for result in tuned))
     if not names:
         return None
     searches = {
-        name: [each.tuning for each in tuned if each.name == name and each.tuning] for name in names
+        name: [result.tuning for result in tuned if result.name == name and result.tuning]
+        for name in names
     }
-    seeds = ", ".join(dict.fromkeys(str(each.seed) for each in results))
-    best = {name: [tuning.objective for tuning in found] for name, found in searches.items()}
+    seeds = ", ".join(dict.fromkeys(str(result.seed) for result in results))
+    best = {name: [tuning.objective for tuning in tunings] for name, tunings in searches.items()}
     columns: dict[str, Any] = {
         "controller": names,
-        "gains": [len(found[0].ranges) for found in searches.values()],
-        "sets of gains": [max(len(each.history) for each in found) for found in searches.values()],
-        "converged": [
-            f"{sum(each.converged for each in found)} of {len(found)}"
-            for found in searches.values()
+        "gains": [len(tunings[0].ranges) for tunings in searches.values()],
+        "sets of gains": [
+            max(len(tuning.history) for tuning in tunings) for tunings in searches.values()
         ],
-        "restarts": [sum(each.restarts for each in tuned if each.name == name) for name in names],
+        "converged": [
+            f"{sum(tuning.converged for tuning in tunings)} of {len(tunings)}"
+            for tunings in searches.values()
+        ],
+        "restarts": [
+            sum(result.restarts for result in tuned if result.name == name) for name in names
+        ],
         "objective": metric_column(
             "rmse", [sorted(values)[len(values) // 2] for values in best.values()]
         ),
@@ -72,22 +79,22 @@ def gains_table(results: Sequence[ContenderResult]) -> Table | None:
     """The gains of the searches and of the commissionings, in SI units."""
     rows = [
         (
-            each.name,
-            each.seed,
+            result.name,
+            result.seed,
             "models",
             path,
             value,
-            "on a bound" if path in each.tuning.on_bound else "",
+            "on a bound" if path in result.tuning.on_bound else "",
         )
-        for each in results
-        if each.tuning is not None
-        for path, value in each.tuning.gains.items()
+        for result in results
+        if result.tuning is not None
+        for path, value in result.tuning.gains.items()
     ]
     rows += [
-        (each.name, each.seed, truth, path, value, f"{found.runs} runs")
-        for each in results
-        for truth, found in each.commissionings.items()
-        for path, value in found.gains.items()
+        (result.name, result.seed, truth, path, value, f"{commissioning.runs} runs")
+        for result in results
+        for truth, commissioning in result.commissionings.items()
+        for path, value in commissioning.gains.items()
     ]
     names = ("controller", "seed", "found on", "gain", "value [SI]", "remark")
     return _rows("gains", "Gains", names, rows, shown=False)
@@ -98,7 +105,7 @@ def truth_table(joint: BenchmarkJoint) -> Table:
     truths = joint.truths
     columns: dict[str, Any] = {"truth": [truth.name for truth in truths]}
     described = [joint.describe(truth) for truth in truths]
-    columns |= {key: [each[key] for each in described] for key in described[0]}
+    columns |= {key: [description[key] for description in described] for key in described[0]}
     return Table(
         "truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model."
     )
@@ -106,18 +113,18 @@ def truth_table(joint: BenchmarkJoint) -> Table:
 
 def metrics_table(results: Sequence[ContenderResult]) -> Table:
     """All metrics, one row for each run."""
-    keys = [(each, key) for each in results for key in each.runs]
+    keys = [(result, key) for result in results for key in result.runs]
     columns: dict[str, Any] = {
-        "controller": [each.name for each, _ in keys],
-        "seed": [each.seed for each, _ in keys],
+        "controller": [result.name for result, _ in keys],
+        "seed": [result.seed for result, _ in keys],
         "group": [str(key.group) for _, key in keys],
         "truth": [key.truth for _, key in keys],
         "task": [key.task for _, key in keys],
     }
-    found = [each.runs[key].metrics for each, key in keys]
+    metrics = [result.runs[key].metrics for result, key in keys]
     for field, (title, _, _) in METRICS.items():
         columns[title] = metric_column(
-            field, [math.nan if m is None else float(getattr(m, field)) for m in found]
+            field, [math.nan if m is None else float(getattr(m, field)) for m in metrics]
         )
     return Table(
         "metrics",
@@ -135,8 +142,8 @@ def learning_table(curves: Sequence[LearningCurve]) -> Table:
     """The rms errors of repeated trials."""
     columns: dict[str, Any] = {"trial": list(range(1, max(c.errors.size for c in curves) + 1))}
     columns |= {
-        f"{each.contender}, {each.task.name}": metric_column("rmse", each.errors.tolist())
-        for each in curves
+        f"{curve.contender}, {curve.task.name}": metric_column("rmse", curve.errors.tolist())
+        for curve in curves
     }
     return Table(
         "learning",
@@ -149,9 +156,9 @@ def learning_table(curves: Sequence[LearningCurve]) -> Table:
 def failure_table(results: Sequence[ContenderResult]) -> Table | None:
     """The runs that ended early, with their reasons; None if there are none."""
     rows = [
-        (each.name, each.seed, *key, run.reason)
-        for each in results
-        for key, run in each.runs.items()
+        (result.name, result.seed, *key, run.reason)
+        for result in results
+        for key, run in result.runs.items()
         if run.metrics is None
     ]
     return _rows(

@@ -91,7 +91,7 @@ def study_fingerprint(study: Study) -> str:
 def chunk_keys(study: Study) -> list[str]:
     """The keys of all chunks in a store: they do not depend on the runs of the other chunks."""
     common = program_fingerprint(), study.fingerprint()
-    return [fingerprint(*common, study.values[each.start : each.stop]) for each in study.chunks]
+    return [fingerprint(*common, study.values[runs.start : runs.stop]) for runs in study.chunks]
 
 
 def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
@@ -119,8 +119,8 @@ def compute_chunk(study: Study, index: int) -> Chunk:
     scalars = np.full((len(runs), len(study.scalars)), np.nan)
     reasons = [""] * len(runs)
     series = {
-        name: np.full((len(runs), each.times.size), np.nan)
-        for name, each in study.time_series.items()
+        name: np.full((len(runs), metric.times.size), np.nan)
+        for name, metric in study.time_series.items()
     }
     states = study.template.initial_states(*study.varying(runs))
     scenarios: dict[int, Scenario] = {}
@@ -137,8 +137,8 @@ def compute_chunk(study: Study, index: int) -> Chunk:
             reasons[row] = outcome
         else:
             scalars[row] = list(study.scalar_values(outcome).values())
-            for name, each in study.time_series.items():
-                series[name][row] = each.sample(outcome["time"], outcome[each.column])
+            for name, metric in study.time_series.items():
+                series[name][row] = metric.sample(outcome["time"], outcome[metric.column])
     return {"scalars": scalars, "failure_reasons": np.array(reasons), **with_prefix(SERIES, series)}
 
 

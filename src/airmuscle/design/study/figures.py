@@ -92,12 +92,12 @@ def scatter_plot(study: Study, name: str, values: Array) -> Plot:
 def _scatter_figure(study: Study, name: str, values: Array, drawn: Any) -> Any:
     figure, panels = _panels(len(study.parameters), sharey=True)
     factor, label = _shown(name, study.units[name])
-    few = drawn.size <= FEW_POINTS
+    sparse = drawn.size <= FEW_POINTS
     style = {
         "marker": "o",
         "linestyle": "none",
-        "markersize": 5.0 if few else 2.4,
-        "alpha": 0.9 if few else 0.5,
+        "markersize": 5.0 if sparse else 2.4,
+        "alpha": 0.9 if sparse else 0.5,
         "markeredgewidth": 0,
         "color": BLUE,
     }

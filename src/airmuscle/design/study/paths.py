@@ -152,7 +152,10 @@ def changed_scenario(path: str | Path, changes: Mapping[str, str]) -> Scenario:
     template = ScenarioTemplate(tables, location, build_scenario(tables, location))
     varied = [template.parameter(name, str(location)) for name in changes]
     with ambient_pressure(template.scenario.plant.ambient.pressure):
-        values = [quantity(changes[each.path], each.unit, where=each.path) for each in varied]
+        values = [
+            quantity(changes[parameter.path], parameter.unit, where=parameter.path)
+            for parameter in varied
+        ]
     made = template.with_values(varied, values)
     return dataclasses.replace(
         made, title=f"{made.title}; {', '.join(f'{k} = {v}' for k, v in changes.items())}"

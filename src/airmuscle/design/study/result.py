@@ -125,7 +125,7 @@ class StudyResult(Reported):
         study = self.study
         indices = self.indices()
         metrics = {name: self[name] for name in study.scalars}
-        paths = [each.path for each in study.parameters]
+        paths = [parameter.path for parameter in study.parameters]
         plots = (
             [
                 Plot(
@@ -177,7 +177,7 @@ class StudyResult(Reported):
                 f"Failed runs: {self.failed.size}. They are excluded from the statistics; the table"
                 " has the reasons."
             )
-        excluded = max((each.excluded_points for each in indices.values()), default=0)
+        excluded = max((sobol.excluded_points for sobol in indices.values()), default=0)
         if excluded:
             yield (
                 "Base points excluded from the sensitivities, because a metric is missing:"

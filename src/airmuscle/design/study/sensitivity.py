@@ -105,7 +105,7 @@ def sensitivity_table(paths: Sequence[str], indices: Mapping[str, SobolIndices])
     """The Sobol indices of each metric with respect to each parameter, with their confidence
     intervals.
     """
-    found = indices.values()
+    all_indices = indices.values()
 
     def pairs(intervals: list[Array]) -> TableColumn:
         return TableColumn(
@@ -115,10 +115,12 @@ def sensitivity_table(paths: Sequence[str], indices: Mapping[str, SobolIndices])
     columns = {
         "metric": [name for name in indices for _ in paths],
         "parameter": [*paths] * len(indices),
-        "first order": TableColumn(np.concatenate([each.first for each in found]), digits=3),
-        "first order, interval": pairs([each.first_interval for each in found]),
-        "total": TableColumn(np.concatenate([each.total for each in found]), digits=3),
-        "total, interval": pairs([each.total_interval for each in found]),
+        "first order": TableColumn(
+            np.concatenate([sobol.first for sobol in all_indices]), digits=3
+        ),
+        "first order, interval": pairs([sobol.first_interval for sobol in all_indices]),
+        "total": TableColumn(np.concatenate([sobol.total for sobol in all_indices]), digits=3),
+        "total, interval": pairs([sobol.total_interval for sobol in all_indices]),
     }
     note = (
         "Intervals: 95 % bootstrap confidence intervals. First order: fraction of the variance"

@@ -99,16 +99,24 @@ def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
 
 def to_gains(ranges: Sequence[GainRange], coordinates: Array) -> Array:
     """Coordinates (E, D) within 0 and 1 as gains (E, D) [SI]."""
-    return np.column_stack([each.from_unit(coordinates[:, i]) for i, each in enumerate(ranges)])
+    return np.column_stack(
+        [gain_range.from_unit(coordinates[:, i]) for i, gain_range in enumerate(ranges)]
+    )
 
 
 def to_coordinates(ranges: Sequence[GainRange], gains: Mapping[str, float]) -> Array | None:
     """The coordinates (D,) of a set of gains; None where one of them is outside its range."""
-    values = [gains[each.path] for each in ranges]
-    if not all(each.low <= value <= each.high for each, value in zip(ranges, values, strict=True)):
+    values = [gains[gain_range.path] for gain_range in ranges]
+    if not all(
+        gain_range.low <= value <= gain_range.high
+        for gain_range, value in zip(ranges, values, strict=True)
+    ):
         return None
     return np.array(
-        [float(each.to_unit(np.array(v))) for each, v in zip(ranges, values, strict=True)]
+        [
+            float(gain_range.to_unit(np.array(v)))
+            for gain_range, v in zip(ranges, values, strict=True)
+        ]
     )
 
 
@@ -166,21 +174,21 @@ def check_cases(cases: Sequence[LoopCase]) -> tuple[LoopCase, ...]:
     """The cases as a tuple. Raises ParameterError if there are none, or their tuned controllers
     differ.
     """
-    given = tuple(cases) if isinstance(cases, Sequence) else (cases,)
-    wrong = [case for case in given if not isinstance(case, LoopCase)]
-    if wrong or not given:
+    family = tuple(cases) if isinstance(cases, Sequence) else (cases,)
+    wrong = [case for case in family if not isinstance(case, LoopCase)]
+    if wrong or not family:
         what = f"contain {abridged(wrong[0])}" if wrong else "are empty"
         raise ParameterError(f"tune: the cases {what}; give a list of LoopCase.")
-    check_names("tune", "case", [case.name for case in given])
-    first = given[0].controller
-    for case in given[1:]:
+    check_names("tune", "case", [case.name for case in family])
+    first = family[0].controller
+    for case in family[1:]:
         if structure(case.controller) is not structure(first):
             raise ParameterError(
                 f"case '{case.name}': its controller is {type(case.controller).__name__}, which is"
-                f" not that of case '{given[0].name}', {type(first).__name__}; all cases need the"
+                f" not that of case '{family[0].name}', {type(first).__name__}; all cases need the"
                 " same controller. If it is enclosed by another law, state controller_path."
             )
-    return given
+    return family
 
 
 def check_names(where: str, kind: str, names: Sequence[str]) -> None:

@@ -73,12 +73,12 @@ def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGr
             raise error.located(f"case '{first.name}'") from None
         air = tuple(s.name for s in first.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
         commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
-        kept = (
+        recorded = (
             *(column for name in scales for column in (name, f"{SETPOINT}{name}")),
             *commands,
             *air,
         )
-        groups.append(CaseGroup(np.array(places), together, varied, states, scales, air, kept))
+        groups.append(CaseGroup(np.array(places), together, varied, states, scales, air, recorded))
     return tuple(groups)
 
 
@@ -115,9 +115,9 @@ class Evaluator:
         rows = np.array(possible, dtype=np.intp)
         for group in self.groups:
             samples = self.duration / group.cases[0].loop.sample_time + 2
-            each = max(1, int(MAX_VALUES / (samples * len(group.kept) * len(group.cases))))
-            for i in range(0, rows.size, each):
-                reasons.update(self._evaluate(group, gains, rows[i : i + each], metrics))
+            sets_at_once = max(1, int(MAX_VALUES / (samples * len(group.kept) * len(group.cases))))
+            for i in range(0, rows.size, sets_at_once):
+                reasons.update(self._evaluate(group, gains, rows[i : i + sets_at_once], metrics))
         return metrics, reasons
 
     def _evaluate(
@@ -166,7 +166,7 @@ class Evaluator:
                 loop_with_gains(first, dict(zip(self.paths, row, strict=True)))
                 for row in gains.tolist()
             )
-            loop = [each for each in of_set for _ in range(m)]
+            loop = [set_loop for set_loop in of_set for _ in range(m)]
         with hidden_progress():
             return simulate_batch(
                 first.plant,
@@ -187,5 +187,5 @@ def joined_metrics(parts: Sequence[CaseMetrics]) -> CaseMetrics:
     """The metrics of several groups of sets of gains as those of one."""
     fields = ("index", "air", "travel", "completed")
     return CaseMetrics(
-        *(np.concatenate([getattr(each, name) for each in parts]) for name in fields)
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in fields)
     )

@@ -207,7 +207,7 @@ class RobustObjective:
         complete = np.flatnonzero(np.isfinite(metrics.index).all(axis=1))
         if complete.size:
             index, air, travel = (
-                each[complete] for each in (metrics.index, metrics.air, metrics.travel)
+                metric[complete] for metric in (metrics.index, metrics.air, metrics.travel)
             )
             worst = np.quantile(index, self.quantile, axis=1)
             values[complete] = index.mean(axis=1) + self.quantile_weight * worst

@@ -168,14 +168,14 @@ def tune(
     family = check_cases(cases)
     duration = _check_options(duration, index, objective, budget, seed, len(family))
     ranges = gain_ranges(family[0].controller, bounds)
-    paths = tuple(each.path for each in ranges)
+    paths = tuple(gain_range.path for gain_range in ranges)
     evaluator = Evaluator(
         family, group_cases(family, index), paths, duration, index, integrator, start_time
     )
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
-    given = search.given(start)
+    start_points = search.given(start)
     with process_pool(workers) as executor:
-        interrupted = search.run(given, seed, executor)
+        interrupted = search.run(start_points, seed, executor)
     if not search.values:
         raise KeyboardInterrupt
     gains = np.concatenate(search.gains)
@@ -198,7 +198,7 @@ def tune(
     )
     if not math.isfinite(result.objective):
         reason = next(
-            (each for each, _ in search.reasons.most_common(1)), "the index is not finite"
+            (text for text, _ in search.reasons.most_common(1)), "the index is not finite"
         )
         raise SimulationError(
             f"tune: each of {len(result.history)} sets of gains fails in at least one case; most"
@@ -273,9 +273,9 @@ class _Search:
         given.
         """
         present = {leaf.path: leaf.value for leaf in leaves(self.evaluator.cases[0].controller)}
-        own = to_coordinates(self.ranges, present)
-        self.present_count = 0 if own is None else 1
-        points = [] if own is None else [own]
+        present_point = to_coordinates(self.ranges, present)
+        self.present_count = 0 if present_point is None else 1
+        points = [] if present_point is None else [present_point]
         for number, gains in enumerate(start):
             check_known(f"tune: start {number} names", gains, self.evaluator.paths, "bounds names")
             point = to_coordinates(self.ranges, {**present, **gains})
@@ -291,7 +291,7 @@ class _Search:
             )
         return points
 
-    def run(self, given: list[Array], seed: int, executor: Executor | None) -> bool:
+    def run(self, start_points: list[Array], seed: int, executor: Executor | None) -> bool:
         """Search until two descents agree or the budget is used; whether the user interrupted."""
         from scipy.stats import qmc
 
@@ -301,15 +301,15 @@ class _Search:
         first = qmc.Sobol(
             d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)
         ).random(self.population)
-        first[: len(given)] = given if given else first[:0]
+        first[: len(start_points)] = start_points if start_points else first[:0]
         random = np.random.default_rng([seed, 1])
         ends = list[float]()
         used = list[Array]()
         try:
             for start in first[np.argsort(self._energies(first), kind="stable")]:
                 if any(
-                    float(np.linalg.norm(start - other)) < APART * math.sqrt(start.size)
-                    for other in used
+                    float(np.linalg.norm(start - earlier)) < APART * math.sqrt(start.size)
+                    for earlier in used
                 ):
                     continue
                 used.append(start)
@@ -317,8 +317,8 @@ class _Search:
                 if self.converged or not self._has_budget(strategy.size):
                     break
                 ends.append(self._descend(strategy))
-                best, *others = sorted(ends)
-                self.converged = bool(others) and others[0] - best <= AGREEMENT * abs(best)
+                best, *worse = sorted(ends)
+                self.converged = bool(worse) and worse[0] - best <= AGREEMENT * abs(best)
         except KeyboardInterrupt:
             return True
         return False
@@ -346,7 +346,7 @@ class _Search:
         gains = to_gains(self.ranges, np.clip(coordinates, 0.0, 1.0))
         size = self._sets_of_a_task
         parts = self._calls.results([gains[i : i + size] for i in range(0, len(gains), size)])
-        metrics = joined_metrics([found for found, _ in parts])
+        metrics = joined_metrics([part for part, _ in parts])
         for _, reasons in parts:
             self.reasons.update(reasons)
         values = np.asarray(self.objective(metrics), dtype=float)

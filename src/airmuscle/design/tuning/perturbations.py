@@ -118,13 +118,16 @@ def perturbed_family(
             with located_errors(f"{symbol} x {factor:g}"):
                 changed.append((f"{symbol} x {factor:g}", with_parameters(plant, values)))
     known = [
-        [leaf.value for leaf in leaves(each) if _CONDUCTANCE.search(leaf.path)]
-        for each in plant.circuits
+        [leaf.value for leaf in leaves(circuit) if _CONDUCTANCE.search(leaf.path)]
+        for circuit in plant.circuits
     ]
     if perturbations.leak and not all(known):
         notes.append("no case with a leak: a circuit has no conductance")
     elif perturbations.leak:
-        leaks = (Valve(perturbations.leak * max(each), LEAK_CRITICAL_RATIO) for each in known)
+        leaks = (
+            Valve(perturbations.leak * max(conductances), LEAK_CRITICAL_RATIO)
+            for conductances in known
+        )
         circuits: Any = tuple(map(WithLeak, plant.circuits, leaks))
         made = circuits if isinstance(plant.circuit, tuple) else circuits[0]
         changed.append(("leak", dataclasses.replace(plant, circuit=made)))
@@ -134,9 +137,9 @@ def perturbed_family(
             "no drawn parameters: neither the scenario nor a muscle file states the uncertainty of"
             " parameters"
         )
-    for name, each in changed:
+    for name, varied in changed:
         with located_errors(f"case '{name}'"):
-            cases.append(LoopCase(name, each, loop, initial_state(each)))
+            cases.append(LoopCase(name, varied, loop, initial_state(varied)))
     if perturbations.delay and not isinstance(loop.controller, ControlLaw):
         notes.append("no case with a delay: the controller is no ControlLaw")
     elif perturbations.delay:
@@ -167,7 +170,7 @@ def _draws(
             " muscles; give one for each."
         )
     of_plant = parameter_uncertainty(fitted) if fitted is not None and fitted.parameters else None
-    if of_plant is None and not any(each is not None for each in uncertainties):
+    if of_plant is None and not any(uncertainty is not None for uncertainty in uncertainties):
         return
     random = np.random.default_rng(seed)
     for number in range(count):

@@ -202,8 +202,8 @@ def ultimate_point(
             around[rising + 1] - around[rising]
         )
         period = float(crossings[-1] - crossings[0]) / (rising.size - 1)
-        whole = (t >= crossings[0]) & (t < crossings[-1])
-        a = waveform_amplitude(t[whole], y[whole], period, rising.size - 1)
+        complete = (t >= crossings[0]) & (t < crossings[-1])
+        a = waveform_amplitude(t[complete], y[complete], period, rising.size - 1)
     if rising.size < 3 or a <= abs(hysteresis):
         raise ParameterError(
             f"relay experiment: {rising.size} rising crossings and an amplitude of {a:.4g} in the"
@@ -243,10 +243,10 @@ def waveform_amplitude(time: Array, values: Array, period: float, periods: int) 
     place, start = time / period, np.array([phase[wave.argmin()], phase[wave.argmax()]])
     simplex = start + START_STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 0.0, "maxiter": 80}
-    found = minimize(
+    turning_points = minimize(
         lambda at: _two_arcs(place, values, at)[0], start, method="Nelder-Mead", options=options
     ).x
-    residual, of_arcs = _two_arcs(place, values, found)
+    residual, of_arcs = _two_arcs(place, values, turning_points)
     return (
         of_arcs
         if residual / (values.size - 2 * (ARC_DEGREE + 2)) < BETTER * variance

@@ -92,7 +92,8 @@ class Tuning(Reported):
         """The best gains that lie on a bound of their range, within 1 % of it."""
         gains = self.gains
         places = {
-            each.path: float(each.to_unit(np.array(gains[each.path]))) for each in self.ranges
+            gain_range.path: float(gain_range.to_unit(np.array(gains[gain_range.path])))
+            for gain_range in self.ranges
         }
         return {path: gains[path] for path, place in places.items() if not 0.01 <= place <= 0.99}
 
@@ -186,12 +187,16 @@ class Tuning(Reported):
         """The gains before and after, with their ranges."""
         present = {leaf.path: leaf.value for leaf in leaves(self.cases[0].controller)}
         columns: dict[str, Any] = {
-            "gain": [each.path for each in self.ranges],
-            "minimum": TableColumn([each.low for each in self.ranges], BY_ROW),
-            "maximum": TableColumn([each.high for each in self.ranges], BY_ROW),
-            "present": TableColumn([present[each.path] for each in self.ranges], BY_ROW),
-            "tuned": TableColumn([self.gains[each.path] for each in self.ranges], BY_ROW),
-            "unit": [units.get(each.path, "") for each in self.ranges],
+            "gain": [gain_range.path for gain_range in self.ranges],
+            "minimum": TableColumn([gain_range.low for gain_range in self.ranges], BY_ROW),
+            "maximum": TableColumn([gain_range.high for gain_range in self.ranges], BY_ROW),
+            "present": TableColumn(
+                [present[gain_range.path] for gain_range in self.ranges], BY_ROW
+            ),
+            "tuned": TableColumn(
+                [self.gains[gain_range.path] for gain_range in self.ranges], BY_ROW
+            ),
+            "unit": [units.get(gain_range.path, "") for gain_range in self.ranges],
         }
         return Table("gains", "Gains", columns, brief=MAX_BRIEF)
 
@@ -344,11 +349,11 @@ def _display(unit: str) -> tuple[float, str]:
 def rule_table(rules: Sequence[RuleSettings]) -> Table:
     """The settings of tuning rules."""
     columns: dict[str, Any] = {
-        "rule": [each.rule for each in rules],
-        "gain": [each.gain for each in rules],
-        "integral time": TableColumn([each.integral_time for each in rules], "s"),
-        "derivative time": TableColumn([each.derivative_time for each in rules], "s"),
-        "set-point weight": [each.setpoint_weight for each in rules],
+        "rule": [settings.rule for settings in rules],
+        "gain": [settings.gain for settings in rules],
+        "integral time": TableColumn([settings.integral_time for settings in rules], "s"),
+        "derivative time": TableColumn([settings.derivative_time for settings in rules], "s"),
+        "set-point weight": [settings.setpoint_weight for settings in rules],
     }
     title = "Settings of tuning rules, among the starts"
     return Table("rules", title, columns, "The gain is in SI units.", brief=len(rules))

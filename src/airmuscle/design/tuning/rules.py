@@ -198,12 +198,12 @@ def step_experiment(
         raise ParameterError(
             f"step_experiment: the command would be {value:g}; allowed range: {low:g} to {high:g}."
         )
-    held = Schedule(
-        {name: ((0.0, float(each)),) for name, each in commands(pid.commanded, value).items()}
+    stepped = Schedule(
+        {name: ((0.0, float(command)),) for name, command in commands(pid.commanded, value).items()}
     )
     run = simulate(
         case.plant,
-        WithDrivers(held, case.loop.drivers),
+        WithDrivers(stepped, case.loop.drivers),
         duration=duration,
         initial_state=case.start(),
         output_times=duration / ROWS,
@@ -241,9 +241,9 @@ def rule_starts(
     bounds.
     """
     starts = []
-    for each in settings:
-        times = {"integral_time": each.integral_time, "derivative_time": each.derivative_time}
-        gains = {"gain": each.gain, **{name: time for name, time in times.items() if time > 0}}
+    for rule in settings:
+        times = {"integral_time": rule.integral_time, "derivative_time": rule.derivative_time}
+        gains = {"gain": rule.gain, **{name: time for name, time in times.items() if time > 0}}
         starts.append(
             {name: float(np.clip(gains[name], *bounds[name])) for name in gains if name in bounds}
         )

@@ -81,7 +81,7 @@ class ScenarioLoop(ShortRepr):
         tables = self.tables["plant"].get("muscle", [])
         named = tables if isinstance(tables, list) else [tables]
         muscles = self.scenario.plant.muscles
-        found: list[ParameterUncertainty | None] = [None] * len(muscles)
+        uncertainties: list[ParameterUncertainty | None] = [None] * len(muscles)
         for i, value in enumerate(
             named if len(named) == len(muscles) else []
         ):  # otherwise of a plant of the library
@@ -99,10 +99,10 @@ class ScenarioLoop(ShortRepr):
                     for m in (entry.muscle, muscles[i])
                 )
                 paths = muscle_paths(entry.uncertainty, "")
-                found[i] = entry.uncertainty.part(
+                uncertainties[i] = entry.uncertainty.part(
                     p in of_plant and of_file.get(p) == of_plant[p] for p in paths
                 )
-        return found
+        return uncertainties
 
     def bounds(self, given: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
         """The ranges [SI] of the tuned gains: those given as `gain=5 1/m:500 1/m`, or the default
