@@ -66,7 +66,7 @@ class TableReader:
         for key in values if is_named else ():
             with located_errors(location):
                 check_field(cls, key)
-        library = ["library"] if any(each in self.named for each in alternatives(kind)) else []
+        library = ["library"] if any(option in self.named for option in alternatives(kind)) else []
         check_keys(values, [*(key for key in names if key), *library], location)
         values = {names[key]: value for key, value in values.items() if names[key] not in given}
         hints = type_hints(cls)
@@ -174,9 +174,9 @@ def _keys(cls: type[Any]) -> list[str]:
 def only_class(kind: Any) -> type[Any] | None:
     """The class of a place where only one is possible."""
     classes = [
-        each
-        for each in alternatives(kind)
-        if dataclasses.is_dataclass(each) and inspect.isclass(each)
+        option
+        for option in alternatives(kind)
+        if dataclasses.is_dataclass(option) and inspect.isclass(option)
     ]
     if len(classes) != 1 or inspect.isabstract(classes[0]) or has_variants(classes[0]):
         return None

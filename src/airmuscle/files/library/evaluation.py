@@ -66,8 +66,8 @@ class Evaluation(Reported):
         remarks = {"pressure": "gauge"}
         if length:
             moved = quantity_text(length * point.contraction, "m", "mm")
-            whole = quantity_text(length, "m", "mm", 6)
-            remarks["contraction"] = f"{moved} of {whole}"
+            resting_length = quantity_text(length, "m", "mm", 6)
+            remarks["contraction"] = f"{moved} of {resting_length}"
         shown = {"pressure": "kPa", "contraction": "%", "force": "N"}
         digits = {
             name: 4 if name in (self.solved, "contraction") else 6 for name in UNITS
@@ -180,19 +180,19 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
             f"{type(law).__name__}: the solution {describe_point(point)} is not physical. Give"
             " values nearer to the validity range of the characteristic (airmuscle show)."
         )
-    found = Evaluation(entry, point, solved)
-    for message in _warnings(found):
+    evaluation = Evaluation(entry, point, solved)
+    for message in _warnings(evaluation):
         warnings.warn(message, AirmuscleWarning, stacklevel=2)
-    return found
+    return evaluation
 
 
-def _warnings(found: Evaluation) -> Iterator[str]:
+def _warnings(evaluation: Evaluation) -> Iterator[str]:
     """That a point is measured but not permitted, slack, or extrapolated. Raises RatingError as
     `evaluate`.
     """
-    point = found.point
-    ratings = found.entry.ratings
-    limits = found.validity_range
+    point = evaluation.point
+    ratings = evaluation.entry.ratings
+    limits = evaluation.validity_range
     is_measured = limits is not None and limits.contains(point.pressure, point.contraction)
     if excesses := "; ".join(ratings.excesses(**point._asdict()) if ratings is not None else ()):
         if not is_measured:

@@ -55,7 +55,10 @@ PACKAGES = (
 def _models(*packages: ModuleType) -> dict[str, type[Any]]:
     """The model classes of packages by name; their modules are imported."""
     return {
-        n: cls for each in packages for n in each.__all__ if _is_file_model(cls := getattr(each, n))
+        n: cls
+        for package in packages
+        for n in package.__all__
+        if _is_file_model(cls := getattr(package, n))
     }
 
 
@@ -74,7 +77,7 @@ def model_names(kind: Any = Any) -> tuple[str, ...]:
 def has_variants(cls: type[Any]) -> bool:
     """Whether a file may name a subclass of a class; such stand in the package of the class."""
     packages = [package for package in PACKAGES if cls.__name__ in package.__all__]
-    return any(each is not cls and issubclass(each, cls) for each in _models(*packages).values())
+    return any(model is not cls and issubclass(model, cls) for model in _models(*packages).values())
 
 
 def allows(kind: Any, cls: type[Any]) -> bool:
@@ -102,7 +105,7 @@ def model_class(
     if ":" in name and classes is None:
         return _class_of_code(name, where)
     package = next(
-        (each for each in PACKAGES if name in each.__all__), None
+        (candidate for candidate in PACKAGES if name in candidate.__all__), None
     )  # the only one that is imported
     known = classes if classes is not None else _models(package) if package else {}
     if name not in known:
@@ -133,7 +136,7 @@ def allow_code() -> Iterator[None]:
     try:
         yield
     finally:
-        sys.path[:] = (each for each in sys.path if each not in folders)
+        sys.path[:] = (folder for folder in sys.path if folder not in folders)
         _ALLOWED.reset(token)
 
 
@@ -178,14 +181,14 @@ def _class_of_code(name: str, where: str) -> type[Any]:
         raise UnknownNameError(
             f"{where}: '{one_line(name)}' is no class that is declared with @model."
         )
-    found: type[Any] = cls
-    if dataclasses.fields(found) and not type_hints(found):
+    model: type[Any] = cls
+    if dataclasses.fields(model) and not type_hints(model):
         why = (
             "an annotation is of a name that the module does not import, or imports for type"
             " checkers alone"
         )
         raise UnknownNameError(f"{where}: the fields of '{one_line(name)}' are unknown: {why}.")
-    return found
+    return model
 
 
 Reader = Callable[[Any, Any, Location], Any]
@@ -215,7 +218,7 @@ def is_required(field: dataclasses.Field[Any]) -> bool:
 
 def check_required(
     cls: type[Any],
-    given: Mapping[str, Any],
+    stated: Mapping[str, Any],
     hints: Mapping[str, Any],
     location: Location,
     is_named: bool,
@@ -224,9 +227,9 @@ def check_required(
     the class.
     """
     for field in dataclasses.fields(cls):
-        value = given.get(field.name)
+        value = stated.get(field.name)
         if not is_required(field) or (
-            field.name in given and not (isinstance(value, str) and not value.strip())
+            field.name in stated and not (isinstance(value, str) and not value.strip())
         ):
             continue
         key = field.metadata.get("key", field.name)

@@ -215,10 +215,10 @@ def _file_in_folder(name: str) -> str:
     none.
     """
     files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
-    found = next(
+    file_name = next(
         (file.as_posix() for file in files if 0 < len(name) <= MAX_NAME and file.is_file()), ""
     )
-    return f" '{name}' is a folder; write {found}." if found else ""
+    return f" '{name}' is a folder; write {file_name}." if file_name else ""
 
 
 def is_path(name_or_path: str | Path) -> bool:

@@ -243,20 +243,20 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
 
 def _stated_band(campaign: Campaign, stage: StaticStage, length: float | None) -> StatedBand:
     """The bands of the muscle of a resting length [m], whose specimens are those of this length."""
-    held = stage.held_band
+    held_band = stage.held_band
     runs = [record.recording for record in campaign.records if record.kind.is_static]
     errors = ranked_specimen_errors(stage.comparison.recommended, [stage.comparison], stage.points)
     band = _complete_band(StatedBand("force", stage.band.half_width, str(stage.band)), runs, errors)
-    if held is not None and held.half_width != stage.band.half_width:
+    if held_band is not None and held_band.half_width != stage.band.half_width:
         band = dataclasses.replace(
-            band, source=f"{stage.band} {held}", held_half_width=held.half_width
+            band, source=f"{stage.band} {held_band}", held_half_width=held_band.half_width
         )
     if length is not None:
         lengths = resting_lengths_of(runs)
-        own = tuple(
+        specimens = tuple(
             n for n in band.specimens if abs(lengths.get(n, length) - length) <= LENGTH_TOLERANCE
         )
-        band = dataclasses.replace(band, specimens=own)
+        band = dataclasses.replace(band, specimens=specimens)
     return band
 
 

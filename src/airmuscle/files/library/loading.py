@@ -176,14 +176,14 @@ def check_describes_law(tables: Mapping[str, Any], what: str) -> None:
 def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] = Entry) -> Any:
     """The muscle, law, valve, product or plant of the tables of a file. The ratings of an Entry are
     those of its `product` unless it states some."""
-    given: dict[str, Any] = {"name": Path(location.file).stem}
+    stated: dict[str, Any] = {"name": Path(location.file).stem}
     if kind is PlantEntry:
         keys = (*SCENARIO_TABLES, "sources")
         place = location.inside("sources")
         check_keys(tables, ("title", "provenance", "note", "warning", *keys, "reference"), location)
         sources = read_table(tables.get("sources", {}), None, place, " of paths and sources")
-        given["plant"] = build_plant(tables["plant"], location.inside("plant"))
-        given["sources"] = tuple(
+        stated["plant"] = build_plant(tables["plant"], location.inside("plant"))
+        stated["sources"] = tuple(
             (path, read_text(sources, path, place, needed=True)) for path in sources
         )
         tables = {key: value for key, value in tables.items() if key not in keys}
@@ -196,10 +196,10 @@ def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] =
             )
         with located_errors(location):
             product = load_product(read_text(tables, "product", location, needed=True))
-        given["ratings"] = product.ratings
+        stated["ratings"] = product.ratings
         cited = product.references
         tables = {key: value for key, value in tables.items() if key != "product"}
-    entry = build(tables, location, given, kind=kind)
+    entry = build(tables, location, stated, kind=kind)
     if kind is not Entry:
         return entry
     inside = getattr(entry.characteristic, "geometry", None)
@@ -316,16 +316,18 @@ def _entry_parts(entry: Entry, replaced: Mapping[str, Any], location: Location) 
     }
     if "contractile" in replaced:
         del parts["validity_range"]  # it belongs to the replaced law
-    kept = {name: part for name, part in parts.items() if part is not None and name not in replaced}
-    if not isinstance(kept.get("contractile"), ForceLaw | NoneType):
+    retained = {
+        name: part for name, part in parts.items() if part is not None and name not in replaced
+    }
+    if not isinstance(retained.get("contractile"), ForceLaw | NoneType):
         raise ParameterError(
             f"{location}: {entry.name} is {type(entry.characteristic).__name__}, which is not"
             " solved for the force; a plant needs a ForceLaw. In Python, as_force_law(law,"
             " validity range) makes one."
         )
-    if "geometry" not in {*kept, *replaced}:
+    if "geometry" not in {*retained, *replaced}:
         raise ParameterError(f"{location}: {entry.name} lacks {MISSING_GEOMETRY}.")
-    return kept
+    return retained
 
 
 def load_data(name: str) -> Recording:

@@ -72,8 +72,8 @@ def scale_entry(
         f"Not scaled, but as at the original size: {', '.join(parts)}." if parts else "",
     )
     old, new = (
-        {f"characteristic.{leaf.path}": leaf.value for leaf in leaves(each.characteristic)}
-        for each in (original, entry)
+        {f"characteristic.{leaf.path}": leaf.value for leaf in leaves(muscle_entry.characteristic)}
+        for muscle_entry in (original, entry)
     )
     fitted = () if entry.uncertainty is None else entry.uncertainty.parameters
     uncertainty = (

@@ -81,12 +81,12 @@ class PlantSignals:
         """Muscles and mechanism of the plant, itself and the sample time, for the fields that need
         them.
         """
-        own = {
+        plant_parts = {
             tuple[Muscle, ...]: self.plant.muscles,
             Mechanism: self.plant.mechanism,
             Plant: self.plant,
         }
-        return {name: own.get(hints[name], self.sample_time) for name in plant_fields(cls)}
+        return {name: plant_parts.get(hints[name], self.sample_time) for name in plant_fields(cls)}
 
     def make(
         self,
@@ -224,10 +224,10 @@ def build_control_loop(
     inner = location.inside("controller")
     remedy = '. Write model = "PID", its parameters, sample_time and setpoint'
     controller_table = read_table(table["controller"], plant, inner, f"{remedy} in it")
-    own = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
+    law_table = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
     stated = {key: value for key, value in controller_table.items() if key in LOOP_KEYS}
     keys: LoopTable = build(stated, inner, kind=LoopTable)
-    controller = build_law(own, plant, units, inner, keys.sample_time)
+    controller = build_law(law_table, plant, units, inner, keys.sample_time)
     place = inner.inside("setpoint")
     if "drivers" in keys.setpoint:
         raise ParameterError(

@@ -106,18 +106,18 @@ def build_experiment(
                was found elsewhere
     """
     row: RecordTable = values.table_reader(plant).build(table, location, kind=RecordTable)
-    given = dict(
+    input_table = dict(
         values.optional_table(shared, "input", location) if row.input is None else row.input
     )
-    if "file" in given:  # absolute, because the table is also written to other folders
-        given["file"] = str((location.folder / str(given["file"])).resolve())
+    if "file" in input_table:  # absolute, because the table is also written to other folders
+        input_table["file"] = str((location.folder / str(input_table["file"])).resolve())
     recording = _read_recording(row, location, observed, plant) if recording is None else recording
-    kept = (recording["time"] >= row.first) & (recording["time"] <= row.last)
-    if not kept.any():
+    selected = (recording["time"] >= row.first) & (recording["time"] <= row.last)
+    if not selected.any():
         raise ParameterError(
             f"{recording.origin}: no row from first, {row.first:g} s, to last, {row.last:g} s."
         )
-    recording = recording.rows(kept)
+    recording = recording.rows(selected)
     tables = {**shared["plant"], **row.plant}
     in_plant = location.inside("plant")
     plant = build_plant(tables, in_plant) if row.plant else plant
@@ -128,14 +128,14 @@ def build_experiment(
     )
     plant = plant if ambient == plant.ambient else dataclasses.replace(plant, ambient=ambient)
     with ambient_pressure(plant.ambient.pressure):
-        signal = build_input_signal(given, plant.input_variables, location.inside("input"))
+        signal = build_input_signal(input_table, plant.input_variables, location.inside("input"))
         with located_errors(location.inside("input")):
             check_signal(
                 plant, signal, 0.0, max(float(recording["time"][-1]) - row.start_time, 1e-9)
             )
         place = location.inside("initial_state")
         conditions = build_initial_conditions(row.initial_state, plant, recording, place)
-    return Experiment(recording, signal, conditions, row.start_time, plant), given
+    return Experiment(recording, signal, conditions, row.start_time, plant), input_table
 
 
 def _read_recording(
@@ -225,13 +225,13 @@ class DynamicFitSetup(ShortRepr):
         plant = fit.plant(record)
         model = fit.problem.record_models[record]
         assert isinstance(plant, Plant)
-        origins = [each.recording.origin for each in self.experiments]
+        origins = [experiment.recording.origin for experiment in self.experiments]
         note = f"{self.title}: parameters estimated from {', '.join(origins)}."
         known = dict(model.experiment.initial_conditions.known)
         for k in model.unknown_indices:
             if isinstance(what := model.unknowns[k].target, InitialValue):
                 known[what.name] = float(fit.values[k])
-        given = {
+        stated = {
             name
             for c in plant.mechanism.coordinates
             for name in (c.name, c.speed)
@@ -240,7 +240,7 @@ class DynamicFitSetup(ShortRepr):
         start = {
             name: value
             for name, value in known.items()
-            if name in given or name in pressure_names(plant)
+            if name in stated or name in pressure_names(plant)
         }
         run = {
             "duration": float(model.times[-1]) - model.start_time(fit.values),
@@ -252,7 +252,7 @@ class DynamicFitSetup(ShortRepr):
         }
         fitted = {
             "observed": observed,
-            "uncertainty": fit_uncertainty(fit, [each.rms for each in cross]),
+            "uncertainty": fit_uncertainty(fit, [prediction.rms for prediction in cross]),
         }
         return scenario_toml(
             f"{self.title}, {origins[record]}", plant, self.input_tables[record], run, note, fitted

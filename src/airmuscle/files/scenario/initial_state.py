@@ -139,11 +139,18 @@ def _loose_coordinate(
     still = dict.fromkeys(plant.inputs, 0.0)
     for c in coordinates:
         moved = [
-            {each.name: state[each.name] + part * c.nominal * (each is c) for each in coordinates}
+            {
+                coordinate.name: state[coordinate.name] + part * c.nominal * (coordinate is c)
+                for coordinate in coordinates
+            }
             for part in (-LOOSE, 0.0, LOOSE)
         ]
         rates = [plant.rates(plant.state_at(pressure=pressures, **place), still) for place in moved]
-        if all(rate[each.speed] == rates[0][each.speed] for rate in rates for each in coordinates):
+        if all(
+            rate[coordinate.speed] == rates[0][coordinate.speed]
+            for rate in rates
+            for coordinate in coordinates
+        ):
             return c
     return None
 
@@ -165,12 +172,14 @@ def recorded_pressures(plant: Plant, recording: Recording) -> dict[str, float]:
     recorded.
     """
     columns = [name for name in recording if name.rpartition(".")[2] == PRESSURE]
-    found = {}
+    pressures = {}
     for prefix in plant.prefixes:
         muscle = f"{prefix}{PRESSURE}"
-        if own := [name for name in columns if name.startswith(prefix)]:
-            found[muscle] = first_value(recording, muscle if muscle in own else own[0])
-    return found
+        if muscle_columns := [name for name in columns if name.startswith(prefix)]:
+            pressures[muscle] = first_value(
+                recording, muscle if muscle in muscle_columns else muscle_columns[0]
+            )
+    return pressures
 
 
 def _complete(pressures: Mapping[str, float], plant: Plant, location: Location) -> list[float]:

@@ -48,14 +48,14 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
     factors = {}
     for name in models[0].names:
         joint = root_mean_square([fit.rms(name, i) for i in range(len(models))])
-        predicted = [each[name] for each in cross if name in each]
+        predicted = [errors[name] for errors in cross if name in errors]
         error = max([joint, *([root_mean_square(predicted)] if predicted else [])])
         residuals = [fit.residuals(i)[name] for i in range(len(models))]
-        residuals = [each[np.isfinite(each)] for each in residuals]
+        residuals = [series[np.isfinite(series)] for series in residuals]
         deviations[name] = error * _tail_factor(np.concatenate(residuals))
         if len(predicted) > 1:
             noise = root_mean_square(
-                [estimate_noise(each) for each in residuals]
+                [estimate_noise(series) for series in residuals]
             )  # contains no error of the model
             factors[name] = t_quantile(degrees_of_freedom(error, noise, len(predicted)))
     known = {name: value for name, value in deviations.items() if value > 0.0}
@@ -67,7 +67,8 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
     }
     columns = {name: np.concatenate([record[name] for record in records]) for name in deviations}
     ranges = {
-        name: [float(np.nanmin(each)), float(np.nanmax(each))] for name, each in columns.items()
+        name: [float(np.nanmin(column)), float(np.nanmax(column))]
+        for name, column in columns.items()
     }
     return {
         **table,
@@ -93,23 +94,23 @@ def _covariance(fit: DynamicFit) -> dict[str, Any]:
     }
 
 
-def parameter_uncertainty(found: PlantUncertainty) -> ParameterUncertainty:
+def parameter_uncertainty(fitted: PlantUncertainty) -> ParameterUncertainty:
     """Standard errors and correlations of the parameters that have a variance; several paths of one
     are one name.
     """
-    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    errors = np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0))
     known = np.flatnonzero(errors)
-    correlations = found.covariance[np.ix_(known, known)] / np.outer(errors[known], errors[known])
+    correlations = fitted.covariance[np.ix_(known, known)] / np.outer(errors[known], errors[known])
     return ParameterUncertainty(
-        tuple(SEPARATOR.join(found.parameters[i]) for i in known),
+        tuple(SEPARATOR.join(fitted.parameters[i]) for i in known),
         tuple(errors[known].tolist()),
         tuple(map(tuple, np.clip(correlations, -1.0, 1.0).tolist())),
     )
 
 
-def uncertainty_table(found: PlantUncertainty) -> dict[str, Any]:
+def uncertainty_table(fitted: PlantUncertainty) -> dict[str, Any]:
     """The table [uncertainty] of the deviations and of the covariance alone."""
-    return {"deviations": found.deviations, **dataclasses.asdict(parameter_uncertainty(found))}
+    return {"deviations": fitted.deviations, **dataclasses.asdict(parameter_uncertainty(fitted))}
 
 
 def _tail_factor(residuals: Array) -> float:

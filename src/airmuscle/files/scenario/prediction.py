@@ -67,8 +67,8 @@ class PlantModel:
         outputs = {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
         with located_errors(recording.origin):
             headings = [split_unit(heading)[0] for heading in recording]
-            kept = {name: each for name, each in observed.items() if each[1] in headings}
-            recording = with_observed(recording, kept, plant)
+            recorded = {name: column for name, column in observed.items() if column[1] in headings}
+            recording = with_observed(recording, recorded, plant)
             known = observed or [
                 n for kind in PREDICTABLE for n in outputs if n.rpartition(".")[2] == kind
             ]
@@ -81,10 +81,10 @@ class PlantModel:
             initial = pressures | recorded_pressures(plant, recording)
             stated = self.tables["run"].get("initial_state", {})
             for name in (
-                each
+                state_name
                 for c in plant.mechanism.coordinates
-                for each in (c.name, c.speed)
-                if each in stated
+                for state_name in (c.name, c.speed)
+                if state_name in stated
             ):
                 initial[name] = (
                     first_value(recording, name) if name in recording else float(outputs[name])
@@ -196,10 +196,16 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
     left_out = [part for part in UNUSED_PARTS if getattr(entry, part) is not None]
     if left_out and isinstance(law, ForceLaw):
         notes.append(f"left out of the static prediction: {', '.join(left_out)}")
-    own = None if entry.geometry is None else float(entry.geometry.resting_length)
-    if own is not None and length is not None and abs(own - length) > LENGTH_TOLERANCE:
+    entry_length = None if entry.geometry is None else float(entry.geometry.resting_length)
+    if (
+        entry_length is not None
+        and length is not None
+        and abs(entry_length - length) > LENGTH_TOLERANCE
+    ):
         differences.append("another resting length")
-        notes.append(f"the law was scaled from {1e3 * own:.4g} mm to {1e3 * length:.4g} mm")
+        notes.append(
+            f"the law was scaled from {1e3 * entry_length:.4g} mm to {1e3 * length:.4g} mm"
+        )
     half, source, remarks = _band(entry, fitted_quantity_of(law).name, recording)
     limits = entry.error_band
     rates = (
@@ -249,12 +255,14 @@ def _band(entry: Entry, quantity: str, recording: Recording) -> tuple[float | No
     band = entry.error_band
     if band is None or band.quantity != quantity:
         return None, "", []
-    held = band.held_half_width is not None and "contraction" in recording and is_held(recording)
-    own = (band.held_half_width or band.half_width) if held else band.half_width
+    is_static = (
+        band.held_half_width is not None and "contraction" in recording and is_held(recording)
+    )
+    half_width = (band.held_half_width or band.half_width) if is_static else band.half_width
     name = specimen_name(recording)
     length = recording.constants.get("resting_length")
     if not band.specimens or name in band.specimens:
-        return own, band.source, []
+        return half_width, band.source, []
     notes = length_notes(None if length is None else float(length), band.resting_lengths)
     measured = ", ".join(band.specimens[:MAX_NAMES]) + (
         ", ..." if len(band.specimens) > MAX_NAMES else ""
@@ -270,4 +278,4 @@ def _band(entry: Entry, quantity: str, recording: Recording) -> tuple[float | No
     ):
         new *= widening(band.resting_lengths, float(length))
     source = f"for a specimen that was not measured: {band.new_specimen_source}"
-    return max(new, own), source, [f"{which}; the band is that of other specimens", *notes]
+    return max(new, half_width), source, [f"{which}; the band is that of other specimens", *notes]

@@ -141,12 +141,12 @@ class Scenario(ShortRepr):
 
     def select_columns(self, recording: Recording) -> Recording:
         """The recording with time and the columns of the scenario."""
-        kept = {
+        selected = {
             name: recording[name]
             for name in recording
             if not self.columns or name in ("time", *self.columns)
         }
-        return dataclasses.replace(recording, columns=kept)
+        return dataclasses.replace(recording, columns=selected)
 
 
 def load_scenario(path: str | Path) -> Scenario:

@@ -170,11 +170,11 @@ class _ModelSchemas:
                     properties[key] = {"enum": list(_CHOICES[cls, field.name])}
                 else:
                     properties[key] = self.part(hints[field.name])
-        own = [*(["model"] if is_model and model_needed else []), *_required_keys(cls)]
+        required = [*(["model"] if is_model and model_needed else []), *_required_keys(cls)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
         return {
             "description": summary,
-            **_table(properties, [n for n in own if n not in plant_fields(cls)]),
+            **_table(properties, [n for n in required if n not in plant_fields(cls)]),
         }
 
     def number(self, declared: Parameter, hint: Any) -> Schema:
@@ -209,8 +209,8 @@ class _ModelSchemas:
         if reader is initial_state.read_initial_table:
             return _by_name(_quantity("m"))
         if reader is values.read_drivers:
-            each = {"anyOf": [self.kind(Driver), _table({"library": _TEXT}, ("library",))]}
-            return _by_name({"anyOf": [*each["anyOf"], _list_of(each)]})
+            driver = {"anyOf": [self.kind(Driver), _table({"library": _TEXT}, ("library",))]}
+            return _by_name({"anyOf": [*driver["anyOf"], _list_of(driver)]})
         return _by_name(_TEXT)
 
     def muscle(self) -> Schema:
@@ -252,14 +252,14 @@ def _plant(models: _ModelSchemas) -> Schema:
     one.
     """
     plant = models.table(Plant, model_needed=False)
-    each = models.muscle()
+    muscle = models.muscle()
     needed = plant.pop("required")
     plant["properties"]["library"] = {
         "description": "a plant of the library, whose parts are replaced",
         **_TEXT,
     }
     plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
-    plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], _list_of(each)]}
+    plant["properties"]["muscle"] = {"anyOf": [*muscle["anyOf"], _list_of(muscle)]}
     return plant
 
 

@@ -75,18 +75,18 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
         f"{name} {typographic(format_number(value))}"
         for name, value in scenario.initial_state.items()
     )
-    own = {
+    origins = {
         key: "scenario" for key in ("integrator", "initial_state") if key not in scenario.defaults
     }
     tables = [_range_table(scenario, recording)]
     tables.append(parameter_table(scenario.plant, "parameters", "Parameters of the plant"))
     tables += [controller_table(scenario, loop)] if loop else []
     chosen = (
-        ("integrator", str(problem.integrator), own.get("integrator", "default")),
+        ("integrator", str(problem.integrator), origins.get("integrator", "default")),
         (
             "initial state (SI)",
             start,
-            own.get("initial_state", "default: equilibrium at ambient pressure"),
+            origins.get("initial_state", "default: equilibrium at ambient pressure"),
         ),
         ("inputs", describe_input(problem.input), "scenario"),
     )
@@ -115,19 +115,19 @@ def _range_table(scenario: Scenario, recording: Recording) -> Table:
     scales = []
     for name in names:
         quantity = quantity_of(name)
-        own = declared.get(name)
+        declared_unit = declared.get(name)
         factor, unit = display_scale(name)
-        is_usual = quantity is not None and own in (
+        is_usual = quantity is not None and declared_unit in (
             None,
             quantity.unit,
         )  # a unit that a model declares stays
-        scales.append((factor, unit.removesuffix("-")) if is_usual else (1.0, own or ""))
+        scales.append((factor, unit.removesuffix("-")) if is_usual else (1.0, declared_unit or ""))
     values = [factor * recording[name] for name, (factor, _) in zip(names, scales, strict=True)]
     columns: dict[str, Any] = {
         "column": names,
-        "min": TableColumn([float(each.min()) for each in values], BY_ROW),
-        "max": TableColumn([float(each.max()) for each in values], BY_ROW),
-        "last": TableColumn([float(each[-1]) for each in values], BY_ROW),
+        "min": TableColumn([float(column.min()) for column in values], BY_ROW),
+        "max": TableColumn([float(column.max()) for column in values], BY_ROW),
+        "last": TableColumn([float(column[-1]) for column in values], BY_ROW),
         "unit": [unit for _, unit in scales],
     }
     return Table("ranges", "Columns", columns, brief=MAX_BRIEF)
@@ -189,10 +189,11 @@ def describe_input(command: InputSignal | ControlLoop) -> str:
         controller = command.controller
         name = type(controller).__name__
         inputs = ", ".join(controller.inputs)
-        others = command.driven_inputs if command.drivers else command.other_inputs
+        other_inputs = command.driven_inputs if command.drivers else command.other_inputs
         return (
             f"{name}, sample time {command.sample_time:g} s, manipulated inputs {inputs}; set"
-            f" point: {describe_input(command.setpoint)}; other inputs: {describe_input(others)}"
+            f" point: {describe_input(command.setpoint)}; other inputs:"
+            f" {describe_input(other_inputs)}"
         )
     if isinstance(command, WithDrivers):
         chains = (f"{name}: {', '.join(map(str, chain))}" for name, chain in command.chains.items())

@@ -206,15 +206,15 @@ class FitTable:
         """The unknowns of each record: parameters, the start time and initial values, within their
         margins.
         """
-        found: list[RecordUnknown] = list(self.own)
+        unknowns: list[RecordUnknown] = list(self.own)
         if self.start_time is not None:
-            found.append(StartTime(self.start_time))
+            unknowns.append(StartTime(self.start_time))
         for name, within in self.initial_state.items():
-            found += [
-                InitialValue(each, within)
-                for each in (pressure_names(plant) if name == PRESSURE else (name,))
+            unknowns += [
+                InitialValue(state, within)
+                for state in (pressure_names(plant) if name == PRESSURE else (name,))
             ]
-        return tuple(found)
+        return tuple(unknowns)
 
 
 Points = tuple[tuple[float, float], ...]

@@ -212,12 +212,12 @@ def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
     first, *between, last = np.unique(
         np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path])
     ).tolist()
-    kept = [first]
+    spaced = [first]
     distance = float(time[-1]) / (8 * POINTS)
     for instant in between:  # without those that follow another one too closely
-        if instant - kept[-1] >= distance and last - instant >= distance:
-            kept.append(instant)
-    instants = np.array([*kept, last])
+        if instant - spaced[-1] >= distance and last - instant >= distance:
+            spaced.append(instant)
+    instants = np.array([*spaced, last])
     return instants, np.interp(instants, time, pressure), np.interp(instants, time, path)
 
 
@@ -314,7 +314,9 @@ def _signal_table(signal: InputSignal) -> dict[str, Any]:
 
 
 def _drivers(drivers: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: list(each) if isinstance(each, tuple) else each for name, each in drivers.items()}
+    return {
+        name: list(chain) if isinstance(chain, tuple) else chain for name, chain in drivers.items()
+    }
 
 
 def _rows(signals: Mapping[str, Any]) -> dict[str, Any]:
