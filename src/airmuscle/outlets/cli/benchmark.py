@@ -86,7 +86,7 @@ def benchmark(
     """
     joint = request.valves(TRUTH_SEEDS[: request.truths])
     trials = request.trials
-    known = {each.name: each for each in standard_contenders(joint)}
+    known = {contender.name: contender for contender in standard_contenders(joint)}
     names = dict.fromkeys(request.controller)
     for name in names:
         if name not in known and is_path(name):
@@ -94,7 +94,7 @@ def benchmark(
         check_known("there is no controller", name, known, error=InputError)
     contenders = [known[name] for name in names or known]
     tasks = find_tasks(request.task)
-    if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
+    if trials and (trials < 2 or LEARNED not in [contender.name for contender in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
     check_writable(out)
     seeds = range(request.seed, request.seed + request.searches)
@@ -114,7 +114,7 @@ def benchmark(
         )
     curves = []
     if trials:
-        tuned = next(each for each in result.results if each.name == LEARNED)
+        tuned = next(entry for entry in result.results if entry.name == LEARNED)
         curves = [
             learn(
                 result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=request.seed
@@ -122,6 +122,6 @@ def benchmark(
         ]
     chapter = result.chapter(curves)
     deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark")
-    found = [run for each in result.results for run in each.runs.values()]
-    if not any(run.metrics for run in found):
-        raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")
+    runs = [run for entry in result.results for run in entry.runs.values()]
+    if not any(run.metrics for run in runs):
+        raise SimulationError(f"all runs failed; reason of the first: {runs[0].reason}")

@@ -126,7 +126,7 @@ def campaign(
         notes.append("muscle: not written, because it needs a static characteristic")
     if scenarios and not any(scenario.text for scenario in scenarios):
         notes.append(
-            f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}"
+            f"scenarios: not written: {'; '.join(dict.fromkeys(s.reason for s in scenarios))}"
         )
     chapters[0] = dataclasses.replace(
         chapters[0],
@@ -140,13 +140,13 @@ def campaign(
             for r in result.records
             if r.kind.is_static and r.resting_length is not None
         }
-        others = {
+        other_entries = {
             length: _entry(result, length) for length in sorted(lengths - {result.resting_length})
         }
         named_muscles = {
-            f"muscle-{1e3 * length:.0f}mm.toml": to_toml(each)
-            for length, each in others.items()
-            if each
+            f"muscle-{1e3 * length:.0f}mm.toml": to_toml(other_entry)
+            for length, other_entry in other_entries.items()
+            if other_entry
         }
         contents = {"muscle.toml": to_toml(entry), **named_muscles, **contents}
     chapters += reading_chapters(complete)

@@ -145,9 +145,10 @@ class LazyCommands(TyperGroup):
         command = typer.Typer(**SETTINGS)
         command.command(row.name)(function)
         built: Any = typer.main.get_command(command)
-        for each in built.params:
-            if each.param_type_name == "argument":  # no Python type after its name in a help text
-                each.display_type_rich = lambda ctx: ""
+        for parameter in built.params:
+            # a help text shows no Python type after the name of an argument
+            if parameter.param_type_name == "argument":
+                parameter.display_type_rich = lambda ctx: ""
         if row.name in RUN_CODE:
             built.params.append(_allow_code_option())
         return built
@@ -214,7 +215,11 @@ def _allow_code_option() -> Any:
     @bearer.command()
     def bear(allow_code: AllowCode = False) -> None: ...
 
-    (flag,) = (each for each in typer.main.get_command(bearer).params if each.name == "allow_code")
+    (flag,) = (
+        parameter
+        for parameter in typer.main.get_command(bearer).params
+        if parameter.name == "allow_code"
+    )
     flag.expose_value = False
     return flag
 

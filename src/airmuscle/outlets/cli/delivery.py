@@ -40,7 +40,7 @@ def deliver(
     others   files elsewhere that are named with those of the folder
     complete whether nothing remains to be computed, so that the results of tasks are removed
     """
-    worded = [in_words(each, lambda text: in_options(text, command)) for each in chapters]
+    worded = [in_words(chapter, lambda text: in_options(text, command)) for chapter in chapters]
     paths = dict(others or {})
     if out is not None:
         write_result(out, worded, title, files or {})
@@ -63,8 +63,8 @@ def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: b
         return
     if on_one_screen():
         chapters = [
-            replace(each, notes=tuple(text for text in each.notes if text not in warned))
-            for each in chapters
+            replace(chapter, notes=tuple(text for text in chapter.notes if text not in warned))
+            for chapter in chapters
         ]
     echo(
         as_text(

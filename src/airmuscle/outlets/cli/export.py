@@ -171,7 +171,7 @@ def _export_fmu(source: str, out: Path, request: ExportRequest) -> Exported:
     """The FMU of a plant or of its controller, or both as an SSP package, in a folder or as a
     file.
     """
-    platforms = [find_platform(each) for each in dict.fromkeys(request.platforms)]
+    platforms = [find_platform(platform) for platform in dict.fromkeys(request.platforms)]
     fmi = 3 if request.fmi is None else request.fmi
     part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
     suffix = ".ssp" if part == "ssp" else ".fmu"
@@ -230,8 +230,8 @@ def _export_mujoco(source: str, out: Path, request: ExportRequest) -> Exported:
 def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
     """The robot description of a joint or an arm, with the plugins of its muscles."""
     written = WRITERS[request.to](load_scenario(source).plant, out, name=request.name)
-    plugins = [path for each in written.plugins for path in each.files]
-    remarks = list(dict.fromkeys(each.remark for each in written.plugins if each.remark))
+    plugins = [path for plugin in written.plugins for path in plugin.files]
+    remarks = list(dict.fromkeys(plugin.remark for plugin in written.plugins if plugin.remark))
     left = list(written.left_out)
     lines = [f"plugins, source only: {remark}" for remark in remarks]
     lines += [f"left out: {', '.join(left)}"] if left else []

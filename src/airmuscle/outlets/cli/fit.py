@@ -75,11 +75,11 @@ def fit(
     check_writable(out)
     progress = progress_bars("comparison" if request.compare else "fit")
     with execution.executor(out) as executor, progress as show:
-        found = fit_requested(
+        fitted = fit_requested(
             request, files, recordings, lambda _, fraction: show("", fraction), executor
         )
-    muscle = {} if found.refusal else {"muscle.toml": to_toml(found.entry)}
-    deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle)
+    muscle = {} if fitted.refusal else {"muscle.toml": to_toml(fitted.entry)}
+    deliver("fit", fitted.chapters, json=json, out=out, title="Fit", files=muscle)
 
 
 @request
@@ -118,15 +118,25 @@ def fit_volume_command(
     recordings = read_recordings(files, reading)
     points = volume_points(recordings, request.temperature)
     lengths = resting_lengths(recordings)
-    own = getattr(getattr(entry, "geometry", None), "resting_length", None)
-    others = [] if own is None else [each for each in lengths if abs(each - own) > 1e-6]
-    if entry is not None and others:
+    entry_length = getattr(getattr(entry, "geometry", None), "resting_length", None)
+    deviating = (
+        []
+        if entry_length is None
+        else [
+            length_of_data
+            for length_of_data in lengths
+            if abs(length_of_data - entry_length) > 1e-6
+        ]
+    )
+    if entry is not None and deviating:
         raise ParameterError(
-            f"the resting length of the data is {others[0]:.4g} m, that of {entry.name} {own:.4g}"
-            " m. Correct one of them."
+            f"the resting length of the data is {deviating[0]:.4g} m, that of {entry.name}"
+            f" {entry_length:.4g} m. Correct one of them."
         )
     length = (
-        float(own) if own is not None and not lengths else check_one_length(lengths, "a muscle")
+        float(entry_length)
+        if entry_length is not None and not lengths
+        else check_one_length(lengths, "a muscle")
     )
     fit = fit_volume(points, length)
     if entry is None:
@@ -215,22 +225,22 @@ def approximate(
     length = getattr(entry.geometry, "resting_length", None)
     data = grid if length is None else grid.with_constants(resting_length=length)
     initial, _ = find_initial_law(model, [data], request.degree, "MODEL")
-    found = approximate_law(entry.characteristic, initial.characteristic, limits)
-    chapter = found.chapter()
+    approximation = approximate_law(entry.characteristic, initial.characteristic, limits)
+    chapter = approximation.chapter()
     original = type(entry.characteristic).__name__
     if out is not None:
-        note = f"Approximated from {entry.name}: {found.summary}. {entry.note}".strip()
-        other = dataclasses.replace(
+        note = f"Approximated from {entry.name}: {approximation.summary}. {entry.note}".strip()
+        approximated = dataclasses.replace(
             entry,
             name="muscle",
-            title=f"{type(found.model).__name__} in place of {original}: {entry.title}",
+            title=f"{type(approximation.model).__name__} in place of {original}: {entry.title}",
             provenance="fitted",
             note=note,
-            characteristic=found.model,
-            validity_range=found.validity_range,
+            characteristic=approximation.model,
+            validity_range=approximation.validity_range,
             checks=(),
         )
-        save(other, out)
+        save(approximated, out)
     title = f"{entry.name}, {original}, by {chapter.title}"
     print_result(
         [dataclasses.replace(chapter, title=title)], {} if out is None else {"muscle": out}, json

@@ -67,17 +67,17 @@ def fit_dynamic(
     recordings = [experiment.recording for experiment in loaded.experiments]
     notes = row_notes(recordings)
     findings = [
-        f"{each.origin}: {finding.text}"
-        for each in recordings
-        for finding in inspect(each).findings
+        f"{recording.origin}: {finding.text}"
+        for recording in recordings
+        for finding in inspect(recording).findings
     ]
     if not json:
         counts = ((len(loaded.experiments), "record"), (loaded.search.starts, "start"))
-        echo("  " + ", ".join(counted(*each) for each in counts), err=True)
+        echo("  " + ", ".join(counted(*pair) for pair in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
-    fit = fit.with_scatter_of_records([each.common for each in cross])
-    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
+    fit = fit.with_scatter_of_records([prediction.common for prediction in cross])
+    weak = [name for direction in fit.identifiability.undetermined for name, _ in direction.shares]
     wanted = [
         *(weak if WEAK in request.profile else ()),
         *(name for name in request.profile if name != WEAK),

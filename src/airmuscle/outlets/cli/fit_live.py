@@ -88,12 +88,12 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
     limits = ValidityRange(*pressures, request.min_contraction, request.max_contraction)
     if out is not None:
         check_writable(out)
-    given = {
+    stated = {
         name: value
         for name, value in vars(request).items()
         if name in ReadingRequest.__dataclass_fields__
     }
-    reading = ReadingRequest(**given)
+    reading = ReadingRequest(**stated)
     origin = "standard input" if request.follow == "-" else Path(request.follow).name
     reader = RowReader(origin, reading.column_mapping())
     fit = RecursiveFit(
@@ -115,7 +115,7 @@ def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bo
             if fit.samples + fit.outside == 0:
                 for note in reader.notes:
                     echo(f"note: {note}", err=True)
-                if name := next((each for each in QUANTITIES if each not in row), ""):
+                if name := next((quantity for quantity in QUANTITIES if quantity not in row), ""):
                     remedy = " or a length with --resting-length" if name == "contraction" else ""
                     raise ColumnError(
                         f"{reader.origin}: there is no {name}{remedy}; the columns are"

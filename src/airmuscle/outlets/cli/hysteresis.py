@@ -95,25 +95,32 @@ def hysteresis(
     recordings = read_recordings(files, reading)
     entry = None if request.muscle is None else load_law(request.muscle)
     law = None if entry is None else entry.characteristic
-    held = (
+    creep_fit = (
         fit_held_creep(recordings, law=law if isinstance(law, ForceLaw) else None)
         if request.creep
         else None
     )
-    freed = recordings if held is None else free_of_creep(held.elements, recordings)
+    freed = recordings if creep_fit is None else free_of_creep(creep_fit.elements, recordings)
     curve = law if request.use_characteristic else None
     loops = find_loops(freed, law=curve, degree=request.degree, all_rows=request.all_rows)
     check_writable(out)
     progress = None if json else lambda name: echo(f"  {name}", err=True)
     elements = request.elements
-    others = request.friction
-    fits = [fit_loop(loop, elements=elements, others=others, progress=progress) for loop in loops]
+    friction_laws = request.friction
+    fits = [
+        fit_loop(loop, elements=elements, others=friction_laws, progress=progress) for loop in loops
+    ]
     joint = fit_jointly(fits, progress=progress)
     selected = select_friction(fits, joint)
     chapters = hysteresis_chapters(fits, joint)
-    if held is not None:
+    if creep_fit is not None:
         chapters.append(
-            creep_chapter(held.verdict, held.sentences, held.elements, held.standard_errors)
+            creep_chapter(
+                creep_fit.verdict,
+                creep_fit.sentences,
+                creep_fit.elements,
+                creep_fit.standard_errors,
+            )
         )
     notes = [*delay_notes(find_delay(recordings))]
     parts = list[tuple[str, Any, str, str]]()
@@ -123,9 +130,9 @@ def hysteresis(
     else:
         friction, source, verdict = selected
         parts.append(("friction", friction, verdict, f"Friction from {source}"))
-    if held is not None and held.elements.stiffnesses:
-        parts.append(("creep", held.elements, held.verdict, "Creep"))
-    elif held is not None:
+    if creep_fit is not None and creep_fit.elements.stiffnesses:
+        parts.append(("creep", creep_fit.elements, creep_fit.verdict, "Creep"))
+    elif creep_fit is not None:
         notes.append("no creep elements are written")
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
     chapters += reading_chapters(recordings)

@@ -70,8 +70,8 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
         for name, part in parts.items()
         if any(path.startswith(f"{name}.") for path in values)
     }
-    own = getattr(parts.get("characteristic"), "geometry", None)
-    if "characteristic" in changed and own is not None and own == entry.geometry:
+    geometry = getattr(parts.get("characteristic"), "geometry", None)
+    if "characteristic" in changed and geometry is not None and geometry == entry.geometry:
         changed["geometry"] = changed["characteristic"].geometry
     if not isinstance(entry, Entry):
         return dataclasses.replace(entry, **changed)
@@ -139,8 +139,8 @@ def evaluate(
           --contraction "5 %"
       airmuscle evaluate my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
-    found = evaluate_entry(variant.load(name), point.given)
-    chapter = found.chapter()
+    evaluation = evaluate_entry(variant.load(name), point.given)
+    chapter = evaluation.chapter()
     print_result([chapter], {}, json)
     if out is not None:
         write_result(
@@ -148,7 +148,7 @@ def evaluate(
             [],
             "",
             {
-                "isobars.csv": lambda path: save_table(found.isobar_table(), path),
+                "isobars.csv": lambda path: save_table(evaluation.isobar_table(), path),
                 "isobars.png": lambda path: path.write_bytes(
                     rendered_figure(chapter.plots[0])["png"]
                 ),
@@ -156,7 +156,7 @@ def evaluate(
         )
         echo(
             f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'}"
-            f" ({describe_point(found.point)})",
+            f" ({describe_point(evaluation.point)})",
             err=json,
         )
 

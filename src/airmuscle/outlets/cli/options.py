@@ -113,9 +113,9 @@ def with_requests(command: Command) -> Command:
     def expanded(**values: Any) -> None:
         try:
             for name, cls in classes.items():
-                flags = {each.name: flag_of(each) for each in options_of(cls)}
+                flags = {option.name: flag_of(option) for option in options_of(cls)}
                 values[name] = build(
-                    cls, {each: values.pop(each) for each in flags}, flags.__getitem__
+                    cls, {field: values.pop(field) for field in flags}, flags.__getitem__
                 )
             command(**values)
         except RequestError as error:

@@ -77,16 +77,17 @@ def predict(
         loaded = load_plant_model(model)
         margin = request.start_margin
         recordings = read_recordings(measured, reading) if measured else []
-        own: list[Any] = [*request.own, *([] if margin is None else [StartTime(margin)])]
+        unknowns: list[Any] = [*request.own, *([] if margin is None else [StartTime(margin)])]
         predictions = [
-            loaded.predict_recording(each, request.start_time or 0.0, own) for each in recordings
+            loaded.predict_recording(recording, request.start_time or 0.0, unknowns)
+            for recording in recordings
         ]
-        predictions += (each for path in tables for each in loaded.predict_file(path))
+        predictions += (prediction for path in tables for prediction in loaded.predict_file(path))
         thing = loaded.scenario.plant
-    elif given := [
+    elif stated := [
         name for name in ("start_time", "start_margin", "own") if getattr(request, name)
     ]:
-        options = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in stated)
         raise RequestError(f"{options} is for a scenario; MODEL is a muscle or a law")
     else:
         thing = load_law(model)
@@ -99,5 +100,5 @@ def predict(
             predict_with_entry(thing, recording) for recording in read_recordings(files, reading)
         ]
     chapters = prediction_chapters(Path(model).name, thing, predictions)
-    chapters += reading_chapters(each.recording for each in predictions)
+    chapters += reading_chapters(prediction.recording for prediction in predictions)
     deliver("predict", chapters, json=json, out=out, title="Prediction")

@@ -81,9 +81,9 @@ def _print_chapter(chapter: Chapter) -> None:
     for question, answer in chapter.answers:
         text = f"{question} {to_plain(answer)}"
         echo(textwrap.fill(text, terminal_width(), subsequent_indent="  ", break_on_hyphens=False))
-    found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
+    stated = [(kind, statement) for kind in Kind for statement in statements(chapter.claims, kind)]
     values = []
-    for _, s in found:
+    for _, s in stated:
         published = format_published(s.cases[0], with_tolerance=False)
         unit = s.cases[0].unit
         reproduced = (
@@ -95,7 +95,7 @@ def _print_chapter(chapter: Chapter) -> None:
         MIN_CLAIM,
         terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns),
     )
-    texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
+    texts = (f"{PREFIXES[kind]}{to_plain(statement.claim)}" for kind, statement in stated)
     rows = [
         (textwrap.shorten(text, room, placeholder=" …"), *row)
         for text, row in zip(texts, values, strict=True)

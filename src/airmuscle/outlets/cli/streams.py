@@ -110,7 +110,7 @@ def _base_character(decomposition: str) -> str:
     """The character of a decomposition such as "<super> 0032" or "0061 0301" without its accent."""
     codes = [code for code in decomposition.split() if not code.startswith("<")]
     characters = (chr(int(code, 16)) for code in codes)
-    return "".join(each for each in characters if not unicodedata.combining(each))
+    return "".join(character for character in characters if not unicodedata.combining(character))
 
 
 def _replace(error: UnicodeError) -> tuple[str, int]:

@@ -154,7 +154,7 @@ def tune(
     files = {"history.csv": lambda path: save_table(tuning.history.table(), path)}
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
-    others = {"scenario": target}
+    written = {"scenario": target}
     deliver(
         "tune",
         [chapter],
@@ -162,7 +162,7 @@ def tune(
         out=out,
         title="Tuning",
         files=files,
-        others=others,
+        others=written,
         complete=not tuning.interrupted,
     )
     if tuning.interrupted:

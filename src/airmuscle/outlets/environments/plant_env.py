@@ -218,15 +218,15 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
     ) -> None:
         super().__init__(env)
         size = env.observation_space.shape[0]
-        for name, given in {"noise": noise, "resolution": resolution, "delay": delay}.items():
-            values = np.asarray(given, dtype=float)
+        for name, value in {"noise": noise, "resolution": resolution, "delay": delay}.items():
+            values = np.asarray(value, dtype=float)
             if (
                 values.shape not in ((), (size,))
                 or not (np.isfinite(values) & (values >= 0)).all()
                 or delay % 1
             ):
                 raise ParameterError(
-                    f"MeasuredObservations: {name} is {given!r}; give numbers from 0 on, one or"
+                    f"MeasuredObservations: {name} is {value!r}; give numbers from 0 on, one or"
                     f" {size} (delay: one whole number of periods)."
                 )
         self.noise, self.resolution, self.delay = (

@@ -132,7 +132,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
                 raise ParameterError(
                     f"there are {len(seeds)} seeds for {self.num_envs} plants; give one for each."
                 )
-            self._generators = [seeding.np_random(one)[0] for one in seeds]
+            self._generators = [seeding.np_random(plant_seed)[0] for plant_seed in seeds]
             self._drawn[:] = False
         filling = np.arange(
             self.num_envs, self._plants.blocks * self._plants.width
@@ -169,8 +169,10 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         np.multiply(
             self._elapsed, self.task.period, out=self._inputs[:, count], casting="same_kind"
         )
-        given = self._inputs[:, :count].astype(float)
-        effort = self.task.effort_weight * (np.einsum("ij,ij->i", given, given) / count)
+        held_actions = self._inputs[:, :count].astype(float)
+        effort = self.task.effort_weight * (
+            np.einsum("ij,ij->i", held_actions, held_actions) / count
+        )
         self._plants.inputs[...] = self._given.transpose(0, 2, 1)
         self._plants.advance(self._steps)
         anew = np.flatnonzero(self._over)
@@ -312,8 +314,8 @@ def roll_out(
     seeds = range(seed, seed + episodes)
     blocks = [seeds[i : i + EPISODES_OF_A_TASK] for i in range(0, episodes, EPISODES_OF_A_TASK)]
     with process_pool(workers) as executor:
-        found = DistributedCalls(executor, _run_episodes, common).results(blocks)
-    return Rollouts(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+        rollouts = DistributedCalls(executor, _run_episodes, common).results(blocks)
+    return Rollouts(*(np.concatenate(columns) for columns in zip(*rollouts, strict=True)))
 
 
 def _run_episodes(common: tuple[Any, ...], seeds: range) -> tuple[npt.NDArray[Any], ...]:

@@ -153,8 +153,12 @@ class FitUncertainty(ShortRepr, Randomisation):
     def values(self, nominal: Array, uniform: Array) -> Array:
         from scipy.special import ndtri
 
-        found = self.uncertainty
-        fitted = parameter_uncertainty(found) if isinstance(found, PlantUncertainty) else found
+        uncertainty = self.uncertainty
+        fitted = (
+            parameter_uncertainty(uncertainty)
+            if isinstance(uncertainty, PlantUncertainty)
+            else uncertainty
+        )
         draws = fitted.deviations(ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)))
         return np.asarray(nominal + np.repeat(draws, [len(group) for group in self.groups], axis=1))
 

@@ -126,9 +126,9 @@ class EnvironmentTask(System):
         known = {i.name: i for i in self.plant.input_variables}
         actions = []
         for name, variable in known.items():
-            prefix, dot, own = name.rpartition(".")
+            prefix, dot, valve_name = name.rpartition(".")
             fill, discharge = (known.get(f"{prefix}{dot}{valve}") for valve in (_FILL, _DISCHARGE))
-            if own not in (_FILL, _DISCHARGE) or fill is None or discharge is None:
+            if valve_name not in (_FILL, _DISCHARGE) or fill is None or discharge is None:
                 actions.append(
                     Action(
                         name, f"{variable.meaning}; -1 is its minimum, 1 its maximum", (variable,)
@@ -167,7 +167,7 @@ class EnvironmentTask(System):
     def _commands(self, inputs: Mapping[str, Value]) -> dict[str, Value]:
         """All inputs of the plant from the actions by name."""
         commands = (action.commands(inputs[f"action.{action.name}"]) for action in self.actions)
-        return dict(itertools.chain.from_iterable(each.items() for each in commands))
+        return dict(itertools.chain.from_iterable(command.items() for command in commands))
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The observations by name, clipped, then the reward, then 1 where the episode ends, else

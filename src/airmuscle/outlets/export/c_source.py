@@ -51,8 +51,8 @@ def c_files(
     fields |= {"c": "c", "nominal": f"{name}_nominal"} | {key: key.upper() for key in TABLEAU}
     lengths = {
         size: f"{upper}_{size}{'' if size in {'STATES', 'STAGES'} else ' + 1'}"
-        for each in SHAPES.values()
-        for size in each
+        for shape in SHAPES.values()
+        for size in shape
     }
     solver = solver_text(CKernels(shapes, f"{name}_"), integrator, fields, lengths)
     functions, sizes = system.printed(
@@ -78,11 +78,12 @@ def c_files(
         "functions": functions,
         **{key: str(number) for key, number in numbers.items()},
         "enumerations": "".join(
-            _enumeration(f"{name}_{kind}", each) for kind, each in names.items() if each
+            _enumeration(f"{name}_{kind}", texts) for kind, texts in names.items() if texts
         ),
-        **{f"{kind}_names": c_strings(each) for kind, each in names.items()},
+        **{f"{kind}_names": c_strings(texts) for kind, texts in names.items()},
         **{
-            f"{kind}_units": c_strings(units[word] for word in each) for kind, each in names.items()
+            f"{kind}_units": c_strings(units[word] for word in texts)
+            for kind, texts in names.items()
         },
         "defaults": c_values(system.defaults, 1),
         "nominal": c_values(system.compiled.nominal),
@@ -157,7 +158,7 @@ def main_program(program: ExportedRun) -> str:
     }
     if loop is None:
         every = program.system.known.column_names
-        places["columns_at"] = ", ".join(str(every.index(each)) for each in columns)
+        places["columns_at"] = ", ".join(str(every.index(column)) for column in columns)
     else:
         known = program.system.known
         table = loop.drivers

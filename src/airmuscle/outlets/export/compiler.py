@@ -157,7 +157,7 @@ def build_and_run(sources: Sequence[Path], processor: Processor | None = None) -
             )
         ]
     else:
-        for name in (each for each in (COMPILER, EMULATOR) if shutil.which(each) is None):
+        for name in (tool for tool in (COMPILER, EMULATOR) if shutil.which(tool) is None):
             raise ParameterError(
                 f"{name} was not found. The sources are in {place}; to compile and run them for a"
                 f" microcontroller install the packages {PACKAGES} (names of Debian)."

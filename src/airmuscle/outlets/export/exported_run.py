@@ -100,20 +100,22 @@ def solver_text(
         arrays = table, np.array(weights), np.array([0.0, *map(sum, rows)])
         constants |= {"FIRST_STEP": integrator.step, "CLOSE": 1e-9 * integrator.step}
         constants |= {
-            key.upper(): each
-            for key, each in zip(TABLEAU, arrays, strict=True)
+            key.upper(): array
+            for key, array in zip(TABLEAU, arrays, strict=True)
             if key in step.arguments
         }
     places = {"steps": printer.printed(kernels)}
     for name, known, results in (("single_step", STEP, RESULTS), ("state_between", BETWEEN, ())):
         kernel = kernels[name]
-        given = {key: fields[field] for key, field in known.items()}
-        own = [key for key in kernel.arguments if key in SHAPES and key not in {*given, "between"}]
+        texts = {key: fields[field] for key, field in known.items()}
+        workspace = [
+            key for key in kernel.arguments if key in SHAPES and key not in {*texts, "between"}
+        ]
         places[f"{name}_work"] = printer.workspace(
-            {key: [sizes[size] for size in SHAPES[key]] for key in own}
+            {key: [sizes[size] for size in SHAPES[key]] for key in workspace}
         )
         places[name] = printer.bound_call(
-            kernel, given | {key: f"{work}{key}" for key in own}, results
+            kernel, texts | {key: f"{work}{key}" for key in workspace}, results
         )
     return SolverText(places, constants, "jac" in step.called)
 
@@ -233,11 +235,13 @@ def export_loop(
             " sample time."
         )
     near = CLOSE * loop.sample_time
-    others = snapped(loop.other_inputs, prepared.input_names, prepared.instants, near).as_floats()
-    others.values[:, prepared.commanded] = others.slopes[:, prepared.commanded] = 0.0
+    other_inputs = snapped(
+        loop.other_inputs, prepared.input_names, prepared.instants, near
+    ).as_floats()
+    other_inputs.values[:, prepared.commanded] = other_inputs.slopes[:, prepared.commanded] = 0.0
     printed = print_controller(prepared, name, title, tunable)
     drivers = DriverTable(prepared, loop.init(problem.start_time), capacity)
-    return ExportedLoop(printed, prepared, others, drivers, capacity)
+    return ExportedLoop(printed, prepared, other_inputs, drivers, capacity)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -36,7 +36,7 @@ def xml_text(root: Element) -> str:
 
 def _kind(v: Variable) -> dict[str, str]:
     """Attributes of a variable that state what it is."""
-    given = {
+    attributes = {
         "name": v.name,
         "valueReference": str(v.reference),
         "causality": v.causality,
@@ -44,7 +44,7 @@ def _kind(v: Variable) -> dict[str, str]:
         "initial": v.initial,
         "description": v.description,
     }
-    return {key: text for key, text in given.items() if text}
+    return {key: text for key, text in attributes.items() if text}
 
 
 def _numbers(v: Variable) -> dict[str, str]:
@@ -199,9 +199,9 @@ class FmuPackage:
                 known = " ".join(
                     str(first + k) for k in sorted(self.dependencies.get(reference, ()))
                 )
-                given = {} if element == "InitialUnknown" else {"dependencies": known}
-                SubElement(parent, "Unknown" if fmi == 2 else element, {**place, **given})
-        for v in (each for each in self.variables if fmi == 3 and each.is_indicator):
+                dependencies = {} if element == "InitialUnknown" else {"dependencies": known}
+                SubElement(parent, "Unknown" if fmi == 2 else element, {**place, **dependencies})
+        for v in (variable for variable in self.variables if fmi == 3 and variable.is_indicator):
             SubElement(structure, "EventIndicator", valueReference=str(v.reference))
 
     def _units(self, fmi: int) -> tuple[str, ...]:
@@ -319,7 +319,7 @@ def token_of(*content: object) -> str:
     """The text that an importer passes on, so that description and binary belong together: a hash
     of the content.
     """
-    return f"{{{hashlib.sha256(json.dumps([str(each) for each in content]).encode()).hexdigest()[:32]}}}"  # noqa: E501
+    return f"{{{hashlib.sha256(json.dumps([str(part) for part in content]).encode()).hexdigest()[:32]}}}"  # noqa: E501
 
 
 def archive(files: Mapping[str, bytes], first: str) -> bytes:

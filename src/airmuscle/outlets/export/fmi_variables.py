@@ -111,16 +111,18 @@ def make_variables(
     units = program.system.units
     known = program.system.compiled.system
     for state, start in zip(known.states, program.problem.initial_vector.tolist(), strict=True):
-        given = {"unit": state.unit, "nominal": state.nominal}
-        variables.add(state.name, "output", state.meaning, initial="exact", start=start, **given)
+        facts = {"unit": state.unit, "nominal": state.nominal}
+        variables.add(state.name, "output", state.meaning, initial="exact", start=start, **facts)
     for i, state in enumerate(known.states, 1):
         name = f"der({state.name})"
         about = f"derivative of {state.name}"
         unit = per_second(state.unit)
         variables.add(name, "local", about, initial="calculated", unit=unit, derivative_of=i)
-    for each, start in zip(known.input_variables, program.first_inputs, strict=True):
-        limits = {"minimum": each.minimum, "maximum": each.maximum}
-        variables.add(each.name, "input", each.meaning, start=start, unit=each.unit, **limits)
+    for variable, start in zip(known.input_variables, program.first_inputs, strict=True):
+        limits = {"minimum": variable.minimum, "maximum": variable.maximum}
+        variables.add(
+            variable.name, "input", variable.meaning, start=start, unit=variable.unit, **limits
+        )
     for name in program.system.known.output_names:
         variables.add(name, "output", meaning_of(name), initial="calculated", unit=units[name])
     variables.add_parameters(program.system.tunable)

@@ -158,15 +158,15 @@ def _start_pressures(program: ExportedRun, derivatives: Partials) -> StartPressu
     names = known.output_names
     state = dict(zip(states, program.problem.initial_vector.tolist(), strict=True))
     outputs = system.outputs(state, dict(zip(known.input_names, program.first_inputs, strict=True)))
-    found: StartPressures = {}
+    pressures: StartPressures = {}
     for prefix in plant.prefixes if isinstance(plant, Plant) else ():
         column = f"{prefix}pressure"
         mass = f"{prefix}air_mass"
         if column in names and mass in states:
             place = len(states) + names.index(column), states.index(mass)
             if place in derivatives.places:
-                found[column] = float(outputs[column]), *place
-    return found
+                pressures[column] = float(outputs[column]), *place
+    return pressures
 
 
 def _instance(
@@ -234,14 +234,14 @@ def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, fl
                 limits.append(
                     (columns.index(limit.column), low - slack, high + slack, describe_limit(limit))
                 )
-    for given in getattr(system, "input_variables", ()):
-        slack = 1e-9 * (given.maximum - given.minimum)
-        unit = f" {given.unit}" if has_unit(given.unit) else ""
+    for variable in getattr(system, "input_variables", ()):
+        slack = 1e-9 * (variable.maximum - variable.minimum)
+        unit = f" {variable.unit}" if has_unit(variable.unit) else ""
         text = (
-            f"the input {given.name} is limited to its range, {given.minimum:.4g} to"
-            f" {given.maximum:.4g}{unit}"
+            f"the input {variable.name} is limited to its range, {variable.minimum:.4g} to"
+            f" {variable.maximum:.4g}{unit}"
         )
         limits.append(
-            (columns.index(given.name), given.minimum - slack, given.maximum + slack, text)
+            (columns.index(variable.name), variable.minimum - slack, variable.maximum + slack, text)
         )
     return limits

@@ -116,9 +116,9 @@ def _variables(
         )
     for command, (low, high) in zip(law.inputs, printed.ranges, strict=True):
         about = f"command of {command}, held for {prepared.loop.sample_time:g} s"
-        given = {"minimum": low, "maximum": high, "unit": units.get(command, "")}
+        facts = {"minimum": low, "maximum": high, "unit": units.get(command, "")}
         variables.add(
-            command, "output", about, variability="discrete", initial="calculated", **given
+            command, "output", about, variability="discrete", initial="calculated", **facts
         )
     variables.add_parameters(printed.tunable)
     return variables.checked()

@@ -71,16 +71,16 @@ def make_identifier(name: str) -> str:
     return make_identifiers([name])[0]
 
 
-def program_name(given: str, title: str) -> str:
+def program_name(stated: str, title: str) -> str:
     """The name of a program that the user has given, or else one from a title, in lower case.
     Raises ParameterError, with a name that is possible, if the given one is not an identifier."""
-    if given and make_identifier(given) != given:
+    if stated and make_identifier(stated) != stated:
         raise ParameterError(
-            f"'{given[:80]}' cannot be the name of an exported program: it must consist of ASCII"
+            f"'{stated[:80]}' cannot be the name of an exported program: it must consist of ASCII"
             " letters, digits and single underscores, begin with a letter, and be no keyword. Use"
-            f" '{make_identifier(given)}'."
+            f" '{make_identifier(stated)}'."
         )
-    return given or make_identifier(make_identifier(title).lower())
+    return stated or make_identifier(make_identifier(title).lower())
 
 
 def _word(name: str) -> str:

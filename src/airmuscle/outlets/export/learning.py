@@ -68,7 +68,8 @@ def _model(
     number = np.float32 if single else np.float64
     shapes = {"state": (len(model.part.states), "count"), "dt": ()}
     nodes = [
-        helper.make_node(operator, list(given), [result]) for operator, given, result in graph.nodes
+        helper.make_node(operator, list(operands), [result])
+        for operator, operands, result in graph.nodes
     ]
     row = next(name for name in inputs if name not in shapes)
     nodes.append(helper.make_node("Shape", [row], ["count"]))
@@ -101,18 +102,20 @@ def _model(
         "first_axis": np.zeros(1, np.int64),
         **({} if tunable else {"parameters": defaults}),
     }
-    given = [
+    inputs_of_graph = [
         helper.make_tensor_value_info(name, kind, shapes.get(name, ("count",))) for name in inputs
     ]
     if tunable:
-        given.append(helper.make_tensor_value_info("parameters", kind, (len(defaults), "width")))
+        inputs_of_graph.append(
+            helper.make_tensor_value_info("parameters", kind, (len(defaults), "width"))
+        )
     stored = [
         onnx.numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()
     ]
-    whole = helper.make_graph(nodes, "actuator", given, outputs, stored)
+    graph_proto = helper.make_graph(nodes, "actuator", inputs_of_graph, outputs, stored)
     opset = [helper.make_opsetid("", OPSET)]
     made = helper.make_model(
-        whole, opset_imports=opset, ir_version=IR_VERSION, producer_name="airmuscle"
+        graph_proto, opset_imports=opset, ir_version=IR_VERSION, producer_name="airmuscle"
     )
     onnx.checker.check_model(made)
     return made
@@ -145,7 +148,7 @@ class ExportedActuator:
         """The filled templates, by the ends of the names of their files."""
         model = self.model
         low, high = control_range(self.model.controls)
-        functions, held = model.print_functions(language)
+        functions, held_count = model.print_functions(language)
         controls = model.controls
         command = f"{controls[0].name}: {controls[0].meaning}" if controls else "without effect"
         if len(controls) == 2:
@@ -159,7 +162,7 @@ class ExportedActuator:
             "class": "".join(word[:1].upper() + word[1:] for word in self.name.split("_")),
             "file": self.name,
             "functions": functions,
-            "held": str(max(held, 1)),
+            "held": str(max(held_count, 1)),
             "unit": controls[0].unit if controls else "1",
             "command": command,
             "length": repr(float(model.part.resting_lengths[0])),
@@ -175,8 +178,8 @@ class ExportedActuator:
             "spread": _tuple(tuple(row) for row in self.root.tolist()),
         }
         return {
-            f"{self.name}{end}.py": filled(f"{each}_actuator.pyt", places, self.name)
-            for end, each in templates.items()
+            f"{self.name}{end}.py": filled(f"{stack}_actuator.pyt", places, self.name)
+            for end, stack in templates.items()
         }
 
 
@@ -248,7 +251,7 @@ class OnnxStack(Stack):
         observed = step.results["o"]
         valid = step.node("Greater", observed[2], step.constant(0.5))
         rows_out = {"tension": observed[0], "pressure": observed[1], "valid": valid}
-        given = ("state", *driven, "dt")
+        stepped = ("state", *driven, "dt")
         low, high = control_range(model.controls)
         facts = {
             "title": actuator.title,
@@ -263,12 +266,12 @@ class OnnxStack(Stack):
                 onnx, start, model, single, self.tunable, begun, {"state": "x"}, {}
             ),
             f"{name}.onnx": _model(
-                onnx, step, model, single, self.tunable, given, {"next_state": "x"}, rows_out
+                onnx, step, model, single, self.tunable, stepped, {"next_state": "x"}, rows_out
             ),
         }
-        for each in models.values():
-            onnx.helper.set_model_props(each, facts)
-        return {file: each.SerializeToString() for file, each in models.items()}
+        for model_proto in models.values():
+            onnx.helper.set_model_props(model_proto, facts)
+        return {file: model_proto.SerializeToString() for file, model_proto in models.items()}
 
 
 def write_actuator(
@@ -330,4 +333,4 @@ def regulated_plant(muscle: Muscle) -> Plant:
 
 def _tuple(values: Any) -> str:
     """A tuple as text of Python."""
-    return re.sub(r"-?\binf\b", lambda found: f'float("{found[0]}")', repr(tuple(values)))
+    return re.sub(r"-?\binf\b", lambda match: f'float("{match[0]}")', repr(tuple(values)))

@@ -53,10 +53,10 @@ class Modelica(TextLanguage):
 
     def call(self, function: str, x: Sequence[str]) -> str:
         if function == "pow":
-            whole = _WHOLE.fullmatch(x[1])
+            integer = _WHOLE.fullmatch(x[1])
             return (
-                f"{x[0]} ^ {whole[1]}"
-                if whole
+                f"{x[0]} ^ {integer[1]}"
+                if integer
                 else f"noEvent(if {x[0]} > 0.0 then {x[0]} ^ {x[1]} else 0.0)"
             )
         value = f"{function}({x[0]})"

@@ -150,10 +150,10 @@ class MuscleActuator(ShortRepr):
             int(model.plugin_attradr[int(model.actuator_plugin[which])]) :
         ].tobytes()
         texts = raw.split(b"\0")[: len(attributes)]
-        given = {path: text.decode() for path, text in zip(attributes, texts, strict=True) if text}
-        values = [float(given.get(path, value)) for path, value in self.parameters.items()]
+        stated = {path: text.decode() for path, text in zip(attributes, texts, strict=True) if text}
+        values = [float(stated.get(path, value)) for path, value in self.parameters.items()]
         plant = with_parameters(self.plant, values)
-        rest = float(given.get(REST_LENGTH, plant.muscles[0].geometry.resting_length))
+        rest = float(stated.get(REST_LENGTH, plant.muscles[0].geometry.resting_length))
         shortening = rest - float(data.actuator_length[which])
         state = open_plant(plant, (shortening,)).state_at(pressure=pressure)
         first = int(model.actuator_actadr[which])
@@ -189,17 +189,17 @@ def write_mujoco_plugin(
     )  # mass set by MuJoCo
     paths = [leaf.path for leaf in system.tunable]
     states = system.known.state_names
-    own = [leaf.path for leaf in leaves(part)]
+    part_paths = [leaf.path for leaf in leaves(part)]
     places = [*(system.known.input_names.index(i.name) for i in controls), -1, -1]
     values = {
         "provenance": block_comment(lines),
         "name": f"airmuscle.{program}",
         "file": program,
-        "attribute_names": c_strings([*own, REST_LENGTH]),
-        "places": c_integers([paths.index(path) for path in own]),
+        "attribute_names": c_strings([*part_paths, REST_LENGTH]),
+        "places": c_integers([paths.index(path) for path in part_paths]),
         "own_states": c_integers([states.index(state.name) for state in part.states]),
         "rest_length": c_number(part.muscles[0].geometry.resting_length),
-        "attributes": str(len(own) + 1),
+        "attributes": str(len(part_paths) + 1),
         "first": str(places[0]),
         "second": str(places[1]),
     }

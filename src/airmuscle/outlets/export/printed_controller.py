@@ -83,7 +83,9 @@ class PrintedController:
             [f"{self.name}_{kind}_{word}".upper() + f" = {i}" for i, word in row]
             for kind, row in rows.items()
         ]
-        enumerations = "".join(f"enum {{ {', '.join(each)} }};\n" for each in words)
+        enumerations = "".join(
+            f"enum {{ {', '.join(words_of_kind)} }};\n" for words_of_kind in words
+        )
         return counts | {
             "provenance": block_comment(self.provenance),
             "file": self.name,
@@ -116,7 +118,7 @@ class PrintedController:
             "command": law.inputs,
             "later": [f"next {name}" for name in law.initial_memory],
         }
-        rows = {array: [(name, "", "") for name in each] for array, each in names.items()}
+        rows = {array: [(name, "", "") for name in signals] for array, signals in names.items()}
         of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
         labels = make_labels({**rows, "parameters": of_law})
         printer = Printer(dataclasses.replace(language, labels=labels))  # type: ignore[type-var]
@@ -213,13 +215,13 @@ class PrintedController:
         rows = []
         names = list(self.inputs)
         for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
-            given = {
+            arrays = {
                 "measurement": measurement,
                 "setpoint": setpoint,
                 "memory": memory,
                 "parameters": parameters,
             }
-            body = InterpretedBody(given, single)
+            body = InterpretedBody(arrays, single)
             values = emission.computed(body, code, names)
             for (output, index), value in values.items():
                 body.store(list(self.outputs)[output], index, value)
@@ -290,7 +292,7 @@ def print_controller(
         for i, leaf in enumerate(known)
     ]
     ranges = [prepared.ranges[n] for n in law.inputs]
-    low, high = ([each[k] for each in ranges] for k in (0, 1))
+    low, high = ([limits[k] for limits in ranges] for k in (0, 1))
     old = [*sample.sample_time, *sample.minimum, *sample.maximum, *sample.parameters]
     new = [loop.sample_time, *low, *high, *parameters]
     results = nodes.replaced([*sample.commands, *sample.later], old, new)

@@ -78,13 +78,15 @@ def _joint_model(mechanism: AntagonisticJoint) -> RobotModel:
         0.5 * joint.inertia * STANDARD_GRAVITY / joint.weight_torque if joint.weight_torque else 0.0
     )
     mass = joint.weight_torque / (STANDARD_GRAVITY * distance) if distance else 1.0
-    own = joint.inertia - mass * distance**2
+    central_inertia = joint.inertia - mass * distance**2
     centre = (
         distance * math.sin(joint.weight_angle),
         0.0,
         -distance * math.cos(joint.weight_angle),
     )
-    link = SpatialLink((0, -1, 0), (0.0, 0.0, 0.0), mass, centre, own, 0.0, joint.damping)
+    link = SpatialLink(
+        (0, -1, 0), (0.0, 0.0, 0.0), mass, centre, central_inertia, 0.0, joint.damping
+    )
     routes = [
         MuscleRoute((1,), (sign * joint.radius,), joint.offset, (joint.profile,))
         for sign in (1.0, -1.0)
@@ -100,8 +102,8 @@ def _planar_model(mechanism: PlanarArm) -> RobotModel:
         tip = mechanism.payload if number == len(mechanism.links) else 0.0
         mass = link.mass + tip
         centre = (link.mass * link.centre + tip * link.length) / mass
-        own = link.inertia + link.mass * (link.centre - centre) ** 2
-        inertia = own + tip * (link.length - centre) ** 2  # parallel axes
+        link_inertia = link.inertia + link.mass * (link.centre - centre) ** 2
+        inertia = link_inertia + tip * (link.length - centre) ** 2  # parallel axes
         position = (0.0, 0.0, -before)
         at = (0.0, 0.0, -centre)
         links.append(
@@ -125,15 +127,19 @@ def _stick_slip_model(mechanism: WithStickSlip) -> RobotModel:
     elements = mechanism.elements
     shares = {
         "the friction by the tensions of the muscles": any(
-            any(each.load_arms) for each in elements
+            any(element.load_arms) for element in elements
         ),
-        "the friction by the load of a bearing": any(any(each.bearing_arms) for each in elements),
-        "stiction above the friction in sliding": any(each.static_excess for each in elements),
+        "the friction by the load of a bearing": any(
+            any(element.bearing_arms) for element in elements
+        ),
+        "stiction above the friction in sliding": any(
+            element.static_excess for element in elements
+        ),
         "the residual law": mechanism.residual is not None,
     }
     left_out = tuple(text for text, has in shares.items() if has)
     return dataclasses.replace(
-        inner, frictions=[each.coulomb_torque for each in elements], left_out=left_out
+        inner, frictions=[element.coulomb_torque for element in elements], left_out=left_out
     )
 
 
@@ -175,10 +181,10 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     ET.SubElement(root, "option", gravity=f"0 0 {-robot.gravity!r}")
     extension = ET.SubElement(root, "extension")
     body = ET.SubElement(root, "worldbody")
-    for number, each in enumerate(
+    for number, link_facts in enumerate(
         zip(robot.joints, robot.links, robot.frictions, strict=True), start=1
     ):
-        body = _mjcf_body(body, f"link{number}", *each)
+        body = _mjcf_body(body, f"link{number}", *link_facts)
     tendons = ET.SubElement(root, "tendon")
     actuators = ET.SubElement(root, "actuator")
     states: list[float] = []

@@ -150,7 +150,7 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
         second = -second
     # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower
     # limit of the force.
-    known = nodes.logical_and(*(nodes.logical_or(each >= 0, each < 0) for each in x))
+    known = nodes.logical_and(*(nodes.logical_or(argument >= 0, argument < 0) for argument in x))
     values = [nodes.where(known, result, x[0] + x[1]) for result in (value, first, second)]
     lines = provenance(title, law)
     return PrintedLaw(name, arguments, results, x, parameters, values, tuple(leaves(law)), lines)
@@ -375,18 +375,18 @@ def _simulation(
         return filled(f"simulate.{suffix}", places, name)
     driven = len(loop.drivers.kinds) > 0
     first = template("ulp.mjs") if driven and suffix == "mjs" else ""
-    own = {
-        each: template(f"{each}.{suffix}") if driven else ""
-        for each in ("driver_arrays", "apply_drivers")
+    driver_texts = {
+        name: template(f"{name}.{suffix}") if driven else ""
+        for name in ("driver_arrays", "apply_drivers")
     }
-    own["kernels"] = f"{first}{kernels.text('driven_inputs', loop.kernels)}"
-    return filled(f"loop.{suffix}", {**places, **own}, name)
+    driver_texts["kernels"] = f"{first}{kernels.text('driven_inputs', loop.kernels)}"
+    return filled(f"loop.{suffix}", {**places, **driver_texts}, name)
 
 
 def _fields(name: str, value: Any) -> str:
     """Assignments of a value to a field, of those of a dictionary to its fields."""
     if isinstance(value, dict):
-        return "".join(_fields(f"{name}.{key}", each) for key, each in value.items())
+        return "".join(_fields(f"{name}.{key}", item) for key, item in value.items())
     text = (
         m_strings(value)
         if isinstance(value, tuple)

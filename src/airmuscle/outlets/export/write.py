@@ -126,8 +126,8 @@ class PrintedPredictive(PrintedController):
             sample = plain_kernels("predictive")["predictive_sample"]
             known = {**law.arrays(), **self._given}
             arrays = {
-                name: each if each.dtype == np.int64 else each.astype(np.float32)
-                for name, each in known.items()
+                name: array if array.dtype == np.int64 else array.astype(np.float32)
+                for name, array in known.items()
             }
             at = law.model.measured.astype(np.float32)
             to = law.model.controlled.astype(np.float32)

@@ -171,8 +171,10 @@ def request(cls: type[T]) -> type[T]:
 def options_of(cls: Any) -> tuple[Option, ...]:
     """The declared fields of a request, in order."""
     hints = type_hints(cls)
-    found = []
-    for field in (each for each in dataclasses.fields(cls) if _KEY in each.metadata):
+    options = []
+    for field in dataclasses.fields(cls):
+        if _KEY not in field.metadata:
+            continue
         declared = dict(field.metadata[_KEY])
         hint = hints[field.name]
         default = declared.pop("default")
@@ -180,7 +182,7 @@ def options_of(cls: Any) -> tuple[Option, ...]:
         repeated = item_type(hint)
         kinds = alternatives(hint) if repeated is None else (repeated,)
         kind = next(kind for kind in kinds if kind is not type(None))
-        found.append(
+        options.append(
             Option(
                 field.name,
                 kind if kind in (bool, int, float, str, Path) else str,
@@ -190,7 +192,7 @@ def options_of(cls: Any) -> tuple[Option, ...]:
                 **declared,
             )
         )
-    return tuple(found)
+    return tuple(options)
 
 
 def form_fields(cls: type[Any]) -> list[dict[str, Any]]:
@@ -199,12 +201,12 @@ def form_fields(cls: type[Any]) -> list[dict[str, Any]]:
     names = ("name", "label", "hint", "example", "filled")
     return [
         {
-            **{name: getattr(each, name) for name in names},
-            "offered": list(map(list, each.offered)),
-            "mark": YES if each.kind is bool else "",
+            **{name: getattr(option, name) for name in names},
+            "offered": list(map(list, option.offered)),
+            "mark": YES if option.kind is bool else "",
         }
-        for each in options_of(cls)
-        if each.label
+        for option in options_of(cls)
+        if option.label
     ]
 
 
@@ -215,19 +217,19 @@ def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
     Raises InputError, with the name of the field in the words of the outlet.
     """
     values: dict[str, Any] = {}
-    for each in options_of(cls):
-        value = given.get(each.name)
-        if value is None or value in ((), []) or (value == "" and not each.empty):
-            if each.needed:
-                demand = "give a number with its unit" if each.unit else "give it"
-                raise RequestError(f"{where(each.name)} is missing; {demand}.", each.name)
+    for option in options_of(cls):
+        value = given.get(option.name)
+        if value is None or value in ((), []) or (value == "" and not option.empty):
+            if option.needed:
+                demand = "give a number with its unit" if option.unit else "give it"
+                raise RequestError(f"{where(option.name)} is missing; {demand}.", option.name)
             continue
-        label = where(each.name)
-        if each.repeated:
+        label = where(option.name)
+        if option.repeated:
             value = re.split(r"[,;\s]+", value.strip(",; \n")) if isinstance(value, str) else value
-            values[each.name] = tuple(each.convert(item, label) for item in value)
+            values[option.name] = tuple(option.convert(item, label) for item in value)
         else:
-            values[each.name] = each.convert(value, label)
+            values[option.name] = option.convert(value, label)
     made = cls(**values)
     if hasattr(made, "check"):
         made.check(where)

@@ -101,7 +101,7 @@ def _fit_named(
     start = with_braid(initial, request.braid, recordings)
     law = start.characteristic
     fixed = (*request.fix, *scaling)
-    found = fit(
+    fitted = fit(
         law,
         recordings,
         loss=request.loss(fitted_quantity_of(law).unit),
@@ -109,14 +109,14 @@ def _fit_named(
         censoring=UNCENSORED if request.uncensored else None,
         sigma=1.0 if request.equal_weights else None,
     )
-    errors = specimen_errors(found, recordings, fixed)
-    entry = fitted_entry(found, start, names, recordings=recordings, errors=errors)
-    entry, chapters, notes = _more(request, found, entry, recordings, progress, workers)
+    errors = specimen_errors(fitted, recordings, fixed)
+    entry = fitted_entry(fitted, start, names, recordings=recordings, errors=errors)
+    entry, chapters, notes = _more(request, fitted, entry, recordings, progress, workers)
     odd = odd_specimen_notes(errors)
     chapter = fit_chapter(
-        found, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings)
+        fitted, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings)
     )
-    return FittedMuscle(found, entry, [chapter, *chapters], odd)
+    return FittedMuscle(fitted, entry, [chapter, *chapters], odd)
 
 
 def _compare(
@@ -133,10 +133,10 @@ def _compare(
     candidates = None
     if request.characteristic is not None:
         named, scaling = find_initial_law(request.characteristic, recordings, request.degree)
-        own = Candidate(
+        named_candidate = Candidate(
             f"{request.characteristic} (named)", named.characteristic, (*request.fix, *scaling)
         )
-        candidates = [*standard_candidates(recordings), own]
+        candidates = [*standard_candidates(recordings), named_candidate]
     both = None if request.purpose is None else request.purpose == "both"
     selection = select_law(
         recordings,
@@ -174,7 +174,7 @@ def _compare(
 
 def _more(
     request: FitRequest,
-    found: Fit,
+    fitted: Fit,
     entry: Entry,
     recordings: list[Recording],
     progress: Progress | None,
@@ -186,24 +186,24 @@ def _more(
     chapters = list[Chapter]()
     notes = list[str]()
     sample = None
-    weak = weakly_determined(found) if WEAK in request.profile else ()
+    weak = weakly_determined(fitted) if WEAK in request.profile else ()
     names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
     if request.bootstrap is not None:
         report = None if progress is None else lambda fraction: progress("refits", fraction)
         sample = bootstrap(
-            found,
+            fitted,
             recordings,
             refits=request.bootstrap,
             by=request.split,
             progress=report,
             workers=workers,
         )
-    profiles = tuple(profile(found, name) for name in names)
-    uncertainty = Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
+    profiles = tuple(profile(fitted, name) for name in names)
+    uncertainty = Uncertainty(fitted, sample, profiles, WEAK in request.profile and not weak)
     if request.shape:
-        if not isinstance(found.model, ContractileSurface):
+        if not isinstance(fitted.model, ContractileSurface):
             raise ParameterError(
-                f"--shape: the shape of {type(found.model).__name__} is given by its formula; only"
+                f"--shape: the shape of {type(fitted.model).__name__} is given by its formula; only"
                 " a ContractileSurface can be constrained. Give --characteristic"
                 " ContractileSurface, or omit --shape."
             )
@@ -213,17 +213,17 @@ def _more(
             free = Recording(
                 {"pressure": pressure, "contraction": contraction}, "--free-contraction"
             )
-        shaped = fit_shape_constrained(found.model, recordings, free=free)
-        chapters.append(shaped.chapter(found))
+        shaped = fit_shape_constrained(fitted.model, recordings, free=free)
+        chapters.append(shaped.chapter(fitted))
         note = f"{entry.note} With shape constraints: rms error {shaped.rmse:.4g} N."
         entry = dataclasses.replace(entry, characteristic=shaped.model, note=note, error_band=None)
     else:
-        notes = list(map(str, shape_violations_of_fit(found)))
+        notes = list(map(str, shape_violations_of_fit(fitted)))
     if sample is not None or profiles or uncertainty.none_weak:
         chapters.append(uncertainty.chapter())
     if request.length_error:
         errors = [
-            estimate_length_error(found.model, recordings, name) for name in request.length_error
+            estimate_length_error(fitted.model, recordings, name) for name in request.length_error
         ]
         chapters.append(length_error_chapter(errors))
     return entry, chapters, notes
@@ -234,13 +234,13 @@ def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:
     chapters, the brief view has fewer laws of the ranking, and those that are not ranked once."""
     stated = set[str]()
     brief = list[Chapter]()
-    for each in chapters:
-        notes = tuple(note for note in each.notes if note not in stated)
-        tables = each.tables
+    for chapter in chapters:
+        notes = tuple(note for note in chapter.notes if note not in stated)
+        tables = chapter.tables
         if len(chapters) > 1:
-            tables = tuple(_shortened(each, table, not brief) for table in tables)
-        brief.append(dataclasses.replace(each, notes=notes, tables=tables))
-        stated |= set(each.notes)
+            tables = tuple(_shortened(chapter, table, not brief) for table in tables)
+        brief.append(dataclasses.replace(chapter, notes=notes, tables=tables))
+        stated |= set(chapter.notes)
     return brief
 
 
@@ -250,7 +250,7 @@ def _shortened(chapter: Chapter, table: Table, first: bool) -> Table:
     """
     if isinstance(table.brief, int):
         return table if first else dataclasses.replace(table, brief=0)
-    recommended = next(each.value for each in chapter.values if each.name == "recommended")
+    recommended = next(row.value for row in chapter.values if row.name == "recommended")
     laws = list(table.columns["law"].values)
     return dataclasses.replace(
         table, brief=sorted({*table.brief[:RANKED], laws.index(recommended)})

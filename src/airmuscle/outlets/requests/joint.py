@@ -167,7 +167,7 @@ def fit_requested_arm(
         )
         for number, muscle in enumerate(fit.arm.muscle)
         if any(
-            each.path.startswith(f"muscle[{number}].") for each in fit.estimates
+            estimate.path.startswith(f"muscle[{number}].") for estimate in fit.estimates
         )  # identified parameters
     }
     return (
@@ -189,7 +189,9 @@ def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict
     """
     middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
-    held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
+    schedule = {
+        f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)
+    }
     run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
     ranges = np.ptp(
         np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0
@@ -206,7 +208,7 @@ def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict
     tuned = f"{note}, and so are the gains: airmuscle tune finds better ones"
     uncertainty = {"uncertainty": uncertainty_table(fit.uncertainty())}
     return {
-        "scenario.toml": scenario_toml(title, fit.plant(), held, run, note, uncertainty),
+        "scenario.toml": scenario_toml(title, fit.plant(), schedule, run, note, uncertainty),
         "controlled.toml": scenario_toml(
             f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned, uncertainty
         ),

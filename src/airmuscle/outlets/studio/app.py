@@ -84,7 +84,9 @@ def library_list() -> dict[str, Any]:
             }
             listed[kind].append(row)
     fit = [
-        field for each in (ReadingRequest, BraidRequest, FitRequest) for field in form_fields(each)
+        field
+        for request in (ReadingRequest, BraidRequest, FitRequest)
+        for field in form_fields(request)
     ]
     return {
         **listed,

@@ -39,7 +39,7 @@ MAX_ENTRIES = 20_000
 """Largest size [bytes] and number of the files of an archive (chosen)."""
 MAX_TEXT = 20_000
 """Largest size of a mapping and of a scenario [characters] (chosen)."""
-FIELDS = ("mapping", *(each["name"] for each in form_fields(JointFitRequest)))
+FIELDS = ("mapping", *(option["name"] for option in form_fields(JointFitRequest)))
 """Fields of the page; each is a text, and may be empty."""
 
 
@@ -51,21 +51,21 @@ def _request(texts: ArmTexts, folder: Path) -> JointFitRequest:
     """The request, whose mapping file and known joint are written to a folder. Raises
     InputError.
     """
-    given: dict[str, Any] = {**texts, "mapping": _written(folder / MAPPING, texts["mapping"])}
+    stated: dict[str, Any] = {**texts, "mapping": _written(folder / MAPPING, texts["mapping"])}
     known = texts["known"].strip()
     if known and ("=" in known or "[" in known):
         try:
             check_self_contained(parse_toml(known, KNOWN))
         except AirmuscleError as error:
             raise RequestError(str(error.message), "known") from None
-        given["known"] = str(_written(folder / KNOWN, known))
+        stated["known"] = str(_written(folder / KNOWN, known))
     elif known and known not in list_plants():
         raise RequestError(
             f"'{known[:60]}' is no plant of the library; write the name of one, or the text of a"
             f" scenario.{suggestion(known, list_plants())}",
             "known",
         )
-    return build(JointFitRequest, given, lambda name: name.replace("_", " "))
+    return build(JointFitRequest, stated, lambda name: name.replace("_", " "))
 
 
 def _written(path: Path, text: str) -> Path:
@@ -101,13 +101,13 @@ def sheet_of_episodes(folder: str, texts: ArmTexts) -> dict[str, Any]:
     try:
         with _opened(Path(folder)) as (source, place):
             sheet["mapping"] = sheet["mapping"] or propose_mapping(source)
-            found = inspect_requested(
+            inspection = inspect_requested(
                 source, _request({**texts, "mapping": sheet["mapping"]}, place)
             )
             sheet["lines"] = [
-                line for line in str(found).splitlines() if not line.startswith("error: ")
+                line for line in str(inspection).splitlines() if not line.startswith("error: ")
             ]
-            sheet["problems"] = [{"field": "mapping", "text": text} for text in found.errors]
+            sheet["problems"] = [{"field": "mapping", "text": text} for text in inspection.errors]
     except RequestError as error:
         sheet["problems"] = [{"field": error.field or "mapping", "text": error.message}]
     sheet["ready"] = not sheet["problems"]
@@ -164,10 +164,10 @@ def _opened(folder: Path, field: str = "mapping") -> Iterator[tuple[Path, Path]]
             )
         except AirmuscleError as error:
             text = without_folder(without_folder(str(error.message), place), folder / FILES)
-            own = getattr(error, "field", "") or next(
+            named_field = getattr(error, "field", "") or next(
                 (n for n in ("mapping", "known") if f"{n}.toml" in text), field
             )
-            raise RequestError(text, own) from None
+            raise RequestError(text, named_field) from None
 
 
 def _unpacked(archive: Path, folder: Path) -> Path:
@@ -177,7 +177,10 @@ def _unpacked(archive: Path, folder: Path) -> Path:
     try:
         with zipfile.ZipFile(archive) as file:
             entries = file.infolist()
-            if len(entries) > MAX_ENTRIES or sum(each.file_size for each in entries) > MAX_UNPACKED:
+            if (
+                len(entries) > MAX_ENTRIES
+                or sum(entry.file_size for entry in entries) > MAX_UNPACKED
+            ):
                 raise FileError(
                     f"{archive.name}: the archive holds more than {MAX_ENTRIES} files or"
                     f" {MAX_UNPACKED // 10**6} MB; give fewer episodes."

@@ -70,7 +70,8 @@ class ReadSet:
         """Add a problem, once."""
         problem = as_field_error(error, field)
         if all(
-            (problem.message, problem.field) != (each.message, each.field) for each in self.problems
+            (problem.message, problem.field) != (known.message, known.field)
+            for known in self.problems
         ):
             self.problems.append(problem)
 
@@ -89,7 +90,9 @@ def read_set(folder: Path, settings: FitSettings) -> ReadSet:
         except AirmuscleError as error:
             read.complain(error, "columns")
     read.remarks += dict.fromkeys(
-        in_page_words(each.message.args[0]) for each in caught if isinstance(each.message, Warning)
+        in_page_words(warning.message.args[0])
+        for warning in caught
+        if isinstance(warning.message, Warning)
     )
     dropped = settings.texts["outliers"] == "drop"
     read.outliers = find_bench_outliers(read.recordings) if dropped else [()] * len(read.recordings)
@@ -129,10 +132,12 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
             )
         columns = columns[:MAX_COLUMNS]
         listed = read.columns.setdefault(path.name, [])
-        listed += [each for each in columns if all(each.key != other.key for other in listed)]
+        listed += [column for column in columns if all(column.key != entry.key for entry in listed)]
         try:
-            own = {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
-            mapped = apply_mapping(table, settings.mapping(own))
+            selections = {
+                key: settings.columns[key] for key in _keys(table) if key in settings.columns
+            }
+            mapped = apply_mapping(table, settings.mapping(selections))
         except AirmuscleError as error:
             read.complain(error, "columns")
             continue
@@ -244,7 +249,9 @@ def _unit_problems(
 
 def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
     """Complain about each quantity that a static fit needs and the recording lacks."""
-    moved = next((each for each in ("length", "shortening") if each in recording.columns), "")
+    moved = next(
+        (quantity for quantity in ("length", "shortening") if quantity in recording.columns), ""
+    )
     for name in (name for name in NEEDED if name not in recording):
         text = f"no column is a {name}. Select its column."
         field = "columns"

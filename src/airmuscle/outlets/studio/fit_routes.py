@@ -233,8 +233,8 @@ class FitService:
     async def add_file(self, request: Any) -> Any:
         """Store a file, in a new set unless one is given; returns the set and its files."""
         name = check_file_name(request.query_params.get("name", ""))
-        given = request.query_params.get("set", "")
-        identifier = await self._uploads.add(given, name, request.stream(), self._queue.is_needed)
+        stated = request.query_params.get("set", "")
+        identifier = await self._uploads.add(stated, name, request.stream(), self._queue.is_needed)
         return json_answer({"set": identifier, "files": self._uploads.names(identifier)})
 
     async def remove_file(self, request: Any) -> Any:
@@ -264,10 +264,10 @@ class FitService:
         """
         wanted = await limited_table(request, MAX_SETTINGS)
         name = _name(wanted, "set")
-        given = wanted.get("settings", {})
+        settings = wanted.get("settings", {})
         folder = self._uploads.folder(name)
-        is_arm = isinstance(given, dict) and given.get("record") == "arm"
-        return name, folder, read_arm_settings(given) if is_arm else read_settings(given)
+        is_arm = isinstance(settings, dict) and settings.get("record") == "arm"
+        return name, folder, read_arm_settings(settings) if is_arm else read_settings(settings)
 
     async def status(self, request: Any) -> Any:
         """State and progress of a task."""

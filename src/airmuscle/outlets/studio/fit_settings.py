@@ -25,7 +25,8 @@ MAX_CHOICES = 500
 (chosen).
 """
 OFFERED = {
-    each["name"]: [value for value, _ in each["offered"]] for each in form_fields(ReadingRequest)
+    option["name"]: [value for value, _ in option["offered"]]
+    for option in form_fields(ReadingRequest)
 }
 """Values that the form offers, by the fields with a text that applies to all files."""
 TEXTS = tuple(OFFERED)
@@ -78,7 +79,7 @@ class FitSettings:
         codes = self.texts["missing_code"].replace(";", ",").split(",")
         texts: dict[str, Any] = {
             **self.texts,
-            "missing_code": [each for each in codes if each.strip()],
+            "missing_code": [code for code in codes if code.strip()],
         }
         try:
             chosen = self.columns if columns is None else columns
@@ -110,15 +111,15 @@ def read_settings(data: Any) -> FitSettings:
         raise RequestError("the request must be a table of settings.")
     texts = dict[str, str]()
     for name in (*TEXTS, *BRAID):
-        given = data.get(name, "")
+        value = data.get(name, "")
         texts[name] = (
-            given if given in OFFERED.get(name, ()) else _text(given, name)
+            value if value in OFFERED.get(name, ()) else _text(value, name)
         )  # tab and blank as they are
     facts: dict[str, dict[str, str]] = {}
     for file, value in _table(data.get("files", {}), "files").items():
         field = f"file:{file}"
         table = _table(value, field)
-        for unknown in (each for each in table if each not in FILE_FACTS):
+        for unknown in (fact for fact in table if fact not in FILE_FACTS):
             text = f"'{str(unknown)[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
             raise RequestError(text, field)
         facts[file] = {
@@ -141,7 +142,7 @@ def read_settings(data: Any) -> FitSettings:
     )
     _ = settings.braid  # checks it
     for file, stated in facts.items():
-        for name in (each for each in stated if each in LENGTHS):
+        for name in (fact for fact in stated if fact in LENGTHS):
             _check_length(stated[name], _words(name), f"file:{file}")
     if entry and entry not in list_laws():
         raise RequestError(f"the library has no muscle or law '{entry}'.", "entry")
@@ -224,7 +225,9 @@ def used_rows(
     RequestError for an unknown column."""
     used = kept_rows(recording, outliers)
     for rule in (
-        each for each in rules if not each.recordings or recording.origin in each.recordings
+        selection
+        for selection in rules
+        if not selection.recordings or recording.origin in selection.recordings
     ):
         if rule.rows is not None:
             inside = np.zeros(len(recording), bool)
@@ -248,19 +251,21 @@ def selected(
 ) -> list[am.Recording]:
     """The recordings reduced to the selected rows of their files, with a note on what was left out;
     without those that are empty. Raises RequestError if no row is left."""
-    kept = []
-    for complete, found in zip(recordings, outliers, strict=True):
-        recording = leave_out(complete, found)
-        used = used_rows(complete, rules)[kept_rows(complete, found)]
+    reduced = []
+    for complete, recording_outliers in zip(recordings, outliers, strict=True):
+        recording = leave_out(complete, recording_outliers)
+        used = used_rows(complete, rules)[kept_rows(complete, recording_outliers)]
         count = int(np.count_nonzero(~used))
         note = (
             f"{recording.origin}: {count} of {len(recording)} rows are left out, as specified by"
             " the user."
         )
         if used.all():
-            kept.append(recording)
+            reduced.append(recording)
         elif used.any():
-            kept.append(dataclasses.replace(recording.rows(used), notes=(*recording.notes, note)))
-    if recordings and not kept:
+            reduced.append(
+                dataclasses.replace(recording.rows(used), notes=(*recording.notes, note))
+            )
+    if recordings and not reduced:
         raise RequestError("no row is left; remove a selection.", "rules")
-    return kept
+    return reduced

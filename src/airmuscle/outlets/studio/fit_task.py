@@ -103,23 +103,23 @@ def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Rep
         compare=True, characteristic=named, leave_out=split, braid=braid, accept_misfit=True
     )
     try:
-        found = fit_requested(request, names, recordings, progress)
+        fitted = fit_requested(request, names, recordings, progress)
     except AirmuscleError as error:
         raise as_field_error(error, "fit") from None
-    assert found.selection is not None
-    chapters = [in_words(chapter, in_page_words) for chapter in found.chapters]
+    assert fitted.selection is not None
+    chapters = [in_words(chapter, in_page_words) for chapter in fitted.chapters]
     with atomic_folder(out) as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        sheet = {**result_sheet(found.selection, found.fit), "rows": sum(map(len, recordings))}
+        sheet = {**result_sheet(fitted.selection, fitted.fit), "rows": sum(map(len, recordings))}
         sheet["hysteresis"] = (
             _friction(recordings, staging, report) if settings.hysteresis else None
         )
         report(SHARES[2], "report")
-        save(found.entry, staging / "muscle.toml")
+        save(fitted.entry, staging / "muscle.toml")
         write_into(staging, chapters, title="Fit")
         sheet["notes"] = [
-            *map(in_page_words, found.notes),
-            *([GEOMETRY] if missing_geometry(found.entry) else []),
+            *map(in_page_words, fitted.notes),
+            *([GEOMETRY] if missing_geometry(fitted.entry) else []),
         ]
         sheet["files"] = _pack(staging)
         (staging / RESULT).write_text(as_json(sheet), encoding="utf-8")
@@ -152,9 +152,9 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
         except AirmuscleError as error:
             return {"reason": in_page_words(error.message), "loops": []}
     remarks = [
-        in_page_words(each.message.args[0])
-        for each in caught
-        if isinstance(each.message, AirmuscleWarning)
+        in_page_words(warning.message.args[0])
+        for warning in caught
+        if isinstance(warning.message, AirmuscleWarning)
     ]
     steps, total = itertools.count(), FRICTION_LAWS * (len(loops) + 1)
 
@@ -164,11 +164,13 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
 
     fits = [fit_loop(loop, progress=progress) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
-    own = folder / "friction"
+    report_folder = folder / "friction"
     chapters = hysteresis_chapters(fits, joint)
-    own.mkdir()
-    write_into(own, [in_words(chapter, in_page_words) for chapter in chapters], title="Friction")
-    (own / "report.html").replace(folder / "friction.html")
+    report_folder.mkdir()
+    write_into(
+        report_folder, [in_words(chapter, in_page_words) for chapter in chapters], title="Friction"
+    )
+    (report_folder / "report.html").replace(folder / "friction.html")
     chosen = select_friction(fits, joint)
     if chosen is not None:
         friction, _, verdict = chosen
@@ -234,18 +236,22 @@ def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
         "error": best.cross_validated_rmse,
         "reason": selection.reason,
         "comparisons": [
-            {"purpose": each.purpose, "group": each.leave_out.group_name, **_sheet(each.chapter())}
-            for each in selection.comparisons
+            {
+                "purpose": comparison.purpose,
+                "group": comparison.leave_out.group_name,
+                **_sheet(comparison.chapter()),
+            }
+            for comparison in selection.comparisons
         ],
         "fit": _sheet(fit.chapter()),
         "equations": [
             {
-                "title": each.title,
-                "note": each.note,
-                "lines": [to_display_mathml(line) for line in each.lines],
-                "sources": dict(each.sources),
+                "title": equation.title,
+                "note": equation.note,
+                "lines": [to_display_mathml(line) for line in equation.lines],
+                "sources": dict(equation.sources),
             }
-            for each in equations
+            for equation in equations
         ],
         "parity": {
             "quantity": quantity.name,
@@ -263,13 +269,13 @@ def _bands(fit: am.Fit) -> dict[str, Any] | None:
         return None
     rows = [
         {
-            "level": each.level,
-            "x": each.points,
-            **{key: getattr(each.confidence, key) for key in ("value", "low", "high")},
-            "prediction_low": each.prediction.low,
-            "prediction_high": each.prediction.high,
+            "level": curve.level,
+            "x": curve.points,
+            **{key: getattr(curve.confidence, key) for key in ("value", "low", "high")},
+            "prediction_low": curve.prediction.low,
+            "prediction_high": curve.prediction.high,
         }
-        for each in curves
+        for curve in curves
     ]
     constant = curves[0].constant
     varying = curves[0].varying
@@ -303,11 +309,13 @@ def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
     rows = zip(read.recordings, read.files, inspections, used, read.outliers, strict=True)
     return {
         "files": [
-            {"name": name, "columns": [_column(each) for each in read.columns.get(name, [])]}
+            {"name": name, "columns": [_column(column) for column in read.columns.get(name, [])]}
             for name in names
         ],
         "recordings": [_recording(*row, step) for row in rows],
-        "problems": [{"field": each.field, "text": str(each.message)} for each in read.problems],
+        "problems": [
+            {"field": problem.field, "text": str(problem.message)} for problem in read.problems
+        ],
         "remarks": read.remarks,
         "step": step,
         "ready": bool(read.recordings) and not read.problems,
@@ -332,9 +340,9 @@ def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
 
 def _column(column: FileColumn) -> dict[str, Any]:
     factor, shown = display_scale(column.name) if column.known else (1.0, "")
-    own = {key: getattr(column, key) for key in ("key", "heading", "unit", "stated", "used")}
+    stated = {key: getattr(column, key) for key in ("key", "heading", "unit", "stated", "used")}
     return {
-        **own,
+        **stated,
         "quantity": column.name if column.known else "",
         "factor": factor,
         "shown_unit": shown,
@@ -363,9 +371,10 @@ def _recording(
             "sampling": (
                 None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration}
             ),
-            "outliers": len({each.row for each in inspection.outliers}),
+            "outliers": len({outlier.row for outlier in inspection.outliers}),
             "findings": [
-                {"text": in_page_words(each.text), "serious": each.serious} for each in findings
+                {"text": in_page_words(finding.text), "serious": finding.serious}
+                for finding in findings
             ],
         }
     for name, value in recording.constants.items():

@@ -112,12 +112,12 @@ class UploadStore:
         """Add a file, or replace the one of this name; the identifier of the set, of a new one if
         none is given. Raises BadRequest beyond the limits; then there is no new set."""
         folder = self.folder(identifier) if identifier else None
-        others = (
+        stored = (
             [path for path in (folder / FILES).iterdir() if path.name != name] if folder else []
         )
-        if len(others) >= MAX_FILES:
+        if len(stored) >= MAX_FILES:
             raise BadRequest(f"at most {MAX_FILES} files are fitted together; remove some.", 413)
-        allowed = MAX_SET - sum(path.stat().st_size for path in others)
+        allowed = MAX_SET - sum(path.stat().st_size for path in stored)
         unfinished = self._top / f"{secrets.token_hex(8)}.part"
         try:
             size = 0

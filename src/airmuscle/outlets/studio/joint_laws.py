@@ -91,7 +91,7 @@ def valve_set(plant: am.Plant) -> ValveSet:
     """The valves of a joint. Raises ParameterError for a circuit that the tab does not know."""
     circuit = plant.circuits[0]
     first, second = (muscle.name for muscle in plant.muscles)
-    kinds = {type(each) for each in plant.circuits}
+    kinds = {type(valve) for valve in plant.circuits}
     regulators = am.physics.ProportionalRegulator | am.physics.PressureRegulator
     if len(kinds) == 1 and isinstance(circuit, regulators):
         pressures = (f"{first}.setpoint", f"{second}.setpoint")
@@ -99,7 +99,7 @@ def valve_set(plant: am.Plant) -> ValveSet:
             OPENING if isinstance(circuit, am.physics.ProportionalRegulator) else SLIGHT_OPENING
         ) * circuit.band
         offsets = {pressures[0]: shift, pressures[1]: -shift}
-        highest = min(each.inputs[0].maximum for each in plant.circuits)
+        highest = min(valve.inputs[0].maximum for valve in plant.circuits)
         return ValveSet(pressures, None, False, offsets, (shift, highest - shift))
     pressures = (f"{first}.pressure", f"{second}.pressure")
     if kinds == {am.physics.ProportionalValve} and isinstance(
@@ -244,7 +244,12 @@ def _with_valves(
         return JointController(key, law, law, balance, start, rows)
     averaged = am.control.Cascade(law, valves.inner, (limits[0],) * 2, (limits[1],) * 2)
     rows = tuple(dataclasses.replace(gain, path=f"outer.{gain.path}") for gain in rows)
-    whole = am.engine.SigmaDelta(averaged) if valves.switching else averaged
+    complete = am.engine.SigmaDelta(averaged) if valves.switching else averaged
     return JointController(
-        key, whole, averaged, f"outer.{balance}", start and f"outer.{start}", (*rows, PRESSURE_GAIN)
+        key,
+        complete,
+        averaged,
+        f"outer.{balance}",
+        start and f"outer.{start}",
+        (*rows, PRESSURE_GAIN),
     )

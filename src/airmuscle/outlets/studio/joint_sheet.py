@@ -71,13 +71,15 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
     loaders.
     """
     tables, location = plant_tables(name)
-    given = joint_tables(tables)
-    sheet = sheet_of_tables(given, location, name, tables.get("sources", {}))
-    plant = build_scenario(given, location).plant
+    scenario = joint_tables(tables)
+    sheet = sheet_of_tables(scenario, location, name, tables.get("sources", {}))
+    plant = build_scenario(scenario, location).plant
     statics = statics_within_valves(plant)
     controllers = joint_controllers(plant, statics)
     measured = tuple(
-        dict.fromkeys(column for each in controllers for column in each.law.measured_columns)
+        dict.fromkeys(
+            column for controller in controllers for column in controller.law.measured_columns
+        )
     )
     rows = ",\n".join(
         f"{json.dumps(key)}: {text}"
@@ -100,7 +102,7 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
         ],
         "measured": list(measured),
         "pressure_range": list(statics.pressure_range),
-        "controllers": [_controller_row(each) for each in controllers],
+        "controllers": [_controller_row(controller) for controller in controllers],
         "region": {key: values[taut].tolist() for key, values in region.items()},
         "pair": list(PAIR),
         "offsets": valves.offsets,
@@ -108,15 +110,15 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
         "switching": valves.switching,
         "tasks": [
             {
-                "name": each.name,
-                "motion": {"kind": type(each.motion).__name__, **dataclasses.asdict(each.motion)},
-                "duration": each.duration,
-                "begin": each.begin,
-                "torque": list(map(list, each.torque)),
-                "stiffening": list(map(list, each.stiffening)),
+                "name": task.name,
+                "motion": {"kind": type(task.motion).__name__, **dataclasses.asdict(task.motion)},
+                "duration": task.duration,
+                "begin": task.begin,
+                "torque": list(map(list, task.torque)),
+                "stiffening": list(map(list, task.stiffening)),
             }
-            for each in STANDARD_TASKS
-            if each.stuck is None
+            for task in STANDARD_TASKS
+            if task.stuck is None
         ],
     }
     sheet["id"] = identifier_of(sheet, script)
@@ -130,11 +132,11 @@ def joint_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     plant = dict(tables["plant"])
     run = tables["run"]
     plant["mechanism"] = {"model": "JointWithExternalTorque", "inner": plant["mechanism"]}
-    kept = {
+    retained = {
         key: tables[key] for key in TABLES if key in tables and key not in ("plant", "input", "run")
     }
     return {
-        **kept,
+        **retained,
         "plant": plant,
         "input": {},
         "run": {"duration": DURATION, "initial_state": run["initial_state"]},
@@ -152,12 +154,12 @@ def _programs(
         "statics": _pair_program(plant),
         "inputs": f"(() => {{\n{inputs}\nreturn {{ cut_segments }};\n}})()",
     }
-    for each in controllers:
-        same = each.law is each.averaged
-        programs[each.key] = _law_program(each.law, sample=True, slopes=same)
+    for controller in controllers:
+        same = controller.law is controller.averaged
+        programs[controller.key] = _law_program(controller.law, sample=True, slopes=same)
         if not same:
-            programs[f"{each.key}-averaged"] = _law_program(
-                each.averaged, sample=False, slopes=True
+            programs[f"{controller.key}-averaged"] = _law_program(
+                controller.averaged, sample=False, slopes=True
             )
     return programs
 
@@ -290,8 +292,8 @@ def _needed_torque(plant: am.Plant) -> tuple[dict[str, list[Node]], dict[str, li
     ):
         speed = length * jacobian([contraction], [angle])[0][0] * angular_speed
         damping.append(-muscle.damper.force(pressure, contraction, speed))
-    held = mechanism.generalised_forces(q, damping, lengths)[coordinate.name]
-    needed = nodes.as_node(mechanism.driving_force(q, v, acceleration) - held)
+    damping_torque = mechanism.generalised_forces(q, damping, lengths)[coordinate.name]
+    needed = nodes.as_node(mechanism.driving_force(q, v, acceleration) - damping_torque)
     return {"x": x}, {"f": [needed]}
 
 

@@ -89,7 +89,7 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     """
     law, errors = _in_closed_form(entry)
     geometry, kind, ratings = entry.geometry, type(entry.characteristic), entry.ratings
-    text, functions, held = print_law(law, geometry)
+    text, functions, held_values = print_law(law, geometry)
     rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
     if parameter_model(law, geometry) is not law:
         rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
@@ -126,7 +126,7 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "formula": (kind.__doc__ or "").strip().partition("\n")[0],
         "kind": next(method for form, method, *_ in FORMS if isinstance(law, form)),
         "functions": functions,
-        "held": held,
+        "held": held_values,
         "limits": [float(limit) for limit in _limits(law)],
         "values": [leaf.value for _, leaf in rows],
         "parameters": parameters,
@@ -217,7 +217,7 @@ def sampled_outline(
         outlines = [
             (np.round(axial, decimals), np.round(radius, decimals)) for axial, radius in outlines
         ]
-    axial, radius = ([each[i].tolist() for each in outlines] for i in (0, 1))
+    axial, radius = ([outline[i].tolist() for outline in outlines] for i in (0, 1))
     return {"contractions": contractions.tolist(), "axial": axial, "radius": radius}
 
 

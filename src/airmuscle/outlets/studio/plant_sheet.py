@@ -53,9 +53,11 @@ def sheet_of_tables(
     system = program.system
     columns = list[dict[str, Any]]()
     for column in system.known.column_names:
-        own = system.units[column]
-        usual = {"rad": (180.0 / np.pi, "deg"), "Pa": (1e-3, "kPa")}.get(own, display_scale(column))
-        factor, unit = usual if usual[1] else (1.0, own)
+        si_unit = system.units[column]
+        usual = {"rad": (180.0 / np.pi, "deg"), "Pa": (1e-3, "kPa")}.get(
+            si_unit, display_scale(column)
+        )
+        factor, unit = usual if usual[1] else (1.0, si_unit)
         columns.append(
             {"name": column, "factor": factor, "unit": "" if unit in ("1", "-") else unit}
         )
@@ -102,7 +104,7 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
     places = {leaf.path: i for i, leaf in enumerate(known)}
     rows = []
     for i, leaf in enumerate(known):
-        own = leaf.path.replace(".contractile.geometry.", ".geometry.")
+        geometry_path = leaf.path.replace(".contractile.geometry.", ".geometry.")
         law = re.sub(r"^(muscle(?:\[\d+\])?)\.geometry\.", r"\1.contractile.geometry.", leaf.path)
         twin = places.get(law) if law != leaf.path else None
         if leaf.path.endswith("]") or any(
@@ -112,8 +114,10 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
         if twin is not None and known[twin].value == leaf.value:
             continue
         shared = (
-            [places[own]]
-            if own != leaf.path and own in places and known[places[own]].value == leaf.value
+            [places[geometry_path]]
+            if geometry_path != leaf.path
+            and geometry_path in places
+            and known[places[geometry_path]].value == leaf.value
             else []
         )
         path = re.sub(
@@ -131,10 +135,12 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
 
 def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
     rows = []
-    for each in plant.input_variables:
-        low, high = (end if np.isfinite(end) else None for end in (each.minimum, each.maximum))
-        unit = "" if each.unit == "1" else each.unit
-        rows.append({"name": each.name, "unit": unit, "minimum": low, "maximum": high})
+    for variable in plant.input_variables:
+        low, high = (
+            end if np.isfinite(end) else None for end in (variable.minimum, variable.maximum)
+        )
+        unit = "" if variable.unit == "1" else variable.unit
+        rows.append({"name": variable.name, "unit": unit, "minimum": low, "maximum": high})
     return rows
 
 
@@ -184,17 +190,17 @@ def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
     done = am.solve(scenario.problem)
     opened = {name: OPENED for name in loop.controller.inputs if name.rpartition(".")[2] == "fill"}
     reason = "the run of the scenario ended early."
-    for where, given in (
+    for where, options in (
         ("where its run ends", {"control_state": done.control_state}),
         (f"where its run ends, with valves open by {OPENED:g}", {"inputs": opened}),
     ):
         try:
-            linear = am.control.linearise_loop(scenario.plant, loop, done.final_state, **given)
+            linear = am.control.linearise_loop(scenario.plant, loop, done.final_state, **options)
             values = linear.margins().chapter().values
         except AirmuscleError as error:
             reason = str(error)
             continue
-        rows = [(each.name, *value_cells(each)) for each in values]
+        rows = [(value.name, *value_cells(value)) for value in values]
         text = f"Open loop at {linear.laws[0].measured[0]}, linearised {where}."
         return {
             "text": text,

@@ -81,7 +81,7 @@ class Access:
             return 414, "The path is too long."
         tokens = [cookie_value(headers.get("cookie", ""), cookie_name(scope)), *given_token(scope)]
         if self.token and not any(
-            secrets.compare_digest(each.encode(), self.token.encode()) for each in tokens
+            secrets.compare_digest(candidate.encode(), self.token.encode()) for candidate in tokens
         ):
             return 401, "A token is required; open the address that the command printed."
         path = scope["path"].removeprefix(scope.get("root_path", ""))  # of a proxy
@@ -148,10 +148,10 @@ def secured(application: Application, access: Access) -> Application:
 
         async def send_with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                kept = [
+                retained = [
                     row for row in message.get("headers", []) if row[0].lower() not in dict(HEADERS)
                 ]
-                message = {**message, "headers": [*kept, *HEADERS]}
+                message = {**message, "headers": [*retained, *HEADERS]}
             await send(message)
 
         refusal = access.refusal(scope)

@@ -96,14 +96,14 @@ def close_one_of(connections: Any) -> None:
     """If there are too many, close the one that has waited longest for the head of a request, or
     else the last one.
     """
-    kept = [each for each in connections if not each.transport.is_closing()]
-    if len(kept) <= MAX_CONNECTIONS:
+    opened = [connection for connection in connections if not connection.transport.is_closing()]
+    if len(opened) <= MAX_CONNECTIONS:
         return
-    waiting = [each for each in kept if limit_of(each.cycle) == HEAD_LIMIT]
+    waiting = [connection for connection in opened if limit_of(connection.cycle) == HEAD_LIMIT]
     (
-        min(waiting, key=lambda each: each.since)
+        min(waiting, key=lambda connection: connection.since)
         if waiting
-        else max(kept, key=lambda each: each.since)
+        else max(opened, key=lambda connection: connection.since)
     ).transport.abort()
 
 
@@ -185,12 +185,12 @@ def ending_signals(end: Callable[[], None]) -> Iterator[None]:
     signals = [
         getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)
     ]
-    before = {each: signal.signal(each, lambda number, frame: end()) for each in signals}
+    before = {number: signal.signal(number, lambda number, frame: end()) for number in signals}
     try:
         yield
     finally:
-        for each, handler in before.items():
-            signal.signal(each, handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def serve(

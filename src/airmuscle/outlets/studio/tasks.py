@@ -133,7 +133,7 @@ def _is_quantity(text: str) -> bool:
 
 OMITTED = ("count", "muscle")
 """Fields of the command that the page does not have."""
-FIELDS = tuple(each.name for each in options_of(SizeRequest) if each.name not in OMITTED)
+FIELDS = tuple(option.name for option in options_of(SizeRequest) if option.name not in OMITTED)
 """Fields of the page; each is a text as a user types it, and may be empty where it is optional."""
 MAX_CHOICES = 30
 MAX_FIELD = 60
@@ -146,9 +146,11 @@ curve (chosen).
 def size_form() -> dict[str, Any]:
     """The fields of the form of the page: those of a lift, of a joint, and of both."""
     fields = {
-        each["name"]: each for each in form_fields(SizeRequest) if each["name"] not in OMITTED
+        option["name"]: option
+        for option in form_fields(SizeRequest)
+        if option["name"] not in OMITTED
     }
-    common = [each for name, each in fields.items() if name not in (*LIFT, *JOINT)]
+    common = [option for name, option in fields.items() if name not in (*LIFT, *JOINT)]
     return {
         "lift": [fields[name] for name in LIFT],
         "joint": [fields[name] for name in JOINT],
@@ -158,15 +160,15 @@ def size_form() -> dict[str, Any]:
 
 def size_sheet(text: str) -> dict[str, Any]:
     """The sheet of a request in JSON. Raises InputError, or SolveError with what is reachable."""
-    given = read_request(text)
-    request = build(SizeRequest, given, lambda name: name.replace("_", " "))
+    stated = read_request(text)
+    request = build(SizeRequest, stated, lambda name: name.replace("_", " "))
     result = request.evaluate()
     chapter = result.chapter(sizing_scenario(result.choices, "in the page"))
     sheet: dict[str, Any] = {
         "tab": "size",
         "name": "sizing",
         "provenance": "the library",
-        "request": given,
+        "request": stated,
         "form": size_form(),
         "own_text": text,
         **as_sheet(chapter),
@@ -180,14 +182,14 @@ def size_sheet(text: str) -> dict[str, Any]:
 
 def read_request(text: str) -> dict[str, str]:
     """The fields of a request. Raises ParameterError for another form."""
-    given = table_of(text, ParameterError)
-    if set(given) - set(FIELDS):
+    stated = table_of(text, ParameterError)
+    if set(stated) - set(FIELDS):
         raise ParameterError(f"the request must have the fields {', '.join(FIELDS)} and no others.")
-    if not all(isinstance(value, str) and len(value) <= MAX_FIELD for value in given.values()):
+    if not all(isinstance(value, str) and len(value) <= MAX_FIELD for value in stated.values()):
         raise ParameterError(
             f"the fields of the request must be texts of at most {MAX_FIELD} characters."
         )
-    return {name: given.get(name, "").strip() for name in FIELDS}
+    return {name: stated.get(name, "").strip() for name in FIELDS}
 
 
 def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
