@@ -75,11 +75,14 @@ class TracedRow:
             by_name = dict(zip(self.names, self.values, strict=True))
             wanted = [by_name[name] for name in names]
             self.functions[names] = Recorded([self.arguments], [wanted])
-        broadcast = np.broadcast_arrays(*(x for x in arguments if not isinstance(x, str)))
+        arrays = [x for x in arguments if not isinstance(x, str)]
+        broadcast = np.broadcast_arrays(*arrays)
         shape = broadcast[0].shape
         points = [np.ascontiguousarray(x, dtype=float).reshape(-1) for x in broadcast]
         (rows,) = self.functions[names].at_points(points)
-        return [np.broadcast_to(row, points[0].shape).reshape(shape) for row in rows]
+        # an output that does not depend on the arguments is one number
+        count = points[0].shape
+        return [np.broadcast_to(row, count).reshape(shape) for row in rows]
 
     def at(self, *arguments: Node) -> dict[str, Node]:
         """The outputs by name as expressions of other arguments."""

@@ -244,11 +244,13 @@ def _responses(
     chosen = [[*known.state_names, *known.output_names].index(name) for name in model.outputs]
 
     def call(function: str, size: int, x: npt.ArrayLike, u: npt.ArrayLike) -> Array:
-        inputs, result = base.copy(), np.zeros(size + 1)
-        inputs[places] = np.atleast_1d(np.asarray(u, dtype=float))[: len(places)]
-        compiled.call(
-            function, np.ascontiguousarray(x, dtype=float), inputs, compiled.precomputed, result
-        )
+        result = np.zeros(size + 1)
+        state = np.ascontiguousarray(x, dtype=float)
+        inputs = base.copy()
+        # python-control passes a number for one input
+        values = np.atleast_1d(np.asarray(u, dtype=float))
+        inputs[places] = values[: len(places)]
+        compiled.call(function, state, inputs, compiled.precomputed, result)
         return result[:size]
 
     def rates(t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:

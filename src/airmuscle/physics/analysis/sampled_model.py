@@ -129,8 +129,10 @@ class SampledModel:
         """The outputs (K, k) at the samples for inputs (K, m) from rest."""
         state = np.zeros(len(self.A))
         rows = []
-        for u in np.asarray(inputs, dtype=float).reshape(-1, len(self.inputs)):
-            rows.append(self.C @ state + self.D @ u)
+        samples = np.asarray(inputs, dtype=float).reshape(-1, len(self.inputs))
+        for u in samples:
+            row = self.C @ state + self.D @ u
+            rows.append(row)
             state = self.A @ state + self.B @ u
         return np.array(rows).reshape(-1, len(self.outputs))
 

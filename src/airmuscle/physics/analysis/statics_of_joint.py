@@ -259,12 +259,14 @@ class JointStatics(ShortRepr):
                 known &= (tension > 0.0) & (other_tension > 0.0)  # both are taut
             restoring = k + other_k + self.load(angle, "slope")[0]
             stable = np.where(restoring > 0.0, 1.0, 0.0)
+        # the torque that both muscles balance between them
         cocontraction = np.minimum(np.abs(q), np.abs(other_q))
         columns = (angle, k + other_k, shut + other_shut, cocontraction, stable)
         angle, constant, shut, cocontraction, stable = (
             np.where(known, value, np.nan) for value in columns
         )
-        rows, tensions = known[..., None], np.stack([tension, other_tension], axis=2)
+        rows = known[..., None]
+        tensions = np.stack([tension, other_tension], axis=2)
         both, tensions = (np.where(rows, v, np.nan) for v in (pressures, tensions))
         return JointPoints(angle, both, tensions, constant, shut, cocontraction, stable)
 

@@ -215,6 +215,24 @@ def _statics(
         raise ParameterError(
             "find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles."
         )
+    air = _air_of_muscles(plant, pressure, air_mass)
+    commands = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
+    compiled = compile_system(plant)
+    statics = Statics.of_plants(
+        compiled, compiled.parameters[None], air, commands, pressure is None
+    )
+    if not statics.shut and not statics.allowed().all():
+        plant.state_at(pressure=air)
+        raise EquilibriumError(
+            f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed."
+        )
+    return statics
+
+
+def _air_of_muscles(
+    plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues
+) -> tuple[float, ...]:
+    """The pressure [Pa] or the air mass [kg] of each muscle, of which one is None."""
     name, stated, unit = (
         ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
     )
@@ -244,18 +262,7 @@ def _statics(
             raise ParameterError(
                 f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0."
             )
-    air = tuple(float(value) for value in values if value is not None)
-    commands = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
-    compiled = compile_system(plant)
-    statics = Statics.of_plants(
-        compiled, compiled.parameters[None], air, commands, pressure is None
-    )
-    if not statics.shut and not statics.allowed().all():
-        plant.state_at(pressure=air)
-        raise EquilibriumError(
-            f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed."
-        )
-    return statics
+    return tuple(float(value) for value in values if value is not None)
 
 
 def _balances(statics: Statics) -> tuple[Rows, Array]:

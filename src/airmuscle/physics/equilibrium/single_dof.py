@@ -4,6 +4,7 @@ points.
 
 import functools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +40,26 @@ def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
     return plain[balanced], place[:, None]
 
 
+class LinearRange(NamedTuple):
+    """Both ends of the range (N,), and whether the contractions are linear functions of the
+    coordinate; only then are the ends those within the limits of the muscles.
+    """
+
+    low: Array
+    high: Array
+    is_linear: npt.NDArray[np.bool_]
+
+
+class RootSigns(NamedTuple):
+    """Where values (N, K) announce roots: points that are 0 (N, K), neighbours of different sign
+    (N, K - 1), and three neighbours of equal sign whose second is nearest to zero (N, K - 2).
+    """
+
+    exact: npt.NDArray[np.bool_]
+    crossing: npt.NDArray[np.bool_]
+    nearing: npt.NDArray[np.bool_]
+
+
 def _places(x: Array) -> Array:
     """Values of the one coordinate, (N,) or (N, K), as coordinates (N, K, 1) of the plants."""
     return x.reshape(len(x), -1, 1)
@@ -51,7 +72,7 @@ def _accelerations(plants: Statics, x: Array) -> Array:
 
 def grid(statics: Statics) -> Array:
     """Permitted coordinates (N, K) in ascending order; rows with fewer than K end with NaN."""
-    low, high, linear = _ends_if_linear(statics)
+    low, high, linear = _linear_range(statics)
     x = np.linspace(low, high, GRID_POINTS, axis=1)
     x[~(low < high)] = np.nan
     if linear.all():
@@ -65,21 +86,26 @@ def grid(statics: Statics) -> Array:
     return rows
 
 
-def _ends_if_linear(plants: Statics) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-    """Both ends of the range (N,), and whether the contractions are linear functions of the
-    coordinate.
+def _linear_range(plants: Statics) -> LinearRange:
+    """The range of the coordinate as it follows from two contractions of each muscle; a third one
+    shows whether they are linear.
     """
     size, low, high = plants.limits(0)
     linear = np.ones(size.shape, dtype=bool)
     at = [plants.contractions(_places(k * size)) for k in (0.0, 1.0, -3.0)]
     for zero, unit, opposite, reach in zip(*at, plants.contraction_limits, strict=True):
         rate = (unit - zero) / size
-        linear &= np.abs(opposite - (zero - 3.0 * size * rate)) <= 1e-12
+        expected = zero - 3.0 * size * rate
+        linear &= np.abs(opposite - expected) <= 1e-12
         with np.errstate(divide="ignore", invalid="ignore"):
-            ends = [(end - zero) / rate for end in reach]
-        low = np.where(rate == 0.0, low, np.maximum(low, np.minimum(*ends)))
-        high = np.where(rate == 0.0, high, np.minimum(high, np.maximum(*ends)))
-    return low[:, 0], high[:, 0], linear[:, 0]
+            first, second = ((end - zero) / rate for end in reach)
+        lowest = np.maximum(low, np.minimum(first, second))
+        highest = np.minimum(high, np.maximum(first, second))
+        # a muscle whose length is constant limits nothing
+        is_constant = rate == 0.0
+        low = np.where(is_constant, low, lowest)
+        high = np.where(is_constant, high, highest)
+    return LinearRange(low[:, 0], high[:, 0], linear[:, 0])
 
 
 def _inside(plants: Statics) -> Array:
@@ -88,15 +114,24 @@ def _inside(plants: Statics) -> Array:
     with np.errstate(invalid="ignore"):
         x = np.linspace(low[:, 0], high[:, 0], GRID_POINTS, axis=1)
     inside = plants.within_reach(_places(x))
-    rows, i = np.nonzero(inside[:, :-1] != inside[:, 1:])
-    first = inside[rows, i]
-    edges = _edges(
-        plants.of(rows), *(np.where(first, x[rows, i + k], x[rows, i + 1 - k]) for k in (0, 1))
-    )
-    columns = np.full((len(x), np.bincount(rows, minlength=1).max(initial=0)), np.nan)
-    columns[rows, np.arange(rows.size) - np.searchsorted(rows, rows)] = edges
-    places = np.sort(np.hstack([np.where(inside, x, np.nan), columns]), axis=1)
-    places[:, 1:][np.diff(places, axis=1) == 0.0] = np.nan
+    changes = inside[:, :-1] != inside[:, 1:]
+    rows, i = np.nonzero(changes)
+    before = x[rows, i]
+    after = x[rows, i + 1]
+    is_end = inside[rows, i]
+    permitted = np.where(is_end, before, after)
+    forbidden = np.where(is_end, after, before)
+    edges = _edges(plants.of(rows), permitted, forbidden)
+    most = np.bincount(rows, minlength=1).max(initial=0)
+    number_in_row = np.arange(rows.size) - np.searchsorted(rows, rows)
+    columns = np.full((len(x), most), np.nan)
+    columns[rows, number_in_row] = edges
+    points = np.where(inside, x, np.nan)
+    places = np.hstack([points, columns])
+    places.sort(axis=1)
+    # an edge that is a point of the grid stands once
+    repeated = np.diff(places, axis=1) == 0.0
+    places[:, 1:][repeated] = np.nan
     return np.sort(places, axis=1)
 
 
@@ -118,25 +153,47 @@ def balances(plants: Statics, x: Array, f: Array) -> tuple[Rows, Array]:
     neighbours of different sign, and two points where f crosses zero twice between neighbours of
     equal sign.
     """
-    with np.errstate(invalid="ignore", over="ignore"):
-        zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
-        exact = zero[:, 1:-1] & ~(zero[:, :-2] & zero[:, 2:])
-        crossing = f[:, :-1] * f[:, 1:] < 0.0
-        # of three neighbours of equal sign, the second is nearest to zero
-        a, b, c = (np.sign(f[:, k : k + max(f.shape[1] - 2, 0)]) for k in range(3))
-        one_sign = (a == b) & (b == c) & (b != 0.0)
-        a, b, c = (np.abs(f[:, k : k + max(f.shape[1] - 2, 0)]) for k in range(3))
-        nearing = one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c))
-    rows, i = np.nonzero(exact)
+    signs = _root_signs(f)
+    rows, i = np.nonzero(signs.exact)
     root_parts = [(rows, x[rows, i])]
-    rows, i = np.nonzero(crossing)
-    root_parts.append(_roots(plants, f, rows, x[rows, i], x[rows, i + 1]))
-    rows, i = np.nonzero(nearing)
+    rows, i = np.nonzero(signs.crossing)
+    low = x[rows, i]
+    high = x[rows, i + 1]
+    root_parts.append(_roots(plants, f, rows, low, high))
+    rows, i = np.nonzero(signs.nearing)
     around = np.stack([x[rows, i + k] for k in range(3)])
-    root_parts += _pairs(plants, f, rows, around, np.sign(f[rows, i + 1]))
+    sign = np.sign(f[rows, i + 1])
+    root_parts += _pairs(plants, f, rows, around, sign)
     row, place = (np.concatenate(parts) for parts in zip(*root_parts, strict=True))
     order = np.lexsort((place, row))
     return row[order], place[order]
+
+
+def _root_signs(f: Array) -> RootSigns:
+    """Where values (N, K) announce roots; NaN announces none."""
+    count = max(f.shape[1] - 2, 0)
+    neighbours = [f[:, k : k + count] for k in range(3)]
+    with np.errstate(invalid="ignore", over="ignore"):
+        zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
+        is_within_zeros = zero[:, :-2] & zero[:, 2:]
+        exact = zero[:, 1:-1] & ~is_within_zeros
+        crossing = f[:, :-1] * f[:, 1:] < 0.0
+        nearing = _nears_zero(*neighbours)
+    return RootSigns(exact, crossing, nearing)
+
+
+def _nears_zero(before: Array, middle: Array, after: Array) -> npt.NDArray[np.bool_]:
+    """Where three neighbours have one sign, and the middle one is nearest to zero."""
+    sign = np.sign(middle)
+    nearing = sign != 0.0
+    nearing &= np.sign(before) == sign
+    nearing &= np.sign(after) == sign
+    size = np.abs(middle)
+    size_before = np.abs(before)
+    size_after = np.abs(after)
+    nearing &= size <= np.minimum(size_before, size_after)
+    nearing &= size < np.maximum(size_before, size_after)
+    return nearing
 
 
 def _roots(plants: Statics, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
@@ -219,21 +276,28 @@ def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: A
     """A point between two at which the function has the opposite sign, by golden-section search;
     NaN without one.
     """
-    inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
-    values = np.stack([sign * function(v) for v in inner])
+    length = high - low
+    first = high - GOLDEN * length
+    second = low + GOLDEN * length
+    at_first = sign * function(first)
+    at_second = sign * function(second)
     turn = np.full(low.shape, np.nan)
     for _ in range(50):
-        least = np.where(values[1] < values[0], inner[1], inner[0])
-        turn = np.where(np.isnan(turn) & (values.min(axis=0) < 0.0), least, turn)
+        least = np.where(at_second < at_first, second, first)
+        is_opposite = np.minimum(at_first, at_second) < 0.0
+        turn = np.where(np.isnan(turn) & is_opposite, least, turn)
         if np.isfinite(turn).all():
             break
-        left = values[0] < values[1]
-        low = np.where(left, low, inner[0])
-        high = np.where(left, inner[1], high)
-        retained = np.where(left, inner[0], inner[1])
-        of_kept = np.where(left, values[0], values[1])
-        asked = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        at = sign * function(asked)
-        inner = np.stack([np.where(left, asked, retained), np.where(left, retained, asked)])
-        values = np.stack([np.where(left, at, of_kept), np.where(left, of_kept, at)])
+        in_left_part = at_first < at_second
+        low = np.where(in_left_part, low, first)
+        high = np.where(in_left_part, second, high)
+        length = high - low
+        retained = np.where(in_left_part, first, second)
+        at_retained = np.where(in_left_part, at_first, at_second)
+        new = np.where(in_left_part, high - GOLDEN * length, low + GOLDEN * length)
+        at_new = sign * function(new)
+        first = np.where(in_left_part, new, retained)
+        second = np.where(in_left_part, retained, new)
+        at_first = np.where(in_left_part, at_new, at_retained)
+        at_second = np.where(in_left_part, at_retained, at_new)
     return turn

@@ -170,20 +170,26 @@ def _without_coordinates(statics: Statics) -> str:
 
 def _line(statics: Statics, x: Array) -> str:
     plant = statics.separate[0]
+    pulls = []
     states = plant.muscle_states(statics.state(x))
-    pulls = ", ".join(
-        f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at"
-        f" {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa and a contraction of"
-        f" {100 * float(state.contraction):.1f} %"
-        for m, state in zip(plant.muscles, states, strict=True)
-    )
+    for muscle, state in zip(plant.muscles, states, strict=True):
+        # the addition of 0 makes a zero of a negative zero
+        tension = float(state.tension) + 0.0
+        pressure = round(float(state.pressure) / 1e3, 6) + 0.0
+        contraction = 100 * float(state.contraction)
+        pulls.append(
+            f"{muscle.name} pulls {tension:.4g} N at {pressure:.4g} kPa and a contraction of"
+            f" {contraction:.1f} %"
+        )
+    pulled = ", ".join(pulls)
+    coordinates = statics.plants.mechanism.coordinates
     accelerations = statics.accelerations(x[None, None])[0, 0]
     if len(x) == 1:
-        unit = statics.plants.mechanism.coordinates[0].unit
-        return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {unit}/s2"
-    named = zip(statics.plants.mechanism.coordinates, accelerations, strict=True)
+        unit = coordinates[0].unit
+        return f"{pulled}, and the load accelerates at {accelerations[0]:+.4g} {unit}/s2"
+    named = zip(coordinates, accelerations, strict=True)
     moving = ", ".join(f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in named)
-    return f"{pulls}, and the accelerations are {moving}"
+    return f"{pulled}, and the accelerations are {moving}"
 
 
 def _required_tension(statics: Statics, x: Array) -> str:
@@ -280,7 +286,8 @@ def _coordinates_of(statics: Statics, targets: Array) -> Array:
         at = _contractions(statics, x)
         perturbed = [_contractions(statics, x + 1e-6 * step) for step in np.diag(sizes)]
         slopes = np.stack([(value - at) / 1e-6 for value in perturbed], axis=-1)
-        x = np.add(x, sizes * _least_squares(slopes, targets - at, 1e-15))
+        change = _least_squares(slopes, targets - at, 1e-15)
+        x = np.add(x, sizes * change)
     return x
 
 
@@ -347,16 +354,18 @@ def _steps(statics: Statics, x: Array, f: Array, sizes: Array) -> Array:
     """
     slopes = np.empty((len(x), f.shape[1], x.shape[1]))
     for k, perturbation in enumerate(np.diag(1e-5 * sizes)):
-        ends = [
+        after, before = (
             np.where(statics.within_reach(p[None])[0][:, None], p, x)
             for p in (x + perturbation, x - perturbation)
-        ]
-        span = (ends[0] - ends[1])[:, k] / sizes[k]
-        difference = (
-            statics.accelerations(ends[0][None])[0] - statics.accelerations(ends[1][None])[0]
         )
+        span = (after - before)[:, k] / sizes[k]
+        at_after = statics.accelerations(after[None])[0]
+        at_before = statics.accelerations(before[None])[0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            slopes[:, :, k] = difference / span[:, None]
+            slopes[:, :, k] = (at_after - at_before) / span[:, None]
+    # rows of equal size, so that no acceleration is neglected beside a large one
     scale = np.abs(slopes).max(axis=2)
     scale[scale == 0.0] = 1.0
-    return np.asarray(-sizes * _least_squares(slopes / scale[:, :, None], f / scale, 1e-14))
+    scaled = slopes / scale[:, :, None]
+    change = _least_squares(scaled, f / scale, 1e-14)
+    return np.asarray(-sizes * change)

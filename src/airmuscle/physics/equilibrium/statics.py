@@ -39,9 +39,12 @@ def shut_air_pressure(
         """
         p = gauge_pressure(np.exp(x), plant.ambient)
         steady_states = muscle.steady_state(p, contraction)
-        volume = muscle.volume(muscle.inner_contraction(contraction, steady_states), steady_states)
-        mass: Any = np.asarray(plant.gas.state_at(np.exp(x), volume, plant.ambient)["air_mass"])
-        return np.where(mass > 0, np.log(np.where(mass > 0, mass, 1.0) / air_mass), -np.inf)
+        inner = muscle.inner_contraction(contraction, steady_states)
+        volume = muscle.volume(inner, steady_states)
+        content = plant.gas.state_at(np.exp(x), volume, plant.ambient)
+        mass: Any = np.asarray(content["air_mass"])
+        ratio = np.where(mass > 0, mass, 1.0) / air_mass
+        return np.where(mass > 0, np.log(ratio), -np.inf)
 
     with np.errstate(all="ignore"):
         start = np.log(np.asarray(absolute_pressure(0.0, plant.ambient), dtype=float))
@@ -59,13 +62,18 @@ def _secant(excess: Callable[[Array], Array], a: Array) -> Array:
     root = np.full(a.shape, np.nan)
     lost = np.zeros(a.shape, dtype=bool)
     for _ in range(20):
-        at_b = np.where(np.isfinite(b) & (b < math.log(MAX_PRESSURE)), excess(b), np.nan)
-        open_ = np.isnan(root) & ~lost
-        lost |= open_ & ~np.isfinite(at_b)
-        root = np.where(open_ & ~lost & ((np.abs(at_b) < _TOLERANCE) | (at_b == at_a)), b, root)
+        is_possible = np.isfinite(b) & (b < math.log(MAX_PRESSURE))
+        at_b = np.where(is_possible, excess(b), np.nan)
+        is_open = np.isnan(root) & ~lost
+        lost |= is_open & ~np.isfinite(at_b)
+        has_converged = (np.abs(at_b) < _TOLERANCE) | (at_b == at_a)
+        root = np.where(is_open & ~lost & has_converged, b, root)
         if (lost | np.isfinite(root)).all():
             break
-        a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b
+        following = b - at_b * (b - a) / (at_b - at_a)
+        a = b
+        b = following
+        at_a = at_b
     return root
 
 
@@ -181,9 +189,12 @@ class Statics:
         """Plants (N,) for which the inputs and pressures are allowed."""
         permitted = np.array(np.broadcast_to(True, (len(self.parameters), 1)))
         for variable, value in zip(self.plants.input_variables, self.inputs, strict=True):
-            permitted &= (variable.minimum <= value) & (value <= variable.maximum)
-        for pressure in () if self.shut else self.air:
-            permitted &= np.asarray(absolute_pressure(pressure, self.plants.ambient)) > 0.0
+            permitted &= variable.minimum <= value
+            permitted &= value <= variable.maximum
+        pressures = () if self.shut else self.air
+        for pressure in pressures:
+            absolute = np.asarray(absolute_pressure(pressure, self.plants.ambient))
+            permitted &= absolute > 0.0
         return permitted[:, 0]
 
     def contractions(self, x: Array) -> list[Array]:
@@ -206,7 +217,8 @@ class Statics:
         """Whether the contraction of every muscle is within its limits (N, K)."""
         inside = np.ones(x.shape[:2], dtype=bool)
         for eps, (low, high) in zip(self.contractions(x), self.contraction_limits, strict=True):
-            inside &= (eps >= low) & (eps <= high)
+            inside &= eps >= low
+            inside &= eps <= high
         return inside
 
     def place(self, x: Array) -> dict[str, float]:

@@ -226,15 +226,20 @@ class PlantDisplay(NotebookDisplay):
 
     def _draw(self) -> Any:
         plant: Any = self
-        laws: dict[Any, Any] = {}
+        muscles_of_law: dict[str, list[Any]] = {}
         for muscle in plant.muscles:
-            laws.setdefault(repr((muscle.contractile, muscle.validity_range)), []).append(muscle)
-        groups = list(laws.values())[:MAX_CHARTS]
-        figure, axes = new_figure(len(groups), 1, height=2.6 * len(groups), squeeze=False)
+            # muscles with one law and one range have one chart
+            law = repr((muscle.contractile, muscle.validity_range))
+            muscles_of_law.setdefault(law, []).append(muscle)
+        groups = list(muscles_of_law.values())[:MAX_CHARTS]
+        count = len(groups)
+        figure, axes = new_figure(count, 1, height=2.6 * count, squeeze=False)
         for axis, muscles in zip(axes[:, 0], groups, strict=True):
-            names = textwrap.shorten(", ".join(m.name for m in muscles), 70, placeholder=" …")
-            title = f"{names}: {type(muscles[0].contractile).__name__}"
-            plot_isobars(muscles[0].contractile, title, muscles[0].validity_range, ax=axis)
+            first = muscles[0]
+            names = ", ".join(muscle.name for muscle in muscles)
+            shortened = textwrap.shorten(names, 70, placeholder=" …")
+            title = f"{shortened}: {type(first.contractile).__name__}"
+            plot_isobars(first.contractile, title, first.validity_range, ax=axis)
         return figure
 
 

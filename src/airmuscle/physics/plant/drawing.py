@@ -88,15 +88,17 @@ class MuscleShapes:
         other end.
         """
         geometry = self.geometries[index]
+        radius = self.fitting_radii[index]
         muscle_row = select_prefix(self.prefixes[index], row)
+        contraction = muscle_row["contraction"]
         fitting = FITTING * geometry.resting_length
-        length = geometry.resting_length * (1.0 - muscle_row["contraction"])
-        outline = muscle_outline(geometry, muscle_row["contraction"])
+        length = geometry.resting_length * (1.0 - contraction)
         middle = y + upwards * (fitting + length / 2)
         end = y + upwards * (2 * fitting + length)
-        ends = [(y, y + upwards * fitting), (end - upwards * fitting, end)]
-        boxes = [_box(x, self.fitting_radii[index], *pair) for pair in ends]
-        return [Shape(outline + np.array([x, middle]), muscle_row["pressure"]), *boxes], end
+        first = _box(x, radius, y, y + upwards * fitting)
+        second = _box(x, radius, end - upwards * fitting, end)
+        outline = muscle_outline(geometry, contraction) + np.array([x, middle])
+        return [Shape(outline, muscle_row["pressure"]), first, second], end
 
 
 class Scene(NamedTuple):
@@ -117,62 +119,80 @@ def _joint_scene(muscles: MuscleShapes, joint: AntagonisticJoint) -> Scene:
     """Two muscles side by side below a pulley, whose angle a pointer shows."""
     length = muscles.length
     radius = joint.radius
-    base, place = -1.35 * length, max(radius, muscles.spacing)
+    base = -1.35 * length
+    place = max(radius, muscles.spacing)
     half = max(0.62 * length, 2.05 * muscles.spacing)
+    floor = _box(0.0, 0.5 * length, base - 0.03 * length, base)
+    pulley = (0.0, 0.0, radius)
 
     def draw(row: Row) -> Drawing:
-        shapes = [_box(0.0, 0.5 * length, base - 0.03 * length, base)]
+        shapes = [floor]
         lines = []
         for index, side in enumerate((-1.0, 1.0)):
-            muscle, top = muscles.shapes(index, row, side * place, base, 1.0)
+            x = side * place
+            muscle, top = muscles.shapes(index, row, x, base, 1.0)
             shapes += muscle
-            lines.append(np.array([[side * place, top], [side * radius, 0.0]]))
-        tip = 0.5 * length * np.array([-np.sin(row["angle"]), np.cos(row["angle"])])
+            cable = [[x, top], [side * radius, 0.0]]
+            lines.append(np.array(cable))
+        angle = row["angle"]
+        direction = np.array([-np.sin(angle), np.cos(angle)])
+        tip = 0.5 * length * direction
         lines.append(np.array([[0.0, 0.0], tip]))
-        return Drawing(shapes, lines, [(0.0, 0.0, radius), (*tip.tolist(), 0.2 * radius)])
+        mark = (*tip.tolist(), 0.2 * radius)
+        return Drawing(shapes, lines, [pulley, mark])
 
-    return Scene(muscles, (-half, half, -1.45 * length, 0.62 * length), ("angle",), draw)
+    limits = (-half, half, -1.45 * length, 0.62 * length)
+    return Scene(muscles, limits, ("angle",), draw)
 
 
 def _lift_scene(muscles: MuscleShapes, load: Translation) -> Scene:
     """A muscle that hangs from a ceiling, with the load below it."""
     length = muscles.length
+    ceiling = _box(0.0, 0.3 * length, 0.0, 0.03 * length)
 
     def draw(row: Row) -> Drawing:
         muscle, end = muscles.shapes(0, row, 0.0, 0.0, -1.0)
-        ceiling = _box(0.0, 0.3 * length, 0.0, 0.03 * length)
-        mass = _box(0.0, 0.13 * length, end - 0.2 * length, end - 0.04 * length)
-        return Drawing(
-            [ceiling, *muscle, mass], [np.array([[0.0, end], [0.0, end - 0.04 * length]])], []
-        )
+        top = end - 0.04 * length
+        bottom = end - 0.2 * length
+        mass = _box(0.0, 0.13 * length, bottom, top)
+        cable = np.array([[0.0, end], [0.0, top]])
+        return Drawing([ceiling, *muscle, mass], [cable], [])
 
-    return Scene(
-        muscles, (-0.5 * length, 0.5 * length, -1.5 * length, 0.1 * length), ("position",), draw
-    )
+    limits = (-0.5 * length, 0.5 * length, -1.5 * length, 0.1 * length)
+    return Scene(muscles, limits, ("position",), draw)
 
 
 def _arm_scene(muscles: MuscleShapes, arm: PlanarArm) -> Scene:
     """The links of a planar arm, with its muscles side by side above them."""
-    count, coordinates = len(muscles.geometries), tuple(c.name for c in arm.coordinates)
+    count = len(muscles.geometries)
+    coordinates = tuple(c.name for c in arm.coordinates)
     lengths = [link.length for link in arm.links]
     reach = float(sum(lengths))
     half = max(1.1 * reach, 1.2 * muscles.spacing * count)
+    shoulder = _box(0.0, 0.15 * reach, 0.03 * reach, 0.06 * reach)
+    places = [2.2 * muscles.spacing * (index - 0.5 * (count - 1)) for index in range(count)]
 
     def draw(row: Row) -> Drawing:
-        angles = np.cumsum([row[name] for name in coordinates])
-        steps = [
-            length * np.array([np.sin(a), -np.cos(a)])
-            for length, a in zip(lengths, angles, strict=True)
-        ]
-        points = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
-        shapes = [_box(0.0, 0.15 * reach, 0.03 * reach, 0.06 * reach)]
-        for index in range(count):
-            place = 2.2 * muscles.spacing * (index - 0.5 * (count - 1))
-            shapes += muscles.shapes(index, row, place, 0.15 * reach, 1.0)[0]
-        return Drawing(shapes, [points], [(*point.tolist(), 0.03 * reach) for point in points])
+        points = _joint_points(lengths, [row[name] for name in coordinates])
+        shapes = [shoulder]
+        for index, place in enumerate(places):
+            muscle, _ = muscles.shapes(index, row, place, 0.15 * reach, 1.0)
+            shapes += muscle
+        joints = [(*point.tolist(), 0.03 * reach) for point in points]
+        return Drawing(shapes, [points], joints)
 
-    limits = (-half, half, -1.15 * reach, 0.25 * reach + 1.25 * muscles.length)
+    top = 0.25 * reach + 1.25 * muscles.length
+    limits = (-half, half, -1.15 * reach, top)
     return Scene(muscles, limits, coordinates, draw)
+
+
+def _joint_points(lengths: Sequence[float], angles: Sequence[float]) -> Array:
+    """The shoulder and the ends of the links (N + 1, 2) [m] at the angles of the joints [rad]."""
+    points = [np.zeros(2)]
+    for length, angle in zip(lengths, np.cumsum(angles), strict=True):
+        direction = np.array([np.sin(angle), -np.cos(angle)])
+        points.append(points[-1] + length * direction)
+    return np.vstack(points)
 
 
 def scene_of(

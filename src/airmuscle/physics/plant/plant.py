@@ -167,12 +167,14 @@ class Plant(PlantDisplay, StaticPlant):
         """The rates from an evaluation at this state."""
         rates: dict[str, Value] = {}
         for muscle, prefix, flow in zip(at.muscles, self.prefixes, at.flows, strict=True):
-            growth = self.gas.rates(
+            air_rates = self.gas.rates(
                 muscle.states, muscle.air, flow, muscle.volume_rate, self.ambient
             )
-            rates |= with_prefix(prefix, growth) | with_prefix(prefix, muscle.rates)
+            rates |= with_prefix(prefix, air_rates)
+            rates |= with_prefix(prefix, muscle.rates)
         for c in self.mechanism.coordinates:
-            rates |= {c.name: state[c.speed], c.speed: at.accelerations[c.name]}
+            rates[c.name] = state[c.speed]
+            rates[c.speed] = at.accelerations[c.name]
         rates |= self.mechanism.inner_rates(state, state, at.forces)
         for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
             rates |= self._outside(prefix, circuit.rates)

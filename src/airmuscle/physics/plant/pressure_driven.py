@@ -5,7 +5,7 @@ carries.
 import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from ...core import ParameterError, Value, Values, check_known, model, parameter
 from ...core.system import Input, StateVariable, select_prefix, with_prefix
@@ -14,6 +14,14 @@ from ..muscle import Muscle
 from ..muscle.muscle import MuscleForce
 from .plant import Plant
 from .static_plant import MuscleSystem, states_of_muscle
+
+
+class MusclePull(NamedTuple):
+    """A muscle at a state of the plant: its contraction, its forces and its states."""
+
+    contraction: Value
+    force: MuscleForce
+    states: dict[str, Value]
 
 
 @model
@@ -72,7 +80,7 @@ class PressureDriven(MuscleSystem):
         )
         return (*measured, *self.mechanism.inputs)
 
-    def _pulls(self, state: Values) -> list[tuple[Value, MuscleForce, dict[str, Value]]]:
+    def _pulls(self, state: Values) -> list[MusclePull]:
         """The contraction, the forces and the own states of every muscle."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
@@ -85,30 +93,34 @@ class PressureDriven(MuscleSystem):
             force = muscle.compute_force(
                 pressure, muscle.inner_contraction(eps, muscle_states), eps, v, muscle_states
             )
-            pulls.append((eps, force, muscle_states))
+            pulls.append(MusclePull(eps, force, muscle_states))
         return pulls
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         rates = dict[str, Value]()
         pulls = self._pulls(state)
-        for prefix, muscle, lag, (_, pull, muscle_states) in zip(
+        for prefix, muscle, lag, pull in zip(
             self.prefixes, self.muscle, self.lags, pulls, strict=True
         ):
             pressure = state[f"{prefix}pressure"]
-            rates |= with_prefix(prefix, muscle.rates(muscle_states, pressure, pull.inner_speed))
-            rates[f"{prefix}pressure"] = (inputs[f"{prefix}measured_pressure"] - pressure) / lag
-        tensions = [pull.tension for _, pull, _ in pulls]
+            inner_rates = muscle.rates(pull.states, pressure, pull.force.inner_speed)
+            rates |= with_prefix(prefix, inner_rates)
+            measured = inputs[f"{prefix}measured_pressure"]
+            rates[f"{prefix}pressure"] = (measured - pressure) / lag
+        tensions = [pull.force.tension for pull in pulls]
         forces = self.mechanism.generalised_forces(state, tensions, self.resting_lengths)
         accelerations = self.mechanism.acceleration(state, state, forces, inputs)
         for c in self.mechanism.coordinates:
-            rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
+            rates[c.name] = state[c.speed]
+            rates[c.speed] = accelerations[c.name]
         return {**rates, **self.mechanism.inner_rates(state, state, forces)}
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
         """Contraction and tension of every muscle."""
         outputs: dict[str, Value] = {}
-        for prefix, (eps, pull, _) in zip(self.prefixes, self._pulls(state), strict=True):
-            outputs |= {f"{prefix}contraction": eps, f"{prefix}force": pull.tension}
+        for prefix, pull in zip(self.prefixes, self._pulls(state), strict=True):
+            outputs[f"{prefix}contraction"] = pull.contraction
+            outputs[f"{prefix}force"] = pull.force.tension
         return outputs
 
     def state_at(self, pressures: Sequence[float], **values: float) -> dict[str, float]:

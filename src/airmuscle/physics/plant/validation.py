@@ -48,10 +48,21 @@ def check_parts(plant: Any) -> None:
                 " plant. Use as_force_law(law, validity_range) for a characteristic,"
                 " as_polynomial(geometry) for a geometry."
             )
+    _check_limits_of_laws(plant.muscles)
+    check_structure((tuple(plant.muscles), tuple(plant.circuits), plant.mechanism))
+    _check_counts(plant.muscles, plant.circuits, plant.mechanism)
+    if isinstance(plant.circuit, tuple) and any(c.port_count != 1 for c in plant.circuits):
+        raise ParameterError(
+            "Plant: give a circuit that feeds several muscles alone, not in a tuple."
+        )
+
+
+def _check_limits_of_laws(muscles: Sequence[Muscle]) -> None:
+    """Raise ParameterError for a law whose validity range is not within the bounds of one."""
     limits = parameters(ValidityRange)
     ranged = (
         m.contractile
-        for m in plant.muscles
+        for m in muscles
         if all(hasattr(m.contractile, limit.name) for limit in limits)
     )
     for law, declared in itertools.product(ranged, limits):
@@ -67,12 +78,6 @@ def check_parts(plant: Any) -> None:
                 f" {smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to"
                 f" {high:g}{unit}."
             )
-    check_structure((tuple(plant.muscles), tuple(plant.circuits), plant.mechanism))
-    _check_counts(plant.muscles, plant.circuits, plant.mechanism)
-    if isinstance(plant.circuit, tuple) and any(c.port_count != 1 for c in plant.circuits):
-        raise ParameterError(
-            "Plant: give a circuit that feeds several muscles alone, not in a tuple."
-        )
 
 
 def convert_pressures(plant: Any) -> None:

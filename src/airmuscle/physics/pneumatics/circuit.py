@@ -209,9 +209,11 @@ class WithLeak(CircuitWrapper):
         self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient
     ) -> CircuitFlows:
         inner = self.circuit.supplied_flow(inlet, muscles, state, inputs, ambient)
-        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in muscles]
+        outside = ambient_air(ambient)
+        leakage = [orifice_flow(self.leak, air, outside) for air in muscles]
         flows = tuple(flow - leak for flow, leak in zip(inner.flows, leakage, strict=True))
-        return dataclasses.replace(inner, flows=flows, exhausted=sum(leakage, inner.exhausted))
+        exhausted = sum(leakage, inner.exhausted)
+        return dataclasses.replace(inner, flows=flows, exhausted=exhausted)
 
 
 @model

@@ -113,7 +113,8 @@ class SuppliedVolume(AirSource):
     ) -> tuple[dict[str, Value], Flow]:
         upstream = select_prefix("supply.", state)
         air = self.air(state, ambient)
-        feed_flow = self.feed_flow(self.supply.air(upstream, ambient), air, ambient)
+        upstream_air = self.supply.air(upstream, ambient)
+        feed_flow = self.feed_flow(upstream_air, air, ambient)
         upstream_rates, inflow = self.supply.balance(upstream, feed_flow, ambient)
         rates = self.gas.rates(state, air, feed_flow - drawn, 0.0, ambient)
         return {**rates, **with_prefix("supply.", upstream_rates)}, inflow
