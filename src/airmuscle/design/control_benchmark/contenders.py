@@ -125,19 +125,31 @@ class SensedController(Controller):
         sense, act = self._compiled
         sensors, before, actuation = memory
         readings, sensors = sense.step(sensors, measurement, dt)
-        seen = Measurement(readings, measurement.setpoints, {**measurement.ranges, **self.ranges})
+        ranges = {**measurement.ranges, **self.ranges}
+        seen = Measurement(readings, measurement.setpoints, ranges)
         commands, controller_memory = self.controller.step(before, seen, dt)
         points = {**measurement.setpoints, **with_prefix(COMMANDED, commands)}
         valves, actuation = act.step(actuation, seen._replace(setpoints=points), dt)
-        memories = zip(self.actuation.initial_memory, actuation, strict=True)
-        applied = {
-            key.rpartition("outer.")[2].removeprefix("law."): value for key, value in memories
-        }
-        attained = {name: applied[name] for name in commands}
-        if any(abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()):
-            only = {**seen.ranges, **{name: (value, value) for name, value in attained.items()}}
-            _, controller_memory = self.controller.step(before, seen._replace(ranges=only), dt)
+        attained = self._attained(commands, actuation)
+        is_limited = any(
+            abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()
+        )
+        if is_limited:
+            # The controller takes note of what was applied: a second step, in which nothing else
+            # is possible, replaces its memory.
+            only = {name: (value, value) for name, value in attained.items()}
+            limited = seen._replace(ranges={**seen.ranges, **only})
+            _, controller_memory = self.controller.step(before, limited, dt)
         return valves, (sensors, controller_memory, actuation)
+
+    def _attained(self, commands: Mapping[str, float], actuation: Any) -> dict[str, float]:
+        """The commands as the actuation applied them, which stand in its memory."""
+        applied = dict[str, float]()
+        memories = zip(self.actuation.initial_memory, actuation, strict=True)
+        for key, value in memories:
+            name = key.rpartition("outer.")[2].removeprefix("law.")
+            applied[name] = value
+        return {name: applied[name] for name in commands}
 
     def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the controller."""

@@ -276,10 +276,11 @@ class DeviationLaw(EnclosingLaw):
         speed = memory["speed"]
         deviations = {READING: columns["angle"] - points["angle"]}
         if SPEED_READING in self.law.measured_columns:
-            lagged = speed + (1.0 - ops.exp(-dt / self.speed_lag)) * (
-                points["angular_speed"] - speed
-            )
-            speed = ops.where(memory["started"] > 0, lagged, points["angular_speed"])
+            wanted = points["angular_speed"]
+            share = 1.0 - ops.exp(-dt / self.speed_lag)
+            lagged = speed + share * (wanted - speed)
+            # the first sample starts at the speed of the motion
+            speed = ops.where(memory["started"] > 0, lagged, wanted)
             deviations[SPEED_READING] = columns["angular_speed"] - speed
         seen = Measurement(deviations, {READING: 0.0}, measurement.ranges)
         command, later = self.law.step(select_prefix("law.", memory), seen, dt)
@@ -321,11 +322,12 @@ class AlongMotion(Controller):
         deviations, passed = self.deviation.step(passed, measurement, dt)
         low, high = measurement.ranges[DIFFERENCE]
         command = float(ahead[DIFFERENCE])
-        seen = Measurement(
-            deviations, {READING: 0.0}, {DIFFERENCE: (low - command, high - command)}
-        )
+        # what the feed-forward leaves of the range
+        ranges = {DIFFERENCE: (low - command, high - command)}
+        seen = Measurement(deviations, {READING: 0.0}, ranges)
         back, design_memory = self.design.predictive.step(design_memory, seen, dt)
-        return {DIFFERENCE: command + back[DIFFERENCE]}, (forward, passed, design_memory)
+        total = command + back[DIFFERENCE]
+        return {DIFFERENCE: total}, (forward, passed, design_memory)
 
     def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the designed controller."""

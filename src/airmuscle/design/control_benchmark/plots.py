@@ -38,18 +38,28 @@ def error_figure(names: Sequence[str], errors: Mapping[str, Array]) -> Any:
     """The rms error of every controller in every task (tasks, 3): median, smallest and largest."""
     figure, axis = new_figure(height=1.2 + 0.32 * len(names))
     rows = np.arange(len(names))
+    middle = (len(errors) - 1) / 2
     for i, (contender, values) in enumerate(errors.items()):
         style = marker_style(i)
-        shift = 0.08 * (i - (len(errors) - 1) / 2)
-        axis.plot(values[:, 0], rows + shift, linestyle="none", label=contender, **style)
-        axis.hlines(rows + shift, values[:, 1], values[:, 2], color=style["color"], linewidth=0.7)
+        shifted = rows + 0.08 * (i - middle)
+        median, low, high = values.T
+        axis.plot(median, shifted, linestyle="none", label=contender, **style)
+        axis.hlines(shifted, low, high, color=style["color"], linewidth=0.7)
     axis.set(xscale="log", xlabel="rms error [degree]")
     axis.set_yticks(rows, names)
     axis.set_ylim(len(names) - 0.5, -0.5)
-    for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
-        which(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "125" else "")
+    axis.xaxis.set_major_formatter(_text_of_tick)
+    axis.xaxis.set_minor_formatter(_text_of_tick)
     legend_below(figure, axis, columns=3)
     return figure
+
+
+def _text_of_tick(value: float, _: object) -> str:
+    """The text of a tick of a logarithmic axis, at 1, 2 and 5 of a decade alone: more would
+    overlap.
+    """
+    digit = f"{value:.0e}"[0]
+    return f"{value:g}" if digit in "125" else ""
 
 
 def run_figure(

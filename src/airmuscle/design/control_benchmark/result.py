@@ -314,11 +314,14 @@ class BenchmarkResult(Reported):
     def run_plot(self, names: Sequence[str], group: Group = Group.MODELS) -> Plot:
         """Angle and error over time of some tasks on the first truth, one column for each."""
         truth = self.truths[0]
+        # of the searches of a contender the first
         shown = {result.name: result for result in reversed(self.results)}
         results = [shown[name] for name in self.contenders(group)]
         tasks = {task.name: task for task in self.tasks}
-        figure = partial(run_figure, results, [tasks[name] for name in names], group, truth)
-        return Plot("runs", f"Angle and error over time, {group}, {truth}, first search.", figure)
+        chosen = [tasks[name] for name in names]
+        figure = partial(run_figure, results, chosen, group, truth)
+        caption = f"Angle and error over time, {group}, {truth}, first search."
+        return Plot("runs", caption, figure)
 
     @property
     def _task_names(self) -> list[str]:

@@ -67,16 +67,31 @@ def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
 
 def _signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
     h = joint.sample_time
-    time: Array = h * np.arange(round(task.duration / h) + 2, dtype=float)
+    count = round(task.duration / h) + 2
+    time: Array = h * np.arange(count, dtype=float)
     angle, speed, acceleration = task.motion.at(time)
-    mean = joint.mean_pressure + np.interp(time, *np.array(task.stiffening or ((0.0, 0.0),)).T)
-    half = inverse_dynamics(joint, joint.model, task.motion, time, mean)
-    ahead = inverse_dynamics(joint, joint.model, task.motion, time + 0.5 * h, mean)
-    behind = inverse_dynamics(joint, joint.model, task.motion, time - 0.5 * h, mean)
-    rate = np.where(np.isclose(speed, 0.0), 0.0, (ahead - behind) / h)
-    inverse = AntagonisticInverse(joint.model.muscles, joint.model.mechanism)
+    points = np.array(task.stiffening or ((0.0, 0.0),))
+    mean = joint.mean_pressure + np.interp(time, *points.T)
+    half, ahead, behind = (
+        inverse_dynamics(joint, joint.model, task.motion, instants, mean)
+        for instants in (time, time + 0.5 * h, time - 0.5 * h)
+    )
+    # at rest the sign of the friction, and with it the difference, is undetermined
+    is_at_rest = np.isclose(speed, 0.0)
+    rate = np.where(is_at_rest, 0.0, (ahead - behind) / h)
+    model = joint.model
+    inverse = AntagonisticInverse(model.muscles, model.mechanism)
     stiffness = np.asarray(inverse.stiffness(mean + half, mean - half, angle), dtype=float)
-    return TaskSignals(time, angle, speed, acceleration, mean, half, rate, stiffness)
+    return TaskSignals(
+        time,
+        angle,
+        speed,
+        acceleration,
+        mean,
+        half,
+        rate,
+        stiffness,
+    )
 
 
 _kept_signals = functools.lru_cache(maxsize=128)(_signals)

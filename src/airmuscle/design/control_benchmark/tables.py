@@ -5,7 +5,7 @@ runs.
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core import conversion
 from ...report.chapter import Table, TableColumn
@@ -15,6 +15,17 @@ from .signals import METRICS, RATED_STROKES, SETTLING_BAND, STEADY_TIME
 
 ANR = " (ANR)"
 """End of the unit of a volume of air at the reference atmosphere of ISO 8778."""
+
+
+class SearchRow(NamedTuple):
+    """A contender in the table of the searches; `spread` is None for one search alone."""
+
+    gains: int
+    sets: int
+    converged: str
+    restarts: int
+    objective: float
+    spread: float | None
 
 
 def metric_column(metric: str, values: Sequence[float], **declared: Any) -> TableColumn:
@@ -38,31 +49,17 @@ def search_table(joint: BenchmarkJoint, results: Sequence[ContenderResult]) -> T
     names = list(dict.fromkeys(result.name for result in tuned))
     if not names:
         return None
-    searches = {
-        name: [result.tuning for result in tuned if result.name == name and result.tuning]
-        for name in names
-    }
     seeds = ", ".join(dict.fromkeys(str(result.seed) for result in results))
-    best = {name: [tuning.objective for tuning in tunings] for name, tunings in searches.items()}
+
+    rows = [_search_row([result for result in tuned if result.name == name]) for name in names]
     columns: dict[str, Any] = {
         "controller": names,
-        "gains": [len(tunings[0].ranges) for tunings in searches.values()],
-        "sets of gains": [
-            max(len(tuning.history) for tuning in tunings) for tunings in searches.values()
-        ],
-        "converged": [
-            f"{sum(tuning.converged for tuning in tunings)} of {len(tunings)}"
-            for tunings in searches.values()
-        ],
-        "restarts": [
-            sum(result.restarts for result in tuned if result.name == name) for name in names
-        ],
-        "objective": metric_column(
-            "rmse", [sorted(values)[len(values) // 2] for values in best.values()]
-        ),
-        "spread": TableColumn(
-            [max(v) / min(v) - 1.0 if v[1:] else None for v in best.values()], "1", "%"
-        ),
+        "gains": [row.gains for row in rows],
+        "sets of gains": [row.sets for row in rows],
+        "converged": [row.converged for row in rows],
+        "restarts": [row.restarts for row in rows],
+        "objective": metric_column("rmse", [row.objective for row in rows]),
+        "spread": TableColumn([row.spread for row in rows], "1", "%"),
     }
     return Table(
         "searches",
@@ -72,6 +69,22 @@ def search_table(joint: BenchmarkJoint, results: Sequence[ContenderResult]) -> T
         f" {joint.objective}, median over the seeds; spread: largest over smallest. A search has"
         " converged where its two best descents agree. Where two seeds differ by more than"
         f" {100 * SEARCH_SPREAD:g} %, the worst one is restarted, at most {RESTARTS} times.",
+    )
+
+
+def _search_row(results: Sequence[ContenderResult]) -> SearchRow:
+    """The row of the searches of a contender, one result for each seed."""
+    tunings = [result.tuning for result in results if result.tuning]
+    objectives = [tuning.objective for tuning in tunings]
+    converged = sum(tuning.converged for tuning in tunings)
+    spread = max(objectives) / min(objectives) - 1.0 if len(objectives) > 1 else None
+    return SearchRow(
+        gains=len(tunings[0].ranges),
+        sets=max(len(tuning.history) for tuning in tunings),
+        converged=f"{converged} of {len(tunings)}",
+        restarts=sum(result.restarts for result in results),
+        objective=sorted(objectives)[len(objectives) // 2],
+        spread=spread,
     )
 
 

@@ -65,12 +65,19 @@ class SineMotion(JointMotion):
 
     def at(self, time: Array) -> Array:
         w = 2.0 * math.pi * self.frequency
-        r, r1, r2 = _fifth_degree(time * self.frequency) * self.frequency ** np.arange(3.0)[:, None]
-        s = np.sin(w * time)
-        c = np.cos(w * time)
-        return self.amplitude * np.stack(
-            [r * s, r1 * s + w * r * c, r2 * s + 2.0 * w * r1 * c - w * w * r * s]
-        )
+        powers = self.frequency ** np.arange(3.0)
+        # the rise and its derivatives by the time
+        periods = time * self.frequency
+        r, r1, r2 = _fifth_degree(periods) * powers[:, None]
+        phase = w * time
+        s = np.sin(phase)
+        c = np.cos(phase)
+        angle = r * s
+        speed = r1 * s + w * r * c
+        coupled = 2.0 * w * r1 * c
+        acceleration = r2 * s + coupled - w * w * r * s
+        columns = [angle, speed, acceleration]
+        return self.amplitude * np.stack(columns)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,7 +113,9 @@ def _fifth_degree(share: Array) -> Array:
     """
     s = np.clip(share, 0.0, 1.0)
     value = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-    return np.stack([value, 30.0 * s**2 * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)])
+    first = 30.0 * s**2 * (1.0 - s) ** 2
+    second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return np.stack([value, first, second])
 
 
 DEGREE = math.pi / 180.0

@@ -68,10 +68,11 @@ class Grid(Design):
 
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         sizes = [len(self._levels(variation)) for variation in variations]
-        indices = np.unravel_index(np.arange(math.prod(sizes)), sizes)
-        return np.column_stack(
-            [(index + 0.5) / size for index, size in zip(indices, sizes, strict=True)]
-        )
+        runs = np.arange(math.prod(sizes))
+        indices = np.unravel_index(runs, sizes)
+        # the middle of the share of a level
+        points = [(index + 0.5) / size for index, size in zip(indices, sizes, strict=True)]
+        return np.column_stack(points)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -149,10 +150,13 @@ class Saltelli(SampledDesign):
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         d = len(variations)
         both = _sobol_points(2 * d, self.count, self.seed)
-        table = np.repeat(both[:, None, :d], d + 2, axis=1)
+        first = both[:, :d]
+        second = both[:, d:]
+        # rows A, A with one column of B for each parameter, and B of every base point
+        table = np.repeat(first[:, None], d + 2, axis=1)
         for i in range(d):
-            table[:, 1 + i, i] = both[:, d + i]
-        table[:, d + 1] = both[:, d:]
+            table[:, 1 + i, i] = second[:, i]
+        table[:, d + 1] = second
         return table.reshape(-1, d)
 
 

@@ -198,11 +198,16 @@ class Triangular(Distribution):
         return unit * (self.high - self.low) + self.low
 
     def cdf(self, values: Array) -> Array:
-        c = (self.mode - self.low) / (self.high - self.low)
-        x = np.clip((values - self.low) / (self.high - self.low), 0.0, 1.0)
+        width = self.high - self.low
+        c = (self.mode - self.low) / width
+        share = (values - self.low) / width
+        x = np.clip(share, 0.0, 1.0)
         with np.errstate(divide="ignore", invalid="ignore"):  # of the branch that is not taken
-            falling = np.where(x < 1.0, (x * x - 2.0 * x + c) / (c - 1.0), 1.0)
-            return np.where(x < c, x * x / c, falling)
+            rising = x * x / c
+            falling = (x * x - 2.0 * x + c) / (c - 1.0)
+        # exactly 1 at the end, also where the mode is there
+        below_high = np.where(x < 1.0, falling, 1.0)
+        return np.where(x < c, rising, below_high)
 
 
 def _read_inner(value: Any, unit: str, where: Location) -> Distribution:

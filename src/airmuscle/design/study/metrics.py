@@ -121,7 +121,8 @@ class RootMeanSquare(Scalar):
         steps = np.diff(time)
         if not steps.sum() > 0:
             return abs(float(values[0]))
-        return math.sqrt(float(steps @ (a * a + a * b + b * b)) / 3.0 / float(steps.sum()))
+        integral = float(steps @ (a * a + a * b + b * b)) / 3.0
+        return math.sqrt(integral / float(steps.sum()))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -98,7 +98,9 @@ def _indices(means: Array, parameters: int) -> tuple[Array, Array]:
     """
     variance = means[:, -1:] - means[:, -2:-1] ** 2
     variance = np.where(variance > 0, variance, np.nan)
-    return means[:, :parameters] / variance, means[:, parameters : 2 * parameters] / variance
+    first = means[:, :parameters] / variance
+    total = means[:, parameters : 2 * parameters] / variance
+    return first, total
 
 
 def sensitivity_table(paths: Sequence[str], indices: Mapping[str, SobolIndices]) -> Table:

@@ -57,7 +57,9 @@ class GainRange:
         else:
             inside = self.low + (self.high - self.low) * coordinates
         rounded = [float(f"{value:.{DIGITS - 1}e}") for value in np.ravel(inside).tolist()]
-        return np.asarray(np.clip(rounded, self.low, self.high).reshape(np.shape(inside)))
+        # a bound itself may have more digits
+        limited = np.clip(rounded, self.low, self.high)
+        return np.asarray(limited.reshape(np.shape(inside)))
 
 
 def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:

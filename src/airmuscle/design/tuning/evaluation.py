@@ -56,30 +56,43 @@ def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGr
     groups = []
     for places in members.values():
         together = tuple(cases[i] for i in places)
-        first = together[0]
-        starts = [case.start() for case in together]
-        table = np.array([flatten(case.plant) for case in together])
-        paths = [leaf.path for leaf in leaves(first.plant)]
-        varied = {
-            paths[i]: table[:, i] for i in np.flatnonzero((table != table[0]).any(axis=0)).tolist()
-        }
-        states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
-        outputs = first.plant.outputs(starts[0], dict.fromkeys(first.plant.inputs, 0.0))
-        columns = (*(s.name for s in first.plant.states), *outputs)
-        try:
-            first.loop.check_columns(columns, first.plant.inputs)
-            scales = index.scales_for(first.loop.controller.setpoints, columns)
-        except AirmuscleError as error:
-            raise error.located(f"case '{first.name}'") from None
-        air = tuple(s.name for s in first.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
-        commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
-        recorded = (
-            *(column for name in scales for column in (name, f"{SETPOINT}{name}")),
-            *commands,
-            *air,
-        )
-        groups.append(CaseGroup(np.array(places), together, varied, states, scales, air, recorded))
+        groups.append(_group_of(together, np.array(places), index))
     return tuple(groups)
+
+
+def _group_of(
+    cases: tuple[LoopCase, ...], places: npt.NDArray[np.intp], index: TrackingIndex
+) -> CaseGroup:
+    """Cases of one structure of the plant and one loop, with what they do not have in common."""
+    first = cases[0]
+    plant = first.plant
+    starts = [case.start() for case in cases]
+    states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
+    still = dict.fromkeys(plant.inputs, 0.0)
+    outputs = plant.outputs(starts[0], still)
+    state_names = [state.name for state in plant.states]
+    columns = (*state_names, *outputs)
+    try:
+        first.loop.check_columns(columns, plant.inputs)
+        scales = index.scales_for(first.loop.controller.setpoints, columns)
+    except AirmuscleError as error:
+        raise error.located(f"case '{first.name}'") from None
+    air = tuple(name for name in state_names if name.rpartition(".")[2] == AIR_MASS)
+    commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
+    tracked = (column for name in scales for column in (name, f"{SETPOINT}{name}"))
+    recorded = (*tracked, *commands, *air)
+    varied = _varied_parameters(cases)
+    return CaseGroup(places, cases, varied, states, scales, air, recorded)
+
+
+def _varied_parameters(cases: Sequence[LoopCase]) -> dict[str, Array]:
+    """The parameters (m,) by path in which the plants of cases differ."""
+    rows = [flatten(case.plant) for case in cases]
+    table = np.array(rows)
+    paths = [leaf.path for leaf in leaves(cases[0].plant)]
+    differs = (table != table[0]).any(axis=0)
+    columns = zip(paths, table.T, differs, strict=True)
+    return {path: column for path, column, varies in columns if varies}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -132,18 +145,24 @@ class Evaluator:
         first = group.cases[0]
         shape = (rows.size, len(group.cases))
         at = np.ix_(rows, group.places)
+        succeeded = batch.status == 0
+        elapsed = batch.time - batch.time[0]
         with np.errstate(invalid="ignore", over="ignore"):
-            index = self.index.values(batch.time - batch.time[0], batch.columns, group.scales)
-        completed = (batch.status == 0) & np.isfinite(index)
+            index = self.index.values(elapsed, batch.columns, group.scales)
+        completed = succeeded & np.isfinite(index)
         metrics.index[at] = np.where(completed, index, np.inf).reshape(shape)
-        drawn = [np.maximum(np.diff(batch[name], axis=1), 0.0).sum(axis=1) for name in group.air]
+        # What flows into a muscle is drawn from the supply, and what flows out is lost.
+        drawn = []
+        for name in group.air:
+            inflow = np.maximum(np.diff(batch[name], axis=1), 0.0)
+            drawn.append(inflow.sum(axis=1))
         air = np.sum(drawn, axis=0) if drawn else np.full(len(batch), np.nan)
         metrics.air[at] = air.reshape(shape) / self.duration
-        strokes = [
-            np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (high - low)
-            for name, (low, high) in first.loop.command_ranges(first.plant).items()
-        ]
-        travel = np.where(batch.status == 0, np.sum(strokes, axis=0), np.nan)
+        strokes = []
+        for name, (low, high) in first.loop.command_ranges(first.plant).items():
+            changes = np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1))
+            strokes.append(changes.sum(axis=1) / (high - low))
+        travel = np.where(succeeded, np.sum(strokes, axis=0), np.nan)
         metrics.travel[at] = travel.reshape(shape) / self.duration
         metrics.completed[at] = completed.reshape(shape)
         return batch.reasons.values()

@@ -254,7 +254,9 @@ class TuningHistory(ShortRepr):
     def table(self) -> Table:
         """Every set of gains with its objective and mean metrics [SI]."""
         columns: dict[str, Any] = {"set": list(range(len(self)))}
-        columns |= {path: self.gains[:, i] for i, path in enumerate(self.paths)}
+        for path, gains in zip(self.paths, self.gains.T, strict=True):
+            columns[path] = gains
         columns["objective"] = self.objective
-        columns |= {f"mean {name}": self.means(name) for name in ("index", "air", "travel")}
+        for name in ("index", "air", "travel"):
+            columns[f"mean {name}"] = self.means(name)
         return Table("history", "Sets of gains", columns, series=True)

@@ -40,24 +40,33 @@ class EvolutionStrategy:
 
     def __init__(self, mean: Array, random: np.random.Generator) -> None:
         d = mean.size
-        self.mean, self._random, self._step, self._covariance = (
-            mean.copy(),
-            random,
-            FIRST_WIDTH,
-            np.eye(d),
-        )
+        self.mean = mean.copy()
+        self._random = random
+        self._step = FIRST_WIDTH
+        self._covariance = np.eye(d)
+        self._path = np.zeros(d)
+        self._step_path = np.zeros(d)
+        self._generations = 0
+        # the number of points and parents, and the weights of the parents
         self.size = max(8, 4 + int(3 * math.log(d)))
         parents = self.size // 2
-        weights = math.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
+        # better parents count more
+        ranks = np.arange(1, parents + 1)
+        weights = math.log(parents + 0.5) - np.log(ranks)
         self._weights = weights / weights.sum()
-        self._mass = mass = 1.0 / float(np.sum(self._weights**2))
+        mass = 1.0 / float(np.sum(self._weights**2))
+        self._mass = mass
+        # the rates and the damping as Hansen (2016) recommends them, table 1
         self._path_rate = (4 + mass / d) / (d + 4 + 2 * mass / d)
         self._step_rate = (mass + 2) / (d + mass + 5)
         self._rank_one = 2 / ((d + 1.3) ** 2 + mass)
-        self._rank_mu = min(1 - self._rank_one, 2 * (mass - 2 + 1 / mass) / ((d + 2) ** 2 + mass))
-        self._damping = 1 + 2 * max(0.0, math.sqrt((mass - 1) / (d + 1)) - 1) + self._step_rate
-        self._usual = math.sqrt(d) * (1 - 1 / (4 * d) + 1 / (21 * d * d))
-        self._path, self._step_path, self._generations = np.zeros(d), np.zeros(d), 0
+        rank_mu = 2 * (mass - 2 + 1 / mass) / ((d + 2) ** 2 + mass)
+        self._rank_mu = min(1 - self._rank_one, rank_mu)
+        excess = max(0.0, math.sqrt((mass - 1) / (d + 1)) - 1)
+        self._damping = 1 + 2 * excess + self._step_rate
+        # expected length of a normal random vector
+        correction = 1 - 1 / (4 * d) + 1 / (21 * d * d)
+        self._usual = math.sqrt(d) * correction
 
     @property
     def width(self) -> float:
@@ -68,38 +77,47 @@ class EvolutionStrategy:
         """The points (S, D) of the next generation."""
         values, axes = np.linalg.eigh(self._covariance)
         normal = self._random.standard_normal((self.size, self.mean.size))
-        points: Array = self.mean + self._step * (normal * np.sqrt(values)) @ axes.T
+        steps = self._step * (normal * np.sqrt(values))
+        points: Array = self.mean + steps @ axes.T
         return np.clip(points, 0.0, 1.0)
 
     def tell(self, points: Array, values: Array) -> None:
         """Adapt the distribution to the values (S,) of a generation (S, D); smaller is better."""
-        d = self.mean.size
         mass = self._mass
-        steps = (points[np.argsort(values)[: self._weights.size]] - self.mean) / self._step
+        parents = points[np.argsort(values)[: self._weights.size]]
+        steps = (parents - self.mean) / self._step
         move = self._weights @ steps
         self.mean = self.mean + self._step * move
         self._generations = self._generations + 1
         eigenvalues, axes = np.linalg.eigh(self._covariance)
         whitened = axes @ ((axes.T @ move) / np.sqrt(eigenvalues))
         rate = self._step_rate
-        self._step_path = (1 - rate) * self._step_path + math.sqrt(
-            rate * (2 - rate) * mass
-        ) * whitened
+        gain = math.sqrt(rate * (2 - rate) * mass)
+        self._step_path = (1 - rate) * self._step_path + gain * whitened
         length = float(np.linalg.norm(self._step_path))
-        settled = math.sqrt(1 - (1 - rate) ** (2 * self._generations))
-        short = 1.0 if length / settled < (1.4 + 2 / (d + 1)) * self._usual else 0.0
+        short = self._is_short(length)
         rate = self._path_rate
-        self._path = (1 - rate) * self._path + short * math.sqrt(rate * (2 - rate) * mass) * move
-        old = (
-            1 - self._rank_one - self._rank_mu + (1 - short) * self._rank_one * rate * (2 - rate)
-        ) * self._covariance
-        self._covariance = (
-            old
-            + self._rank_one * np.outer(self._path, self._path)
-            + self._rank_mu * ((steps.T * self._weights) @ steps)
-            + 1e-14 * np.eye(d)
-        )
-        self._step *= math.exp(self._step_rate / self._damping * (length / self._usual - 1))
+        gain = short * math.sqrt(rate * (2 - rate) * mass)
+        self._path = (1 - rate) * self._path + gain * move
+        lost = (1 - short) * self._rank_one * rate * (2 - rate)
+        remaining = (1 - self._rank_one - self._rank_mu + lost) * self._covariance
+        by_path = self._rank_one * np.outer(self._path, self._path)
+        by_steps = self._rank_mu * ((steps.T * self._weights) @ steps)
+        # the last term keeps the covariance positive definite in rounding
+        least = 1e-14 * np.eye(self.mean.size)
+        self._covariance = remaining + by_path + by_steps + least
+        excess = length / self._usual - 1
+        self._step *= math.exp(self._step_rate / self._damping * excess)
+
+    def _is_short(self, length: float) -> float:
+        """1 unless the path of the step size is long, else 0.
+
+        A long path shows a step size that is too small; the path of the mean then waits, lest the
+        covariance grow in its place.
+        """
+        settled = math.sqrt(1 - (1 - self._step_rate) ** (2 * self._generations))
+        longest = (1.4 + 2 / (self.mean.size + 1)) * self._usual
+        return 1.0 if length / settled < longest else 0.0
 
 
 SETS_OF_A_TASK = 4

@@ -102,36 +102,11 @@ def perturbed_family(
     """
     cases = [LoopCase("nominal", plant, loop, initial_state(plant))]
     notes = list[str]()
-    changed = list[tuple[str, Plant]]()
-    nonzero = [leaf.path for leaf in leaves(plant) if leaf.value != 0.0]
-    loads, rotors, supplies = (set(filter(kind.search, nonzero)) for kind in (LOAD, ROTOR, SUPPLY))
-    for factors, symbol, chosen in (
-        (perturbations.loads, "load", loads or rotors),
-        (perturbations.supplies, "supply", supplies),
-    ):
-        if factors and not chosen:
-            notes.append(f"no case with another {symbol}: the plant has no parameter of that kind")
-        for factor in factors if chosen else ():
-            values = [
-                leaf.value * (factor if leaf.path in chosen else 1.0) for leaf in leaves(plant)
-            ]
-            with located_errors(f"{symbol} x {factor:g}"):
-                changed.append((f"{symbol} x {factor:g}", with_parameters(plant, values)))
-    known = [
-        [leaf.value for leaf in leaves(circuit) if _CONDUCTANCE.search(leaf.path)]
-        for circuit in plant.circuits
-    ]
-    if perturbations.leak and not all(known):
-        notes.append("no case with a leak: a circuit has no conductance")
-    elif perturbations.leak:
-        leaks = (
-            Valve(perturbations.leak * max(conductances), LEAK_CRITICAL_RATIO)
-            for conductances in known
-        )
-        circuits: Any = tuple(map(WithLeak, plant.circuits, leaks))
-        made = circuits if isinstance(plant.circuit, tuple) else circuits[0]
-        changed.append(("leak", dataclasses.replace(plant, circuit=made)))
-    changed += (drawn := list(_draws(plant, uncertainties, fitted, perturbations.draws, seed)))
+    changed = _scaled(plant, perturbations, notes)
+    if perturbations.leak:
+        changed += _leaking(plant, perturbations.leak, notes)
+    drawn = list(_draws(plant, uncertainties, fitted, perturbations.draws, seed))
+    changed += drawn
     if perturbations.draws and not drawn:
         notes.append(
             "no drawn parameters: neither the scenario nor a muscle file states the uncertainty of"
@@ -152,6 +127,45 @@ def perturbed_family(
             LoopCase(f"delay {perturbations.delay}", plant, delayed, cases[0].initial_state, "law")
         )
     return PerturbedFamily(tuple(cases), tuple(notes))
+
+
+def _scaled(
+    plant: Plant, perturbations: Perturbations, notes: list[str]
+) -> list[tuple[str, Plant]]:
+    """Plants with other loads and supplies; a note where the plant has no such parameter."""
+    changed = list[tuple[str, Plant]]()
+    nonzero = [leaf.path for leaf in leaves(plant) if leaf.value != 0.0]
+    loads, rotors, supplies = (set(filter(kind.search, nonzero)) for kind in (LOAD, ROTOR, SUPPLY))
+    for factors, symbol, chosen in (
+        (perturbations.loads, "load", loads or rotors),
+        (perturbations.supplies, "supply", supplies),
+    ):
+        if factors and not chosen:
+            notes.append(f"no case with another {symbol}: the plant has no parameter of that kind")
+            continue
+        for factor in factors:
+            values = [
+                leaf.value * (factor if leaf.path in chosen else 1.0) for leaf in leaves(plant)
+            ]
+            name = f"{symbol} x {factor:g}"
+            with located_errors(name):
+                changed.append((name, with_parameters(plant, values)))
+    return changed
+
+
+def _leaking(plant: Plant, share: float, notes: list[str]) -> list[tuple[str, Plant]]:
+    """The plant with leaks whose conductance is a share of that of the valves, if it is known."""
+    known = [
+        [leaf.value for leaf in leaves(circuit) if _CONDUCTANCE.search(leaf.path)]
+        for circuit in plant.circuits
+    ]
+    if not all(known):
+        notes.append("no case with a leak: a circuit has no conductance")
+        return []
+    leaks = (Valve(share * max(conductances), LEAK_CRITICAL_RATIO) for conductances in known)
+    circuits: Any = tuple(map(WithLeak, plant.circuits, leaks))
+    circuit = circuits if isinstance(plant.circuit, tuple) else circuits[0]
+    return [("leak", dataclasses.replace(plant, circuit=circuit))]
 
 
 def _draws(

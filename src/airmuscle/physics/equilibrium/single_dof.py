@@ -129,7 +129,8 @@ def _inside(plants: Statics) -> Array:
     points = np.where(inside, x, np.nan)
     places = np.hstack([points, columns])
     places.sort(axis=1)
-    # an edge that is a point of the grid stands once
+    # An edge that is a point of the grid stands once; NaN ends a row, whose number of places
+    # differs from that of the others.
     repeated = np.diff(places, axis=1) == 0.0
     places[:, 1:][repeated] = np.nan
     return np.sort(places, axis=1)
@@ -172,20 +173,24 @@ def balances(plants: Statics, x: Array, f: Array) -> tuple[Rows, Array]:
 def _root_signs(f: Array) -> RootSigns:
     """Where values (N, K) announce roots; NaN announces none."""
     count = max(f.shape[1] - 2, 0)
-    neighbours = [f[:, k : k + count] for k in range(3)]
+    before, middle, after = (f[:, k : k + count] for k in range(3))
+    one_column_more = (1, 1)
+    zero = np.pad(f == 0.0, ((0, 0), one_column_more))
+    # of an interval of zeros both ends count
+    is_within_zeros = zero[:, :-2] & zero[:, 2:]
+    exact = zero[:, 1:-1] & ~is_within_zeros
     with np.errstate(invalid="ignore", over="ignore"):
-        zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
-        is_within_zeros = zero[:, :-2] & zero[:, 2:]
-        exact = zero[:, 1:-1] & ~is_within_zeros
-        crossing = f[:, :-1] * f[:, 1:] < 0.0
-        nearing = _nears_zero(*neighbours)
+        # of two neighbours
+        products = f[:, :-1] * f[:, 1:]
+        crossing = products < 0.0
+        nearing = _nears_zero(before, middle, after)
     return RootSigns(exact, crossing, nearing)
 
 
 def _nears_zero(before: Array, middle: Array, after: Array) -> npt.NDArray[np.bool_]:
     """Where three neighbours have one sign, and the middle one is nearest to zero."""
     sign = np.sign(middle)
-    nearing = sign != 0.0
+    nearing: npt.NDArray[np.bool_] = sign != 0.0
     nearing &= np.sign(before) == sign
     nearing &= np.sign(after) == sign
     size = np.abs(middle)

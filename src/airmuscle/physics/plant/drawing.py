@@ -149,14 +149,16 @@ def _lift_scene(muscles: MuscleShapes, load: Translation) -> Scene:
     """A muscle that hangs from a ceiling, with the load below it."""
     length = muscles.length
     ceiling = _box(0.0, 0.3 * length, 0.0, 0.03 * length)
+    width = 0.13 * length
 
     def draw(row: Row) -> Drawing:
         muscle, end = muscles.shapes(0, row, 0.0, 0.0, -1.0)
         top = end - 0.04 * length
         bottom = end - 0.2 * length
-        mass = _box(0.0, 0.13 * length, bottom, top)
+        mass = _box(0.0, width, bottom, top)
         cable = np.array([[0.0, end], [0.0, top]])
-        return Drawing([ceiling, *muscle, mass], [cable], [])
+        shapes = [ceiling, *muscle, mass]
+        return Drawing(shapes, [cable], [])
 
     limits = (-0.5 * length, 0.5 * length, -1.5 * length, 0.1 * length)
     return Scene(muscles, limits, ("position",), draw)
@@ -188,10 +190,12 @@ def _arm_scene(muscles: MuscleShapes, arm: PlanarArm) -> Scene:
 
 def _joint_points(lengths: Sequence[float], angles: Sequence[float]) -> Array:
     """The shoulder and the ends of the links (N + 1, 2) [m] at the angles of the joints [rad]."""
-    points = [np.zeros(2)]
+    point = np.zeros(2)
+    points = [point]
     for length, angle in zip(lengths, np.cumsum(angles), strict=True):
         direction = np.array([np.sin(angle), -np.cos(angle)])
-        points.append(points[-1] + length * direction)
+        point = point + length * direction
+        points.append(point)
     return np.vstack(points)
 
 

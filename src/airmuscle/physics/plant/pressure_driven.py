@@ -113,7 +113,8 @@ class PressureDriven(MuscleSystem):
         for c in self.mechanism.coordinates:
             rates[c.name] = state[c.speed]
             rates[c.speed] = accelerations[c.name]
-        return {**rates, **self.mechanism.inner_rates(state, state, forces)}
+        rates |= self.mechanism.inner_rates(state, state, forces)
+        return rates
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
         """Contraction and tension of every muscle."""
