@@ -287,11 +287,12 @@ class CheckResult:
         return abs(self.computed - self.check.equals) <= self.check.tolerance
 
     def __str__(self) -> str:
-        conditions = ", ".join(f"{name} {value:.4g}" for name, value in self.check.conditions)
+        check = self.check
+        conditions = ", ".join(f"{name} {value:.4g}" for name, value in check.conditions)
         relation = "within" if self.passes else "NOT within"
         return (
-            f"{self.check.quantity} at {conditions}: computed {self.computed:.4g}, {relation} "
-            f"{self.check.equals:.4g} ± {self.check.tolerance:.4g} ({self.check.source})"
+            f"{check.quantity} at {conditions}: computed {self.computed:.4g}, {relation} "
+            f"{check.equals:.4g} ± {check.tolerance:.4g} ({check.source})"
         )
 
 

@@ -179,13 +179,16 @@ class _ModelSchemas:
 
     def number(self, declared: Parameter, hint: Any) -> Schema:
         """A declared parameter."""
-        number = _quantity("" if declared.unit in RELATIVE else declared.unit, *declared.bounds)
+        written_unit = "" if declared.unit in RELATIVE else declared.unit
+        number = _quantity(written_unit, *declared.bounds)
         if any(origin(option) is tuple for option in alternatives(hint)):
             column = _table({"file": _TEXT, "column": _TEXT}, ("file", "column"))
             number = {"anyOf": [_list_of(number), column]}
         unit = "" if declared.unit == "1" else f" [{declared.unit}]"
-        default = {"default": declared.default} if isinstance(declared.default, float | int) else {}
-        return {"description": f"{declared.symbol}{unit}: {declared.meaning}", **number, **default}
+        schema = {"description": f"{declared.symbol}{unit}: {declared.meaning}", **number}
+        if isinstance(declared.default, float | int):
+            schema["default"] = declared.default
+        return schema
 
     def _read(self, reader: Any) -> Schema:
         """What a reader of a field takes."""

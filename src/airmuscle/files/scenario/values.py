@@ -235,7 +235,10 @@ def read_drivers(value: Any, plant: Any, where: Location) -> dict[str, Chain]:
     remedy = f'. Write fill = {{ model = "SolenoidDriver" }} in [{where.table}.{where.key}]'
     drivers = read_table(value, plant, where, remedy)
     place = where.inside("")
-    return {name: PLANT_READER.value(item, Chain, place, name) for name, item in drivers.items()}
+    chains = {}
+    for name, item in drivers.items():
+        chains[name] = PLANT_READER.value(item, Chain, place, name)
+    return chains
 
 
 @dataclasses.dataclass(frozen=True)

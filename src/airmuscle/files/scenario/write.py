@@ -181,14 +181,17 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
     """A slow record: a regulator follows the recorded pressure, and a drive the recorded motion."""
     recording = record.recording
     start = float(recording["time"][0])
-    time, pressure, path = _points(recording, float(muscle.geometry.resting_length))
+    length = muscle.geometry.resting_length
+    time, pressure, path = _points(recording, float(length))
     levels = np.column_stack([time, np.maximum(pressure, 0.0)]).tolist()
     table: dict[str, Any] = {"model": "SampledSignal", "setpoint": levels}
     initial: dict[str, float] = {"pressure": float(pressure[0])}
-    mechanism: Any = Isometric(float(np.median(path)) / muscle.geometry.resting_length)
-    if float(np.ptp(path)) > CONTRACTION_BAND * muscle.geometry.resting_length:
+    mechanism: Any = Isometric(float(np.median(path)) / length)
+    # else the motion is noise of the sensor about one contraction
+    if float(np.ptp(path)) > CONTRACTION_BAND * length:
         motion = spline_trajectory(time, path)
-        table[ACCELERATION] = [list(point) for point in motion.input.points[ACCELERATION]]
+        points = motion.input.points[ACCELERATION]
+        table[ACCELERATION] = [list(point) for point in points]
         initial |= motion.initial_state
         mechanism = PrescribedMotion()
     supply = float(pressure.max()) + MARGIN
@@ -199,26 +202,39 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
     return scenario_toml(record.origin, plant, table, run, _note(record, start))
 
 
-def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
-    """Time from the start [s], pressure [Pa] and displacement [m] at points that are dense where
-    the muscle moves.
+class SlowPoints(NamedTuple):
+    """Points (N,) of a slow record: time from the start [s], pressure [Pa], displacement [m]."""
+
+    time: Array
+    pressure: Array
+    path: Array
+
+
+def _points(recording: Recording, length: float) -> SlowPoints:
+    """Points that are dense where the muscle moves: half of them at equal times, half at equal
+    distances along the path.
     """
     time = recording["time"] - recording["time"][0]
     path = running_median(recording["contraction"] * length, MEDIAN_ROWS)
     pressure = running_median(recording["pressure"], MEDIAN_ROWS)
     coarse = slice(None, None, max(1, path.size // 400))
-    travelled = np.append(0.0, np.cumsum(np.abs(np.diff(path[coarse]))))
-    by_path = np.interp(np.linspace(0.0, travelled[-1], POINTS // 2), travelled, time[coarse])
-    first, *between, last = np.unique(
-        np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path])
-    ).tolist()
+    steps = np.abs(np.diff(path[coarse]))
+    travelled = np.append(0.0, np.cumsum(steps))
+    distances = np.linspace(0.0, travelled[-1], POINTS // 2)
+    by_path = np.interp(distances, travelled, time[coarse])
+    by_time = np.linspace(0.0, time[-1], POINTS // 2)
+    first, *between, last = np.unique(np.concatenate([by_time, by_path])).tolist()
     spaced = [first]
     distance = float(time[-1]) / (8 * POINTS)
     for instant in between:  # without those that follow another one too closely
         if instant - spaced[-1] >= distance and last - instant >= distance:
             spaced.append(instant)
     instants = np.array([*spaced, last])
-    return instants, np.interp(instants, time, pressure), np.interp(instants, time, path)
+    return SlowPoints(
+        instants,
+        np.interp(instants, time, pressure),
+        np.interp(instants, time, path),
+    )
 
 
 def scenario_text(scenario: Scenario) -> str:

@@ -229,13 +229,17 @@ def _export_mujoco(source: str, out: Path, request: ExportRequest) -> Exported:
 
 def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
     """The robot description of a joint or an arm, with the plugins of its muscles."""
-    written = WRITERS[request.to](load_scenario(source).plant, out, name=request.name)
-    plugins = [path for plugin in written.plugins for path in plugin.files]
+    write = WRITERS[request.to]
+    written = write(load_scenario(source).plant, out, name=request.name)
+    paths = [written.path]
+    for plugin in written.plugins:
+        paths += plugin.files
     remarks = list(dict.fromkeys(plugin.remark for plugin in written.plugins if plugin.remark))
-    left = list(written.left_out)
     lines = [f"plugins, source only: {remark}" for remark in remarks]
-    lines += [f"left out: {', '.join(left)}"] if left else []
-    return Exported([written.path, *plugins], lines, {"remarks": remarks, "left_out": left})
+    left_out = list(written.left_out)
+    if left_out:
+        lines.append(f"left out: {', '.join(left_out)}")
+    return Exported(paths, lines, {"remarks": remarks, "left_out": left_out})
 
 
 def _export_actuator(source: str, out: Path, request: ExportRequest) -> Exported:

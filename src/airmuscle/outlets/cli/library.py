@@ -242,8 +242,9 @@ def _data_row(path: Path) -> dict[str, str]:
     """Title and provenance from the comments at the top of a data file."""
     with path.open(encoding="utf-8") as file:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
-    text = " ".join(line.lstrip("# ").strip() for line in comments)
-    title = comments[0].lstrip("# ").strip() if comments else ""
+    lines = [comment.lstrip("# ").strip() for comment in comments]
+    text = " ".join(lines)
+    title = lines[0] if lines else ""
     provenance = next((word for word in ("secondary source", "measured") if word in text), "")
     return {"name": path.stem, "title": title, "kind": "data set", "provenance": provenance}
 

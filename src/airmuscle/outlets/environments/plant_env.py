@@ -166,14 +166,19 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
     def _picture(self) -> Any:
         """The picture of the present state."""
         plant = self.task.plant
-        state = dict(zip((s.name for s in plant.states), self._stepper.state.tolist(), strict=True))
-        values = {**plant.outputs(state, complete_inputs(plant, None)), **state}
+        names = [state.name for state in plant.states]
+        state = dict(zip(names, self._stepper.state.tolist(), strict=True))
+        outputs = plant.outputs(state, complete_inputs(plant, None))
+        # a recording has two rows at least
         time = self._elapsed * self.task.period + np.array([0.0, 1.0])
-        columns = {"time": time, **{name: np.full(2, float(v)) for name, v in values.items()}}
+        columns = {"time": time}
+        for name, value in {**outputs, **state}.items():
+            columns[name] = np.full(2, float(value))
         picture = plant.animate(Recording(columns, "environment"))
         picture.draw(0)
-        picture.figure.canvas.draw()
-        return np.asarray(picture.figure.canvas.buffer_rgba())[..., :3].copy()
+        canvas = picture.figure.canvas
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
 def with_on_off_valves(env: Any) -> Any:
@@ -243,11 +248,14 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
 
     def observation(self, observation: Any) -> Floats:
         """The reading of the sensors for an observation (k,)."""
-        noisy = observation + self.noise * self.unwrapped.np_random.normal(size=observation.shape)
-        step = np.where(self.resolution > 0, self.resolution, 1.0)
-        read = np.where(self.resolution > 0, step * np.round(noisy / step), noisy)
+        random = self.unwrapped.np_random
+        noisy = observation + self.noise * random.normal(size=observation.shape)
+        has_steps = self.resolution > 0
+        step = np.where(has_steps, self.resolution, 1.0)
+        read = np.where(has_steps, step * np.round(noisy / step), noisy)
         space = self.observation_space
-        self._late.append(np.clip(read, space.low, space.high).astype(np.float32))
+        limited = np.clip(read, space.low, space.high)
+        self._late.append(limited.astype(np.float32))
         return np.array(self._late[0])
 
 

@@ -228,10 +228,11 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
 
     def _place(self, plants: npt.NDArray[np.intp], parameters: Array, states: Array) -> None:
         """Write parameters (R, P) and states (R, n) of plants into their lanes."""
-        block, lane = np.divmod(plants, self._plants.width)
-        self._plants.parameters[block, :, lane] = parameters
-        self._plants.states[block, :, lane] = states
-        self._plants.prepare(np.unique(block))
+        lanes = self._plants
+        block, lane = np.divmod(plants, lanes.width)
+        lanes.parameters[block, :, lane] = parameters
+        lanes.states[block, :, lane] = states
+        lanes.prepare(np.unique(block))
 
     def _observed(self) -> tuple[npt.NDArray[np.float32], Array, Booleans]:
         """Observations, rewards, and which episodes are terminated."""

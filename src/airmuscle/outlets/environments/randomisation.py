@@ -249,15 +249,17 @@ class EpisodeDraw:
         parameters = np.repeat(self._nominal[None, :], len(uniform), axis=0)
         first = 0
         for r, at in zip(self._randomisations, self._places, strict=True):
-            drawn = r.values(self._nominal[at], uniform[:, first : first + r.dimension])
+            end = first + r.dimension
+            drawn = r.values(self._nominal[at], uniform[:, first:end])
             parameters[:, at] = np.clip(drawn, self._low[at], self._high[at])
-            first += r.dimension
+            first = end
         values: list[Any] = self._nominal.tolist()
         for i in self._varied:
             values[i] = parameters[:, i].view(Column)
         plants: EnvironmentTask = tree.unflatten(self.task, values)
-        ranges = enumerate(plants.initial_ranges.items(), first)
-        initial = {name: low + (high - low) * uniform[:, i] for i, (name, (low, high)) in ranges}
+        initial = {}
+        for i, (name, (low, high)) in enumerate(plants.initial_ranges.items(), first):
+            initial[name] = low + (high - low) * uniform[:, i]
         plant = plants.plant
         pressures = [initial.pop(f"{prefix}pressure") for prefix in plant.prefixes]
         start: dict[str, Any] = {

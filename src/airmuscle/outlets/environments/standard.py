@@ -256,9 +256,10 @@ class ArmReaching(EnvironmentTask):
         self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value
     ) -> tuple[Value, ...]:
         joints = self.plant.mechanism.coordinates
-        pressures = (outputs[f"{p}pressure"] / bar for p in self.plant.prefixes)
-        moving = (state[c.speed] for c in joints)
-        return (*(state[c.name] for c in joints), *moving, *pressures, *self.targets)
+        angles = [state[c.name] for c in joints]
+        speeds = [state[c.speed] for c in joints]
+        pressures = [outputs[f"{p}pressure"] / bar for p in self.plant.prefixes]
+        return (*angles, *speeds, *pressures, *self.targets)
 
     def errors(self, state: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
         pairs = zip(self.plant.mechanism.coordinates, self.targets, strict=True)

@@ -174,12 +174,15 @@ class EnvironmentTask(System):
         0.
         """
         time = inputs[TIME]
-        values = self.observe(state, self.plant.outputs(state, self._commands(inputs)), time)
+        outputs = self.plant.outputs(state, self._commands(inputs))
+        values = self.observe(state, outputs, time)
         observed = {
             o.name: ops.clip(v, o.low, o.high)
             for o, v in zip(self.observations, values, strict=True)
         }
         efforts = [inputs[f"action.{a.name}"] ** 2 for a in self.actions]
-        closeness = ops.exp(-sum(error**2 for error in self.errors(state, time)))
+        distance = sum(error**2 for error in self.errors(state, time))
+        closeness = ops.exp(-distance)
         reward = closeness - self.effort_weight * sum(efforts) / len(efforts)
-        return {**observed, "reward": reward, "terminated": ops.where(self.ends(state), 1.0, 0.0)}
+        terminated = ops.where(self.ends(state), 1.0, 0.0)
+        return {**observed, "reward": reward, "terminated": terminated}

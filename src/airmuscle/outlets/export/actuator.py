@@ -82,11 +82,12 @@ class ActuatorModel:
         low, high = control_range(self.controls)
         command = nodes.limited(command, low, high)
         values = {SHORTENING: self._rest(p) - length, SHORTENING_SPEED: -speed}
-        pair = [nodes.larger(command, 0.0), nodes.larger(-command, 0.0)]
-        openings = pair if len(self.controls) == 2 else [command]
-        values |= {
-            control.name: opening for control, opening in zip(self.controls, openings, strict=False)
-        }
+        filling = nodes.larger(command, 0.0)
+        discharging = nodes.larger(-command, 0.0)
+        openings = [filling, discharging] if len(self.controls) == 2 else [command]
+        # a muscle without a control has no opening
+        for control, opening in zip(self.controls, openings, strict=False):
+            values[control.name] = opening
         return [values[name] for name in self.part.inputs]
 
     @functools.cached_property
@@ -114,9 +115,12 @@ class ActuatorModel:
         t = self._traced
         z = nodes.symbols("z", 3)
         usable = _all_finite(z)
-        outputs = nodes.replaced(t.o, t.u, self._inputs(self._replaced(z, usable, t.p), t.p))
-        names = (*(s.name for s in self.part.states), *t.output_names)
-        known = dict(zip(names, [*t.x, *outputs], strict=True))
+        motion = self._replaced(z, usable, t.p)
+        inputs = self._inputs(motion, t.p)
+        outputs = nodes.replaced(t.o, t.u, inputs)
+        state_names = [state.name for state in self.part.states]
+        known = dict(zip(state_names, t.x, strict=True))
+        known |= dict(zip(t.output_names, outputs, strict=True))
         results = [known["force"], known["pressure"]]
         valid = nodes.logical_and(usable, _all_finite(results))
         for limit in self.part.column_limits:

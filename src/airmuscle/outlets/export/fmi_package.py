@@ -50,10 +50,11 @@ def _kind(v: Variable) -> dict[str, str]:
 def _numbers(v: Variable) -> dict[str, str]:
     """Attributes of a variable that are numbers or units."""
     numbers = {"min": v.minimum, "max": v.maximum, "nominal": v.nominal, "start": v.start}
-    attributes = {
-        key: repr(float(x)) for key, x in numbers.items() if x is not None and math.isfinite(x)
-    }
-    return ({"unit": v.unit} if has_unit(v.unit) else {}) | attributes
+    attributes = {"unit": v.unit} if has_unit(v.unit) else {}
+    for key, number in numbers.items():
+        if number is not None and math.isfinite(number):
+            attributes[key] = repr(float(number))
+    return attributes
 
 
 HEADERS = {

@@ -178,16 +178,21 @@ def base_powers(unit: str) -> dict[str, int] | None:
     """The powers of the base units in a unit such as `m3/(s Pa)`; None where they are not known."""
     numerator, *denominators = unit.replace("Pa(a)", "Pa").split("/")
     powers: dict[str, int] = {}
-    for part, sign in ((numerator, 1), *((text.strip("()"), -1) for text in denominators)):
+    signs = [(numerator, 1)]
+    signs += [(denominator.strip("()"), -1) for denominator in denominators]
+    for part, sign in signs:
         for word in part.replace("*", " ").split():
             atom = _ATOM.match(word)
             if word == "1":
                 continue
             if atom is None or atom[1] not in BASE:
                 return None
+            exponent = sign * int(atom[2] or 1)
             for base, power in BASE[atom[1]].items():
-                powers[base] = powers.get(base, 0) + sign * power * int(atom[2] or 1)
-    return None if "" in denominators else {base: power for base, power in powers.items() if power}
+                powers[base] = powers.get(base, 0) + power * exponent
+    if "" in denominators:
+        return None
+    return {base: power for base, power in powers.items() if power}
 
 
 def add_units(parent: Element, units: Iterable[str]) -> None:

@@ -83,17 +83,31 @@ def program_name(stated: str, title: str) -> str:
     return stated or make_identifier(make_identifier(title).lower())
 
 
+def _in_ascii(character: str) -> str:
+    """A character in ASCII: a letter of another alphabet by the number of its code point, so that
+    different names remain different.
+    """
+    if character.isascii():
+        return character
+    return f"_u{ord(character):X}_" if character.isalnum() else "_"
+
+
 def _word(name: str) -> str:
-    plain = "".join(c for c in unicodedata.normalize("NFKD", name) if not unicodedata.combining(c))
-    letters = "".join(c if c.isascii() else f"_u{ord(c):X}_" if c.isalnum() else "_" for c in plain)
-    word = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", letters)).strip("_")
+    """A name as one word of ASCII letters, digits and single underscores."""
+    characters = unicodedata.normalize("NFKD", name)
+    plain = [character for character in characters if not unicodedata.combining(character)]
+    letters = "".join(map(_in_ascii, plain))
+    underscored = re.sub(r"[^A-Za-z0-9]", "_", letters)
+    word = re.sub(r"_+", "_", underscored).strip("_")
     if not word or not word[0].isalpha():
         word = f"n_{word}".rstrip("_")
     word = f"{word}_" if word.casefold() in RESERVED else word
     if len(word) <= LONGEST:
         return word
-    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:_DIGEST]
-    return f"{word[: LONGEST - _DIGEST - 1].rstrip('_')}_{digest}"
+    content = name.encode("utf-8", "surrogatepass")
+    digest = hashlib.sha256(content).hexdigest()[:_DIGEST]
+    beginning = word[: LONGEST - _DIGEST - 1].rstrip("_")
+    return f"{beginning}_{digest}"
 
 
 _PROGRAM = "add_executable({0}_run main.c)\ntarget_link_libraries({0}_run PRIVATE {0})"

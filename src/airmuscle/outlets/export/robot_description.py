@@ -107,11 +107,20 @@ def _planar_model(mechanism: PlanarArm) -> RobotModel:
         position = (0.0, 0.0, -before)
         at = (0.0, 0.0, -centre)
         links.append(
-            SpatialLink((0, -1, 0), position, max(mass, LEAST), at, inertia, 0.0, link.damping)
+            SpatialLink(
+                (0, -1, 0),
+                position,
+                max(mass, LEAST),
+                at,
+                inertia,
+                0.0,
+                link.damping,
+            )
         )
         before = link.length
     names = [c.name for c in mechanism.coordinates]
-    return RobotModel(names, links, mechanism.routes, mechanism.gravity, [0.0] * len(links))
+    frictions = [0.0] * len(links)
+    return RobotModel(names, links, mechanism.routes, mechanism.gravity, frictions)
 
 
 @robot_model.register

@@ -406,7 +406,8 @@ def m_array(values: Any) -> str:
     """An array (N,) as a column, or a table (N, m)."""
     table = np.asarray(values, dtype=float)
     if not table.size:
-        return f"zeros({', '.join(map(str, table.shape if table.ndim == 2 else (0, 1)))})"
+        shape = table.shape if table.ndim == 2 else (0, 1)
+        return f"zeros({', '.join(map(str, shape))})"
     if table.ndim == 2:
         lines = [", ".join(map(m_number, row)) for row in table.tolist()]
     else:

@@ -187,21 +187,24 @@ def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict
     """The arm at constant set points, and with a PID controller of each angle to be tuned; `names`
     as in the pairs.
     """
-    middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
+    episodes = fit.inspection.episodes
+    middle = np.median(episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     schedule = {
         f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)
     }
     run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
-    ranges = np.ptp(
-        np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0
-    ).tolist()
+    # without the extreme hundredths of the angles, which may be outliers
+    limits = np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0)
+    ranges = np.ptp(limits, axis=0).tolist()
     laws = []
     wanted = {}
     for j, (c, range_) in enumerate(zip(fit.arm.mechanism.coordinates, ranges, strict=True)):
         mean = float(np.mean(levels[2 * j : 2 * j + 2]))
-        pair = CoContraction((f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint"), mean)
-        laws.append(Cascade(PID(c.name, "difference", mean / range_, 0.5), pair, (-mean,), (mean,)))
+        setpoints = (f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint")
+        pair = CoContraction(setpoints, mean)
+        pid = PID(c.name, "difference", mean / range_, 0.5)
+        laws.append(Cascade(pid, pair, (-mean,), (mean,)))
         wanted[c.name] = [[0.0, 0.0], [0.1, STEP * range_]]
     law = laws[0] if len(laws) == 1 else Decentralised(tuple(laws))
     controller = {**model_table(law), "sample_time": 0.01, "setpoint": wanted}

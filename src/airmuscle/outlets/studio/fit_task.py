@@ -412,4 +412,9 @@ def _run(run: Run) -> dict[str, Any]:
     if run.constant_column is not None and run.constant_value is not None:
         factor, unit = display_scale(run.constant_column)
         level = f"{run.constant_column} {run.constant_value * factor:.4g} {unit}"
-    return {"kind": run.kind.name, "level": level, "swept": list(run.swept_columns), "rows": rows}
+    return {
+        "kind": run.kind.name,
+        "level": level,
+        "swept": list(run.swept_columns),
+        "rows": rows,
+    }

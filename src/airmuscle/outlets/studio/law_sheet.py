@@ -25,7 +25,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -300,27 +300,36 @@ def law_and_geometry(model: Any, geometry: am.geometry.Geometry | None) -> tuple
     )
 
 
-def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, list[Node]], list[Node]]]:
-    """Name, arguments and results of every function that can be traced."""
-    functions: list[tuple[str, dict[str, list[Node]], list[Node]]] = []
+class LawFunction(NamedTuple):
+    """A function of the program of a law, by its arguments and results."""
+
+    name: str
+    arguments: dict[str, list[Node]]
+    results: list[Node]
+
+
+def _functions(model: Any, shape: Any) -> list[LawFunction]:
+    """Every function that can be traced."""
+    functions = list[LawFunction]()
     x = nodes.symbols("x", 2)
     for name in DIRECTIONS:
         values = _traced(lambda *at, direction=name: [getattr(model, direction)(*at)], *x)
         if values is not None:
-            functions.append((name, {"x": x}, [*values, *slopes.gradient(values[0], x)]))
+            gradient = slopes.gradient(values[0], x)
+            functions.append(LawFunction(name, {"x": x}, [*values, *gradient]))
     limits = _traced(lambda: _limits(model))
     if limits is not None:
-        functions.append(("limits", {}, limits))
+        functions.append(LawFunction("limits", {}, limits))
     if shape is None:
         return functions
     contraction = x[:1]
     volume = _traced(lambda c: [shape.volume(c)], *contraction) if shape.traceable else None
     if volume is not None:
-        by_contraction = slopes.gradient(volume[0], contraction)
-        functions.append(("volume", {"x": contraction}, [*volume, *by_contraction]))
+        slope = slopes.gradient(volume[0], contraction)
+        functions.append(LawFunction("volume", {"x": contraction}, [*volume, *slope]))
     outline = _traced(lambda *at: _outline(shape, *at), *x)
     if outline is not None:
-        functions.append(("outline", {"x": x}, outline))
+        functions.append(LawFunction("outline", {"x": x}, outline))
     return functions
 
 

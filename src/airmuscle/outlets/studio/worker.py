@@ -98,8 +98,9 @@ class WorkerPool:
         self._warm = warm
         self._unused = list(self._all) if warm else []
         self._starting = threading.Lock()
-        for worker in [] if warm else self._all:
-            self._free.put(worker)
+        if not warm:
+            for worker in self._all:
+                self._free.put(worker)
 
     def prepare(self, idle: int = SPARE) -> None:
         """Start workers in a thread until some are idle, as far as there are some that were never
