@@ -87,6 +87,7 @@ def _group_of(
 
 def _varied_parameters(cases: Sequence[LoopCase]) -> dict[str, Array]:
     """The parameters (m,) by path in which the plants of cases differ."""
+    # one row for each case
     rows = [flatten(case.plant) for case in cases]
     table = np.array(rows)
     paths = [leaf.path for leaf in leaves(cases[0].plant)]

@@ -50,9 +50,10 @@ class EvolutionStrategy:
         # the number of points and parents, and the weights of the parents
         self.size = max(8, 4 + int(3 * math.log(d)))
         parents = self.size // 2
-        # better parents count more
+        # better parents count more, by the logarithm of their rank
         ranks = np.arange(1, parents + 1)
-        weights = math.log(parents + 0.5) - np.log(ranks)
+        largest = math.log(parents + 0.5)
+        weights = largest - np.log(ranks)
         self._weights = weights / weights.sum()
         mass = 1.0 / float(np.sum(self._weights**2))
         self._mass = mass
@@ -100,14 +101,21 @@ class EvolutionStrategy:
         gain = short * math.sqrt(rate * (2 - rate) * mass)
         self._path = (1 - rate) * self._path + gain * move
         lost = (1 - short) * self._rank_one * rate * (2 - rate)
+        self._adapt_covariance(steps, lost)
+        excess = length / self._usual - 1
+        self._step *= math.exp(self._step_rate / self._damping * excess)
+
+    def _adapt_covariance(self, steps: Array, lost: float) -> None:
+        """Let the covariance follow the path of the mean and the steps (M, D) of the parents;
+        `lost` is the share that a path which waits does not contribute.
+        """
         remaining = (1 - self._rank_one - self._rank_mu + lost) * self._covariance
         by_path = self._rank_one * np.outer(self._path, self._path)
-        by_steps = self._rank_mu * ((steps.T * self._weights) @ steps)
+        weighted = steps.T * self._weights
+        by_steps = self._rank_mu * (weighted @ steps)
         # the last term keeps the covariance positive definite in rounding
         least = 1e-14 * np.eye(self.mean.size)
         self._covariance = remaining + by_path + by_steps + least
-        excess = length / self._usual - 1
-        self._step *= math.exp(self._step_rate / self._damping * excess)
 
     def _is_short(self, length: float) -> float:
         """1 unless the path of the step size is long, else 0.

@@ -53,45 +53,67 @@ class TableReader:
 
         kind  annotation of the place of the object, by which other classes are refused
         """
-        for cls, read in self.named.items():
-            if cls in alternatives(kind) and (part := read(table, location, self)) is not None:
-                return part
+        part = self._named_part(table, location, kind)
+        if part is not None:
+            return part
         if isinstance(table, str) and fields.is_table(kind):
             table = {"model": table}
         cls = self._class(table, location, kind)
         given = given or {}
+        values, is_named = self._values_of_fields(cls, table, location, given, kind)
+        hints = type_hints(cls)
+        declared = {p.name: p for p in parameters(cls)}
+        signals = self._signals_of(cls)
+        parts = signals.parts(cls, hints) if signals else {}
+        for name, value in values.items():
+            if name not in declared:
+                parts[name] = self._part(value, cls, name, hints[name], location)
+        fields.check_required(cls, {**values, **parts, **given}, hints, location, is_named)
+        numbers = {name: value for name, value in values.items() if name in declared}
+        if signals:
+            return signals.make(cls, parts, numbers, location)
+        if hasattr(cls, "units_of_table"):
+            with located_errors(location):
+                units = cls.units_of_table(table)
+            for name, unit in units.items():
+                declared[name] = dataclasses.replace(declared[name], unit=unit)
+        numbers = {
+            n: fields.read_parameter(v, declared[n], hints[n], location) for n, v in numbers.items()
+        }
+        with located_errors(location):
+            return cls(**parts, **numbers, **given)
+
+    def _signals_of(self, cls: type[Any]) -> Any:
+        """What makes the objects of a class by the signals of a plant; None for other classes."""
+        return self.signals if self.signals and self.signals.concerns(cls) else None
+
+    def _named_part(self, table: Any, location: Location, kind: Any) -> Any:
+        """The object of a table that names one of the library; None for any other table."""
+        for cls, read in self.named.items():
+            if cls in alternatives(kind):
+                part = read(table, location, self)
+                if part is not None:
+                    return part
+        return None
+
+    def _values_of_fields(
+        self, cls: type[Any], table: Any, location: Location, given: Mapping[str, Any], kind: Any
+    ) -> tuple[dict[str, Any], bool]:
+        """The values of a table by the fields that are not given, and whether the table names its
+        class. Raises ParameterError for another key.
+        """
         names = {f.metadata.get("key", f.name): f.name for f in dataclasses.fields(cls) if f.init}
         values = {key: value for key, value in table.items() if key != "model" or key in names}
         is_named = "model" in table and "model" not in names
         for key in values if is_named else ():
             with located_errors(location):
                 check_field(cls, key)
-        library = ["library"] if any(option in self.named for option in alternatives(kind)) else []
-        check_keys(values, [*(key for key in names if key), *library], location)
-        values = {names[key]: value for key, value in values.items() if names[key] not in given}
-        hints = type_hints(cls)
-        declared = {p.name: p for p in parameters(cls)}
-        signals = self.signals if self.signals and self.signals.concerns(cls) else None
-        parts = signals.parts(cls, hints) if signals else {}
-        parts |= {
-            n: self._part(v, cls, n, hints[n], location)
-            for n, v in values.items()
-            if n not in declared
-        }
-        fields.check_required(cls, {**values, **parts, **given}, hints, location, is_named)
-        numbers = {name: value for name, value in values.items() if name in declared}
-        if signals:
-            return signals.make(cls, parts, numbers, location)
-        with located_errors(location):
-            units = cls.units_of_table(table) if hasattr(cls, "units_of_table") else {}
-        declared |= {
-            name: dataclasses.replace(declared[name], unit=unit) for name, unit in units.items()
-        }
-        numbers = {
-            n: fields.read_parameter(v, declared[n], hints[n], location) for n, v in numbers.items()
-        }
-        with located_errors(location):
-            return cls(**parts, **numbers, **given)
+        allowed = [key for key in names if key]
+        if any(option in self.named for option in alternatives(kind)):
+            allowed.append("library")
+        check_keys(values, allowed, location)
+        read = {names[key]: value for key, value in values.items() if names[key] not in given}
+        return read, is_named
 
     def _class(self, table: Any, location: Location, kind: Any) -> type[Any]:
         """The class of a table. Raises ParameterError or UnknownNameError."""

@@ -163,14 +163,7 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
         check_above_vacuum(values["pressure"])
     contraction = values.get("contraction")
     if contraction is not None and isinstance(law, ForceLaw):  # the other laws check it themselves
-        low, high = law.contraction_range
-        if not low <= contraction <= high:
-            as_percentage = contraction >= 1.0 and contraction / 100 <= high
-            hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
-            raise GeometryLimitError(
-                f"contraction: {100 * contraction:.6g} % is outside the range of"
-                f" {type(law).__name__}, {100 * low:.4g} to {100 * high:.4g} %.{hint}"
-            )
+        _check_contraction(law, contraction)
     with silent_beyond_range():  # the warnings below name the range of the entry
         point = WorkingPoint(**values, **{solved: float(getattr(law, solved)(*values.values()))})
     if not math.isfinite(sum(point)) or (
@@ -184,6 +177,19 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
     for message in _warnings(evaluation):
         warnings.warn(message, AirmuscleWarning, stacklevel=2)
     return evaluation
+
+
+def _check_contraction(law: ForceLaw, contraction: float) -> None:
+    """Raise GeometryLimitError for a contraction outside the range of a law."""
+    low, high = law.contraction_range
+    if low <= contraction <= high:
+        return
+    as_percentage = contraction >= 1.0 and contraction / 100 <= high
+    hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
+    raise GeometryLimitError(
+        f"contraction: {100 * contraction:.6g} % is outside the range of"
+        f" {type(law).__name__}, {100 * low:.4g} to {100 * high:.4g} %.{hint}"
+    )
 
 
 def _warnings(evaluation: Evaluation) -> Iterator[str]:

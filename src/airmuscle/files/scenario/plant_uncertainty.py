@@ -47,16 +47,15 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
     deviations = {}
     factors = {}
     for name in models[0].names:
-        joint = root_mean_square([fit.rms(name, i) for i in range(len(models))])
         predicted = [errors[name] for errors in cross if name in errors]
-        error = max([joint, *([root_mean_square(predicted)] if predicted else [])])
-        residuals = [fit.residuals(i)[name] for i in range(len(models))]
-        residuals = [series[np.isfinite(series)] for series in residuals]
+        error = root_mean_square([fit.rms(name, i) for i in range(len(models))])
+        if predicted:
+            error = max(error, root_mean_square(predicted))
+        residuals = _finite_residuals(fit, name)
         deviations[name] = error * _tail_factor(np.concatenate(residuals))
         if len(predicted) > 1:
-            noise = root_mean_square(
-                [estimate_noise(series) for series in residuals]
-            )  # contains no error of the model
+            # the noise contains no error of the model
+            noise = root_mean_square([estimate_noise(series) for series in residuals])
             factors[name] = t_quantile(degrees_of_freedom(error, noise, len(predicted)))
     known = {name: value for name, value in deviations.items() if value > 0.0}
     records = [model.experiment.recording for model in models]
@@ -92,6 +91,12 @@ def _covariance(fit: DynamicFit) -> dict[str, Any]:
         "standard_errors": [fit.estimates[i].stderr for i in common],
         "correlations": np.clip(fit.correlations[np.ix_(common, common)], -1.0, 1.0).tolist(),
     }
+
+
+def _finite_residuals(fit: DynamicFit, name: str) -> list[Array]:
+    """The residuals of a quantity in each record, where they are defined."""
+    residuals = [fit.residuals(i)[name] for i in range(len(fit.problem.record_models))]
+    return [series[np.isfinite(series)] for series in residuals]
 
 
 def parameter_uncertainty(fitted: PlantUncertainty) -> ParameterUncertainty:

@@ -183,7 +183,8 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
     start = float(recording["time"][0])
     length = muscle.geometry.resting_length
     time, pressure, path = _points(recording, float(length))
-    levels = np.column_stack([time, np.maximum(pressure, 0.0)]).tolist()
+    setpoint = np.maximum(pressure, 0.0)
+    levels = np.column_stack([time, setpoint]).tolist()
     table: dict[str, Any] = {"model": "SampledSignal", "setpoint": levels}
     initial: dict[str, float] = {"pressure": float(pressure[0])}
     mechanism: Any = Isometric(float(np.median(path)) / length)

@@ -1,11 +1,17 @@
 """`airmuscle benchmark`: controllers of an antagonistic joint on common tasks."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ...core import InputError, SimulationError, check_known, check_writable
 from ...design import TRUTH_SEEDS
-from ...design.control_benchmark import find_tasks, learn, scenario_contender, standard_contenders
+from ...design.control_benchmark import (
+    Contender,
+    find_tasks,
+    learn,
+    scenario_contender,
+    standard_contenders,
+)
 from ...design.control_benchmark.commissioning import COMMISSIONING_RUNS
 from ...design.control_benchmark.joints import BenchmarkJoint, on_off_joint, proportional_joint
 from ...design.control_benchmark.result import benchmark_controllers
@@ -59,6 +65,17 @@ class BenchmarkRequest:
     )
 
 
+def _contenders(joint: BenchmarkJoint, requested: Sequence[str]) -> list[Contender]:
+    """The requested controllers, by their names or by scenario files; by default all."""
+    known = {contender.name: contender for contender in standard_contenders(joint)}
+    names = dict.fromkeys(requested)
+    for name in names:
+        if name not in known and is_path(name):
+            known[name] = scenario_contender(joint, name)
+        check_known("there is no controller", name, known, error=InputError)
+    return [known[name] for name in names or known]
+
+
 @with_requests
 def benchmark(
     request: BenchmarkRequest,
@@ -86,13 +103,7 @@ def benchmark(
     """
     joint = request.valves(TRUTH_SEEDS[: request.truths])
     trials = request.trials
-    known = {contender.name: contender for contender in standard_contenders(joint)}
-    names = dict.fromkeys(request.controller)
-    for name in names:
-        if name not in known and is_path(name):
-            known[name] = scenario_contender(joint, name)
-        check_known("there is no controller", name, known, error=InputError)
-    contenders = [known[name] for name in names or known]
+    contenders = _contenders(joint, request.controller)
     tasks = find_tasks(request.task)
     if trials and (trials < 2 or LEARNED not in [contender.name for contender in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")

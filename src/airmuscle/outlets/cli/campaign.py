@@ -125,9 +125,8 @@ def campaign(
     if entry is None and isinstance(result.static, LeftOutStage):
         notes.append("muscle: not written, because it needs a static characteristic")
     if scenarios and not any(scenario.text for scenario in scenarios):
-        notes.append(
-            f"scenarios: not written: {'; '.join(dict.fromkeys(s.reason for s in scenarios))}"
-        )
+        reasons = dict.fromkeys(scenario.reason for scenario in scenarios)
+        notes.append(f"scenarios: not written: {'; '.join(reasons)}")
     chapters[0] = dataclasses.replace(
         chapters[0],
         problems=(*chapters[0].problems, *filter(None, [refusal])),
@@ -135,20 +134,7 @@ def campaign(
     )
     contents = {f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}
     if entry is not None:  # and the muscles of the other resting lengths
-        lengths = {
-            r.resting_length
-            for r in result.records
-            if r.kind.is_static and r.resting_length is not None
-        }
-        other_entries = {
-            length: _entry(result, length) for length in sorted(lengths - {result.resting_length})
-        }
-        named_muscles = {
-            f"muscle-{1e3 * length:.0f}mm.toml": to_toml(other_entry)
-            for length, other_entry in other_entries.items()
-            if other_entry
-        }
-        contents = {"muscle.toml": to_toml(entry), **named_muscles, **contents}
+        contents = {"muscle.toml": to_toml(entry), **_other_muscles(result), **contents}
     chapters += reading_chapters(complete)
     deliver(
         "campaign",
@@ -158,6 +144,21 @@ def campaign(
         title="Bench campaign",
         files=contents,
     )
+
+
+def _other_muscles(result: Campaign) -> dict[str, str]:
+    """The files of the muscles of the other resting lengths."""
+    lengths = {
+        record.resting_length
+        for record in result.records
+        if record.kind.is_static and record.resting_length is not None
+    }
+    files = {}
+    for length in sorted(lengths - {result.resting_length}):
+        entry = _entry(result, length)
+        if entry:
+            files[f"muscle-{1e3 * length:.0f}mm.toml"] = to_toml(entry)
+    return files
 
 
 def _read_each(

@@ -1,9 +1,11 @@
 """`airmuscle fit-dynamic` and `fit-regulator`: plants and regulators from transient records."""
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
+from ...bench import DynamicFit
 from ...bench.identify.dynamic import fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters, regulator_chapters
 from ...bench.segment import inspect
@@ -77,20 +79,25 @@ def fit_dynamic(
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
     fit = fit.with_scatter_of_records([prediction.common for prediction in cross])
-    weak = [name for direction in fit.identifiability.undetermined for name, _ in direction.shares]
-    wanted = [
-        *(weak if WEAK in request.profile else ()),
-        *(name for name in request.profile if name != WEAK),
-    ]
-    profiles = [
-        fit.profile(name, request.points)
-        for name in dict.fromkeys(fit[name].name for name in wanted)
-    ]
+    names_of_profiles = _names_of_profiles(fit, request.profile)
+    profiles = [fit.profile(name, request.points) for name in names_of_profiles]
     count = len(loaded.experiments)
     names = ["scenario.toml"] if count == 1 else [f"scenario-{i + 1}.toml" for i in range(count)]
     files = {name: loaded.scenario(fit, i, cross) for i, name in enumerate(names)}
     chapters = dynamic_chapters(fit, loaded.title, profiles, [*notes, *findings], cross)
     deliver("fit-dynamic", chapters, json=json, out=out, title="Dynamic fit", files=files)
+
+
+def _names_of_profiles(fit: DynamicFit, requested: Sequence[str]) -> list[str]:
+    """The parameters whose profiles are requested, once each: those that the records determine
+    weakly first, if they are.
+    """
+    wanted = list[str]()
+    if WEAK in requested:
+        for direction in fit.identifiability.undetermined:
+            wanted += [name for name, _ in direction.shares]
+    wanted += [name for name in requested if name != WEAK]
+    return list(dict.fromkeys(fit[name].name for name in wanted))
 
 
 @request

@@ -242,6 +242,7 @@ def _data_row(path: Path) -> dict[str, str]:
     """Title and provenance from the comments at the top of a data file."""
     with path.open(encoding="utf-8") as file:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
+    # the first comment is the title
     lines = [comment.lstrip("# ").strip() for comment in comments]
     text = " ".join(lines)
     title = lines[0] if lines else ""

@@ -1,13 +1,15 @@
 """`airmuscle predict`: prediction of further records by an identified muscle or plant."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
-from ...bench import StartTime
+from ...bench import RecordPrediction, StartTime
 from ...bench.identify.prediction import prediction_chapters
 from ...core import FileError, check_writable
 from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
-from ...files.scenario.prediction import load_plant_model, predict_with_entry
+from ...files.scenario.prediction import PlantModel, load_plant_model, predict_with_entry
+from ...recording import Recording
 from ..requests import ReadingRequest, RequestError, Where, many, optional, request
 from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
@@ -44,6 +46,25 @@ class PredictRequest:
             )
 
 
+def _predicted_by_plant(
+    model: PlantModel,
+    recordings: Sequence[Recording],
+    tables: Sequence[Path],
+    request: PredictRequest,
+) -> list[RecordPrediction]:
+    """The predictions of measured recordings, then of the records of files of records."""
+    unknowns: list[Any] = list(request.own)
+    if request.start_margin is not None:
+        unknowns.append(StartTime(request.start_margin))
+    start_time = request.start_time or 0.0
+    predictions = [
+        model.predict_recording(recording, start_time, unknowns) for recording in recordings
+    ]
+    for path in tables:
+        predictions += model.predict_file(path)
+    return predictions
+
+
 @with_requests
 def predict(
     model: Model,
@@ -75,14 +96,8 @@ def predict(
     thing: Any
     if kind_of(read_toml(Path(model))) is PlantEntry if is_file else model in list_plants():
         loaded = load_plant_model(model)
-        margin = request.start_margin
         recordings = read_recordings(measured, reading) if measured else []
-        unknowns: list[Any] = [*request.own, *([] if margin is None else [StartTime(margin)])]
-        predictions = [
-            loaded.predict_recording(recording, request.start_time or 0.0, unknowns)
-            for recording in recordings
-        ]
-        predictions += (prediction for path in tables for prediction in loaded.predict_file(path))
+        predictions = _predicted_by_plant(loaded, recordings, tables, request)
         thing = loaded.scenario.plant
     elif stated := [
         name for name in ("start_time", "start_margin", "own") if getattr(request, name)

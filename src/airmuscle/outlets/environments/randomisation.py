@@ -5,7 +5,7 @@ import dataclasses
 import itertools
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -225,8 +225,18 @@ class EpisodeDraw:
             raise ParameterError(
                 f"randomisation: '{leaves[index].path}' is varied twice; name it once."
             )
+        self._check_ranges([leaf.path for leaf in leaves])
+        self.dimension = sum(r.dimension for r in randomisations) + len(task.initial_ranges)
+        """Number of uniform numbers D that an episode takes."""
+        # raises for an initial state that is impossible
+        self.begin(np.full((1, self.dimension), 0.5))
+
+    def _check_ranges(self, paths: Sequence[str]) -> None:
+        """Raise ParameterError for a range that exceeds the declared one. Draws of a fit are
+        limited to it instead.
+        """
         for (r, at), end in itertools.product(
-            zip(randomisations, self._places, strict=True), (0.0, 1.0)
+            zip(self._randomisations, self._places, strict=True), (0.0, 1.0)
         ):
             if isinstance(r, FitUncertainty):
                 continue
@@ -234,14 +244,9 @@ class EpisodeDraw:
             for value, i in zip(values, at, strict=True):
                 if not self._low[i] <= value <= self._high[i]:
                     raise ParameterError(
-                        f"randomisation: '{leaves[i].path}' would be {value:.4g}; allowed range:"
+                        f"randomisation: '{paths[i]}' would be {value:.4g}; allowed range:"
                         f" {self._low[i]:.4g} to {self._high[i]:.4g}."
                     )
-        self.dimension = sum(r.dimension for r in randomisations) + len(task.initial_ranges)
-        """Number of uniform numbers D that an episode takes."""
-        self.begin(
-            np.full((1, self.dimension), 0.5)
-        )  # raises for an initial state that is impossible
 
     def begin(self, uniform: Array) -> tuple[Array, Array]:
         """Parameters (R, P) and initial states (R, n) from uniform numbers (R, D) in [0, 1); a

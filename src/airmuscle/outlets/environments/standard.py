@@ -256,6 +256,7 @@ class ArmReaching(EnvironmentTask):
         self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value
     ) -> tuple[Value, ...]:
         joints = self.plant.mechanism.coordinates
+        # in the order of the observations
         angles = [state[c.name] for c in joints]
         speeds = [state[c.speed] for c in joints]
         pressures = [outputs[f"{p}pressure"] / bar for p in self.plant.prefixes]

@@ -179,18 +179,13 @@ class FmuPackage:
         """Outputs, rates and what is computed at the start, with the states and inputs on which
         they depend.
         """
+        outputs = [v.reference for v in self.variables if v.causality == "output"]
+        rates = [v.reference for v in self.variables if v.derivative_of is not None]
+        calculated = [v.reference for v in self.variables if v.initial == "calculated"]
         unknowns = (
-            ("Outputs", "Output", [v.reference for v in self.variables if v.causality == "output"]),
-            (
-                "Derivatives",
-                "ContinuousStateDerivative",
-                [v.reference for v in self.variables if v.derivative_of is not None],
-            ),
-            (
-                "InitialUnknowns",
-                "InitialUnknown",
-                [v.reference for v in self.variables if v.initial == "calculated"],
-            ),
+            ("Outputs", "Output", outputs),
+            ("Derivatives", "ContinuousStateDerivative", rates),
+            ("InitialUnknowns", "InitialUnknown", calculated),
         )
         first = 1 if fmi == 2 else 0  # FMI 2.0 counts from 1
         for group, element, references in unknowns:
@@ -202,8 +197,14 @@ class FmuPackage:
                 )
                 dependencies = {} if element == "InitialUnknown" else {"dependencies": known}
                 SubElement(parent, "Unknown" if fmi == 2 else element, {**place, **dependencies})
-        for v in (variable for variable in self.variables if fmi == 3 and variable.is_indicator):
-            SubElement(structure, "EventIndicator", valueReference=str(v.reference))
+        if fmi == 3:
+            self._add_indicators(structure)
+
+    def _add_indicators(self, structure: Element) -> None:
+        """The event indicators, which FMI 2.0 counts alone."""
+        for v in self.variables:
+            if v.is_indicator:
+                SubElement(structure, "EventIndicator", valueReference=str(v.reference))
 
     def _units(self, fmi: int) -> tuple[str, ...]:
         """The C sources that a compiler is given."""

@@ -3,7 +3,7 @@ controller, joined.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -188,21 +188,8 @@ def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
         part: {v.name: v for v in package.variables if v.causality in ("input", "output")}
         for part, package in parts.items()
     }
-    joined = [
-        (a, signal, b)
-        for a, b in (("plant", "controller"), ("controller", "plant"))
-        for signal, v in inside[a].items()
-        if v.causality == "output"
-        and signal in inside[b]
-        and inside[b][signal].causality == "input"
-    ]
-    taken = {(b, signal) for _, signal, b in joined}
-    outside = [
-        (part, v)
-        for part, ports in inside.items()
-        for v in ports.values()
-        if v.causality == "input" and (part, v.name) not in taken
-    ]
+    joined = _joined_ports(inside)
+    outside = _free_inputs(inside, {(target, signal) for _, signal, target in joined})
     _connectors(system, [v for _, v in outside])
     elements = SubElement(system, "ssd:Elements")
     for part, ports in inside.items():
@@ -240,6 +227,31 @@ def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
         {key: repr(experiment[key]) for key in ("startTime", "stopTime")},
     )
     return fmi_package.xml_text(root)
+
+
+def _joined_ports(inside: Mapping[str, Mapping[str, Variable]]) -> list[tuple[str, str, str]]:
+    """Part, signal and other part of the outputs of plant and controller that are inputs of the
+    other.
+    """
+    joined = []
+    for source, target in (("plant", "controller"), ("controller", "plant")):
+        inputs = {name for name, v in inside[target].items() if v.causality == "input"}
+        for signal, v in inside[source].items():
+            if v.causality == "output" and signal in inputs:
+                joined.append((source, signal, target))
+    return joined
+
+
+def _free_inputs(
+    inside: Mapping[str, Mapping[str, Variable]], joined: set[tuple[str, str]]
+) -> list[tuple[str, Variable]]:
+    """Part and variable of the inputs that no output is connected to."""
+    return [
+        (part, v)
+        for part, ports in inside.items()
+        for v in ports.values()
+        if v.causality == "input" and (part, v.name) not in joined
+    ]
 
 
 def _connectors(parent: Element, variables: Sequence[Variable]) -> None:

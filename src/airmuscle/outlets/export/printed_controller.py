@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Leaf, ParameterError, leaves, nodes
+from ...core import Array, Leaf, Node, ParameterError, leaves, nodes
 from ...engine import ControlLaw, ControlLoop, Problem
 from ...engine.compile.functions import Printer
 from ...engine.compile.ir import emission
@@ -267,6 +267,12 @@ def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:
     return loop
 
 
+def _limited_command(command: Node, least: float, most: float) -> Node:
+    """A command within its range, whose ends may be infinite."""
+    raised = nodes.where(command < least, least, command) if np.isfinite(least) else command
+    return nodes.where(raised > most, most, raised) if np.isfinite(most) else raised
+
+
 def print_controller(
     prepared: SampledLoop,
     name: str,
@@ -298,10 +304,9 @@ def print_controller(
     results = nodes.replaced([*sample.commands, *sample.later], old, new)
     commands = results[: len(ranges)]
     later = results[len(ranges) :]
-    limited = []
-    for command, (least, most) in zip(commands, ranges, strict=True):
-        raised = nodes.where(command < least, least, command) if np.isfinite(least) else command
-        limited.append(nodes.where(raised > most, most, raised) if np.isfinite(most) else raised)
+    limited = [
+        _limited_command(command, *limits) for command, limits in zip(commands, ranges, strict=True)
+    ]
     inputs = {
         "measurement": sample.measured,
         "setpoint": sample.setpoints,

@@ -117,20 +117,7 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         read.complain(RequestError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
-        columns = list[FileColumn]()
-        units = table.units or ("",) * len(table.headings)
-        for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
-            chosen = settings.columns.get(key)
-            name, stated, known = _name_and_unit(heading)
-            stated = unit_row or stated
-            unit = ""
-            if chosen:
-                name, unit, known = _name_and_unit(chosen)
-            name = name if known else heading
-            columns.append(
-                FileColumn(key, heading, name, unit or stated, stated, known, chosen != "")
-            )
-        columns = columns[:MAX_COLUMNS]
+        columns = _file_columns(table, settings)[:MAX_COLUMNS]
         listed = read.columns.setdefault(path.name, [])
         listed += [column for column in columns if all(column.key != entry.key for entry in listed)]
         try:
@@ -155,6 +142,22 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
             continue
         read.recordings += parts
         read.files += [path.name] * len(parts)
+
+
+def _file_columns(table: RawTable, settings: FitSettings) -> list[FileColumn]:
+    """The columns of a table, as their headings or the user name them."""
+    columns = list[FileColumn]()
+    units = table.units or ("",) * len(table.headings)
+    for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
+        chosen = settings.columns.get(key)
+        name, stated, known = _name_and_unit(heading)
+        stated = unit_row or stated
+        unit = ""
+        if chosen:
+            name, unit, known = _name_and_unit(chosen)
+        name = name if known else heading
+        columns.append(FileColumn(key, heading, name, unit or stated, stated, known, chosen != ""))
+    return columns
 
 
 def without_folder(text: str, folder: Path) -> str:

@@ -105,6 +105,17 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
+def _facts(value: Any, field: str) -> dict[str, str]:
+    """The facts of a file that are not empty. Raises RequestError for an unknown one."""
+    table = _table(value, field)
+    for fact in table:
+        if fact not in FILE_FACTS:
+            text = f"'{str(fact)[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
+            raise RequestError(text, field)
+    texts = {name: _text(table.get(name, ""), field) for name in FILE_FACTS}
+    return {name: text for name, text in texts.items() if text}
+
+
 def read_settings(data: Any) -> FitSettings:
     """The settings in a request of the page. Raises RequestError."""
     if not isinstance(data, dict):
@@ -117,14 +128,7 @@ def read_settings(data: Any) -> FitSettings:
         )  # tab and blank as they are
     facts: dict[str, dict[str, str]] = {}
     for file, value in _table(data.get("files", {}), "files").items():
-        field = f"file:{file}"
-        table = _table(value, field)
-        for unknown in (fact for fact in table if fact not in FILE_FACTS):
-            text = f"'{str(unknown)[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
-            raise RequestError(text, field)
-        facts[file] = {
-            name: text for name in FILE_FACTS if (text := _text(table.get(name, ""), field))
-        }
+        facts[file] = _facts(value, f"file:{file}")
     columns = {
         key: _heading(key, value)
         for key, value in _table(data.get("columns", {}), "columns").items()

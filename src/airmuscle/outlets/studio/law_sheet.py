@@ -88,38 +88,17 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     without a validity range.
     """
     law, errors = _in_closed_form(entry)
-    geometry, kind, ratings = entry.geometry, type(entry.characteristic), entry.ratings
+    geometry = entry.geometry
+    kind = type(entry.characteristic)
+    ratings = entry.ratings
     text, functions, held_values = print_law(law, geometry)
     rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
     if parameter_model(law, geometry) is not law:
         rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
     limits = validity_range_of(law, entry.validity_range)
     fixed = bool(errors) or len(rows) > MAX_PARAMETERS
-    parameters = (
-        [] if fixed else [parameter_row(path, leaf, entry.provenance) for path, leaf in rows]
-    )
-    known = entry.uncertainty
-    stated = (
-        {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
-    )
-    for row in parameters:
-        row["standard_error"] = stated.get(
-            row["path"], stated.get(row["path"].removeprefix("characteristic."))
-        )
-    shape: dict[str, Any] | None = None
-    if (
-        geometry is not None
-    ):  # the number of its segments, and radii on a grid where there is no closed form
-        low, high = geometry.contraction_range
-        segments = geometry.segments if isinstance(geometry, FibreTube) else 1
-        shape = {
-            "model": type(geometry).__name__,
-            "segments": segments,
-            "range": [float(low), float(high)],
-        }
-        if "outline" not in functions:
-            grid = np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS)
-            shape |= sampled_outline(geometry, grid)
+    parameters = [] if fixed else _parameter_rows(rows, entry)
+    shape = None if geometry is None else _shape_row(geometry, "outline" in functions)
     sheet: dict[str, Any] = {
         **{key: getattr(entry, key) for key in ("name", "title", "provenance", "note", "warning")},
         "law": kind.__name__,
@@ -130,17 +109,54 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "limits": [float(limit) for limit in _limits(law)],
         "values": [leaf.value for _, leaf in rows],
         "parameters": parameters,
-        "resting_length": next(
-            (i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None
-        ),
+        "resting_length": _place_of_resting_length([path for path, _ in rows]),
         "validity_range": None if limits is None else dataclasses.asdict(limits),
-        "ratings": {name: getattr(ratings, name) for name in (ratings.stated if ratings else ())},
+        "ratings": {name: getattr(ratings, name) for name in ratings.stated} if ratings else {},
         "geometry": shape,
         "references": [str(reference) for reference in cite(entry)],
         "approximation": errors,
         "toml": _toml(entry, fixed),
     }
     return with_script(sheet, text, ("prepare", *functions))
+
+
+def _parameter_rows(rows: Sequence[tuple[str, Leaf]], entry: Entry) -> list[dict[str, Any]]:
+    """The parameters of the page by their paths, with their standard errors as far as known."""
+    known = entry.uncertainty
+    stated = (
+        {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
+    )
+    parameters = [parameter_row(path, leaf, entry.provenance) for path, leaf in rows]
+    for row in parameters:
+        path = row["path"]
+        of_law = stated.get(path.removeprefix("characteristic."))
+        row["standard_error"] = stated.get(path, of_law)
+    return parameters
+
+
+def _place_of_resting_length(paths: Sequence[str]) -> int | None:
+    """The number of the parameter that is the resting length; None without one."""
+    for i, path in enumerate(paths):
+        if path.endswith("resting_length"):
+            return i
+    return None
+
+
+def _shape_row(geometry: am.geometry.Geometry, is_printed: bool) -> dict[str, Any]:
+    """A geometry with the number of its segments, and its radii on a grid where the program has no
+    function of them.
+    """
+    low, high = geometry.contraction_range
+    segments = geometry.segments if isinstance(geometry, FibreTube) else 1
+    shape = {
+        "model": type(geometry).__name__,
+        "segments": segments,
+        "range": [float(low), float(high)],
+    }
+    if not is_printed:
+        grid = np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS)
+        shape |= sampled_outline(geometry, grid)
+    return shape
 
 
 def identifier_of(sheet: Mapping[str, Any], text: str = "") -> str:

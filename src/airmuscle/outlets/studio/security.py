@@ -14,7 +14,7 @@ import dataclasses
 import ipaddress
 import json
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -72,10 +72,7 @@ class Access:
         headers = {
             n.decode("latin-1").lower(): value.decode("latin-1") for n, value in scope["headers"]
         }
-        host = headers.get("host", "")
-        name, _, port = host.rpartition(":")
-        bare = name if name and port.isdecimal() else host
-        if self.hosts and bare.lower().removesuffix(".") not in self.hosts:
+        if self.hosts and _name_of_host(headers) not in self.hosts:
             return 421, "This server does not answer for this host."
         if len(scope.get("raw_path") or scope["path"]) > MAX_TARGET:
             return 414, "The path is too long."
@@ -94,12 +91,9 @@ class Access:
             or headers.get("sec-fetch-site", "same-origin") != "same-origin"
         ):
             return 403, "This request does not come from the page of this server."
-        with contextlib.suppress(ValueError):  # an origin that is no address
-            origin = urlsplit(headers.get("origin", ""))
-            here = (scope.get("scheme", "http"), host)
-            if "origin" not in headers or (origin.scheme, origin.netloc) == here:
-                return None
-        return 403, "This request comes from another origin."
+        if not _is_of_this_origin(headers, scope):
+            return 403, "This request comes from another origin."
+        return None
 
     def cookie(self, scope: Scope) -> dict[str, Any] | None:
         """The cookie that keeps a token which the address of a request contains; None without
@@ -135,6 +129,25 @@ def cookie_value(text: str, name: str) -> str:
         cookie.load(text)
         return cookie[name].value if name in cookie else ""
     return ""
+
+
+def _name_of_host(headers: Mapping[str, str]) -> str:
+    """The header Host without its port, in lower case."""
+    host = headers.get("host", "")
+    name, _, port = host.rpartition(":")
+    bare: str = name if name and port.isdecimal() else host
+    return bare.lower().removesuffix(".")
+
+
+def _is_of_this_origin(headers: Mapping[str, str], scope: Scope) -> bool:
+    """Whether the header Origin, if there is one, is the address of the server."""
+    if "origin" not in headers:
+        return True
+    try:
+        origin = urlsplit(headers["origin"])
+    except ValueError:  # an origin that is no address
+        return False
+    return (origin.scheme, origin.netloc) == (scope.get("scheme", "http"), headers.get("host", ""))
 
 
 def secured(application: Application, access: Access) -> Application:
