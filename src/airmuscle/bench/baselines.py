@@ -43,13 +43,14 @@ class LinearArx(ShortRepr):
         """
         outputs = past.copy()
         for row in range(DEPTH - 1, inputs.shape[1] - 1):
-            seen = outputs[:, row - DEPTH + 1 : row + 1].reshape(len(outputs), -1)
-            driven = inputs[:, row - DEPTH + 1 : row + 2].reshape(len(outputs), -1)
-            scaled = (np.concatenate([seen, driven], axis=1) - self.mean) / self.spread
+            first = row - DEPTH + 1
+            seen = outputs[:, first : row + 1].reshape(len(outputs), -1)
+            driven = inputs[:, first : row + 2].reshape(len(outputs), -1)
+            regressors = np.concatenate([seen, driven], axis=1)
+            scaled = (regressors - self.mean) / self.spread
             following = outputs[:, -1] + scaled @ self.coefficients[:-1] + self.coefficients[-1]
-            outputs = np.concatenate(
-                [outputs, np.clip(following, self.low, self.high)[:, None]], axis=1
-            )
+            limited = np.clip(following, self.low, self.high)
+            outputs = np.concatenate([outputs, limited[:, None]], axis=1)
         return outputs[:, DEPTH:]
 
 
@@ -167,10 +168,12 @@ def _run(grid: TimedRecord, known: Sequence[TimedRecord]) -> Array:
     measured = np.concatenate([record.outputs for record in known])
     margin = LIMIT_MARGIN * np.ptp(measured, axis=0)
     runs = [(record.outputs, record.inputs) for record in known]
-    model = fit_arx(runs, measured.min(axis=0) - margin, measured.max(axis=0) + margin)
-    return np.concatenate(
-        [grid.outputs[:DEPTH], model.free_run(grid.outputs[None, :DEPTH], grid.inputs[None])[0]]
-    )
+    low = measured.min(axis=0) - margin
+    high = measured.max(axis=0) + margin
+    model = fit_arx(runs, low, high)
+    past = grid.outputs[:DEPTH]
+    following = model.free_run(past[None], grid.inputs[None])[0]
+    return np.concatenate([past, following])
 
 
 def _rms(record: TimedRecord, predicted: Array) -> Array:

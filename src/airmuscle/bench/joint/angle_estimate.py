@@ -144,10 +144,10 @@ def _predicted_errors(seen: Array, errors: Array, further: Array) -> Array:
         mean = x.mean(axis=0)
         scale = x.std(axis=0) + 1e-9
         z = (x - mean) / scale
-        slope = np.linalg.solve(
-            z.T @ z + RIDGE * len(z) * np.eye(z.shape[1]), z.T @ (e - e.mean(axis=0))
-        )
-        predicted[:, row] = e.mean(axis=0) + (further[:, row] - mean) / scale @ slope
+        level = e.mean(axis=0)
+        ridge = RIDGE * len(z) * np.eye(z.shape[1])
+        slope = np.linalg.solve(z.T @ z + ridge, z.T @ (e - level))
+        predicted[:, row] = level + (further[:, row] - mean) / scale @ slope
     return predicted
 
 
@@ -170,18 +170,19 @@ def _runs(
     rows = pressure.shape[1]
     names = [c.name for c in arm.mechanism.coordinates]
     later = np.minimum(np.arange(rows) + delay, rows - 1)
-    state = {s.name: np.zeros(len(runs) * len(poses)) for s in arm.states}
-    state |= {name: np.tile(poses[:, j], len(runs)) for j, name in enumerate(names)}
-    state |= {
-        f"{p}pressure": np.repeat(pressure[:, later[0], i], len(poses))
-        for i, p in enumerate(arm.prefixes)
-    }
-    simulated = angles(arm, np.repeat(pressure[:, later], len(poses), axis=0), state, sample_time)
+    # every episode from every pose: the poses vary fastest
+    commands = np.repeat(pressure[:, later], len(poses), axis=0)
+    state = {s.name: np.zeros(len(commands)) for s in arm.states}
+    for j, name in enumerate(names):
+        state[name] = np.tile(poses[:, j], len(runs))
+    for i, prefix in enumerate(arm.prefixes):
+        state[f"{prefix}pressure"] = commands[:, 0, i]
+    simulated = angles(arm, commands, state, sample_time)
     stacked = simulated.reshape(len(runs), len(poses), rows, len(names))
     ended = np.isnan(_padded(runs, "angle"))
-    return np.where(ended, np.nan, stacked.mean(axis=1)), np.where(
-        ended, np.nan, stacked.std(axis=1)
-    )
+    mean = np.where(ended, np.nan, stacked.mean(axis=1))
+    deviation = np.where(ended, np.nan, stacked.std(axis=1))
+    return mean, deviation
 
 
 def _padded(runs: Sequence[Episode], name: str, hold_last: bool = False) -> Array:

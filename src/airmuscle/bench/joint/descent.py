@@ -113,10 +113,11 @@ class Descent:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
         self.values = np.array([float(leaves[path].value) for path in self.names])
         self.sizes = np.array([typical_size(path, leaves) for path in self.names])
-        self.low = np.array(
-            [max(leaves[p].declared.bounds[0], LOW.get(_field(p), -np.inf)) for p in self.names]
-        )
-        self.high = np.array([leaves[p].declared.bounds[1] for p in self.names])
+        bounds = [leaves[path].declared.bounds for path in self.names]
+        least = [LOW.get(_field(path), -np.inf) for path in self.names]
+        declared_low = [low for low, _ in bounds]
+        self.low = np.maximum(declared_low, least)
+        self.high = np.array([high for _, high in bounds])
         self.rng = np.random.default_rng(self.seed)
         self.spread = 0.1
 
@@ -169,26 +170,25 @@ class Descent:
         arm = with_values(self.arm, self.names, values)
         sampled = self.windows.sample(SAMPLE, rows)
         errors = self.errors(arm, self.joint, sampled)
-        errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
-        errors = errors[sampled.counts[:, HISTORY + 1 :]]
-        return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
+        limited = np.clip(np.abs(errors), 0.0, OUTLIER)
+        limited = np.where(np.isfinite(errors), limited, OUTLIER)
+        counted = limited[sampled.counts[:, HISTORY + 1 :]]
+        losses = 2 * CLIP**2 * (np.sqrt(1 + (counted / CLIP) ** 2) - 1)
+        return float(np.mean(losses))
 
     def _step(self, normal: Array, slope: Array, rate: float, damping: float) -> None:
-        pull = np.array([self.ridge * (name in self.prior) for name in self.names]) / self.sizes**2
-        slope = slope + pull * (self.values - [self.prior.get(name, 0.0) for name in self.names])
+        weights = [self.ridge * (name in self.prior) for name in self.names]
+        pull = np.array(weights) / self.sizes**2
+        centre = [self.prior.get(name, 0.0) for name in self.names]
+        slope = slope + pull * (self.values - centre)
         normal = normal + np.diag(pull)
         scale = np.sqrt(np.diag(normal))
         scale = scale + 1e-6 * np.max(scale * self.sizes) / self.sizes
-        change = (
-            -np.linalg.solve(
-                normal / np.outer(scale, scale) + damping * np.eye(len(slope)), slope / scale
-            )
-            / scale
-        )
+        damped = normal / np.outer(scale, scale) + damping * np.eye(len(slope))
+        change = -np.linalg.solve(damped, slope / scale) / scale
         limit = MAX_CHANGE * np.maximum(np.abs(self.values), self.sizes)
-        self.values = np.clip(
-            self.values + np.clip(rate * change, -limit, limit), self.low, self.high
-        )
+        moved = self.values + np.clip(rate * change, -limit, limit)
+        self.values = np.clip(moved, self.low, self.high)
         self.arm = with_values(self.arm, self.names, self.values)
 
 
@@ -239,9 +239,12 @@ def gradients(
     """Errors (N, rows) [rad] of the free run of one joint and their derivatives (N, rows, P) by the
     parameters, both 0 in rows of outliers; the other joints move as measured."""
     error, gradient = _run_of_joint(arm, joint, paths, windows)
-    lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
-    lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
-    return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
+    is_finite = np.isfinite(error) & np.isfinite(gradient).all(axis=-1)
+    counts = windows.counts[:, HISTORY + 1 :]
+    lost = ~is_finite | (np.abs(error) > OUTLIER) | np.logical_not(counts)
+    error = np.where(lost, 0.0, error)
+    gradient = np.where(lost[..., None], 0.0, gradient)
+    return error, gradient
 
 
 def _run_of_joint(
@@ -254,25 +257,29 @@ def _run_of_joint(
     state = {name: known[name] for name in names}
     values = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm)}
     for k, path in enumerate(paths):
-        if _field(path) in ("presliding_angle", "lags"):  # on which the initial state depends
-            step = 1e-4 * values[path]
-            moved = start_of(with_values(arm, [path], [values[path] + step]), windows)
-            state |= {sensitivity(name, k): (moved[name] - known[name]) / step for name in names}
+        if _field(path) not in ("presliding_angle", "lags"):
+            continue  # the initial state depends on these parameters alone
+        step = 1e-4 * values[path]
+        changed = with_values(arm, [path], [values[path] + step])
+        moved = start_of(changed, windows)
+        for name in names:
+            state[sensitivity(name, k)] = (moved[name] - known[name]) / step
     measured = (windows.angle, windows.rate, windows.acceleration)
     motion = [column[:, HISTORY:, i, None] for i in system.others for column in measured]
     inputs = np.concatenate([windows.pressure[:, HISTORY:], *motion], axis=-1)
     of_arm = [f"arm.{path}" for path in paths]
     simulated, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
-    return np.asarray(simulated[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint]), slopes[
-        :, 1:, 0
-    ]
+    angle = simulated[:, 1:, 0]
+    errors = angle - windows.angle[:, HISTORY + 1 :, joint]
+    return np.asarray(errors), slopes[:, 1:, 0]
 
 
 def with_values(arm: Arm, paths: Sequence[str], values: Sequence[float] | Array) -> Arm:
     """The arm with other values of these parameters."""
-    place = {leaf.path: i for i, leaf in enumerate(tree.leaves(arm))}
+    index_of = {leaf.path: i for i, leaf in enumerate(tree.leaves(arm))}
+    indices = [index_of[path] for path in paths]
     flat = np.array(tree.flatten(arm))
-    flat[[place[path] for path in paths]] = values
+    flat[indices] = values
     changed: Arm = tree.unflatten(arm, flat.tolist())
     return changed
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import ColumnError, FileError
+from ...core import Array, ColumnError, FileError
 from ..readers.arrays import Arrays, arrays_of_table
 from ..readers.formats import EPISODE_EXTENSIONS, TEXT, format_of
 from ..readers.selection import Selection
@@ -73,18 +73,17 @@ def read_arrays(
 def _read_bag(
     path: Path, sample_time: float | None, mapped: Sequence[str]
 ) -> tuple[list[Arrays], tuple[str, ...]]:
-    file = (
-        path
-        if path.is_file()
-        else min(entry for entry in path.iterdir() if entry.suffix in (".db3", ".mcap"))
-    )
+    file = path
+    if not path.is_file():
+        file = min(entry for entry in path.iterdir() if entry.suffix in (".db3", ".mcap"))
     (table,) = format_of(file).read_tables(file, Selection(columns=tuple(mapped)))
     columns = arrays_of_table(table)
     time = columns.pop("time", np.zeros(0))
     intervals = np.diff(time)
-    step = sample_time or (float(np.median(intervals)) if len(intervals) else 0.0)
+    median = float(np.median(intervals)) if len(intervals) else 0.0
+    step = sample_time or median
     longest = float(np.max(intervals, initial=0.0))
-    if not step > 0.0 or longest > MAX_GAP * max(step, float(np.median(intervals))):
+    if not step > 0.0 or longest > MAX_GAP * max(step, median):
         raise ColumnError(
             f"{path.name}: {len(time)} rows, with up to {longest:.3g} s between two messages; an"
             " episode needs messages without a gap. Split the bag there, or leave it out."
@@ -95,8 +94,11 @@ def _read_bag(
         f"{path.name}: intervals of messages differ by {uneven:.2g} ms; rows are interpolated to"
         f" {1e3 * step:.4g} ms"
     )
-    arrays = {"time": grid, **{n: np.interp(grid, time - time[0], c) for n, c in columns.items()}}
-    return [arrays], (*table.notes, *([note] if uneven > 100.0 * step else []))
+    arrays: dict[str, Array] = {"time": np.asarray(grid, dtype=np.float64)}
+    for name, column in columns.items():
+        arrays[name] = np.interp(grid, time - time[0], column)
+    notes = (*table.notes, note) if uneven > 100.0 * step else table.notes
+    return [arrays], tuple(notes)
 
 
 FORMATS = f"supported are {', '.join(EPISODE_EXTENSIONS)}, and folders of ROS 2 bags."

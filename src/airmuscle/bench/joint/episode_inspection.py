@@ -339,13 +339,12 @@ def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[
     and the residual.
     """
     rows = slice(4, -MAX_DELAY - 1)
-    x = [
-        np.concatenate([p[4 + delay : len(p) - MAX_DELAY - 1 + delay], s[rows]], axis=1)
-        for _, s, p in blocks
-    ]
-    y = [a[rows] for a, _, _ in blocks]
-    regressors = np.concatenate(x)
-    target = np.concatenate(y)
+    parts = []
+    for _, motion, pressure in blocks:
+        delayed = pressure[4 + delay : len(pressure) - MAX_DELAY - 1 + delay]
+        parts.append(np.concatenate([delayed, motion[rows]], axis=1))
+    regressors = np.concatenate(parts)
+    target = np.concatenate([acceleration[rows] for acceleration, _, _ in blocks])
     mean = regressors.mean(axis=0)
     spread = regressors.std(axis=0) + 1e-12
     design = np.column_stack([(regressors - mean) / spread, np.ones(len(regressors))])
@@ -353,19 +352,19 @@ def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[
     coefficients = inverse @ (design.T @ target)
     residual = target - design @ coefficients
     muscles = blocks[0][2].shape[1]
-    ends = np.cumsum([len(part) for part in x])[:-1]
-    ends = (
-        ends if len(x) >= PIECES else np.linspace(0, len(regressors), PIECES + 1).astype(int)[1:-1]
-    )
+    ends = np.cumsum([len(part) for part in parts])[:-1]
+    if len(parts) < PIECES:
+        ends = np.linspace(0, len(regressors), PIECES + 1).astype(int)[1:-1]
     pieces = zip(np.split(design, ends), np.split(residual, ends), strict=True)
-    scores = np.array([a.T @ r for a, r in pieces])
+    scores = np.array([regressor.T @ error for regressor, error in pieces])
     t_values = np.empty((muscles, target.shape[1]))
     for j in range(target.shape[1]):
-        covariance = inverse @ (scores[:, :, j].T @ scores[:, :, j]) @ inverse
-        t_values[:, j] = coefficients[:muscles, j] / np.sqrt(
-            np.maximum(np.diag(covariance)[:muscles], 1e-300)
-        )
-    return t_values, float(np.sum(residual.var(axis=0) / target.var(axis=0)))
+        score = scores[:, :, j]
+        covariance = inverse @ (score.T @ score) @ inverse
+        variances = np.maximum(np.diag(covariance)[:muscles], 1e-300)
+        t_values[:, j] = coefficients[:muscles, j] / np.sqrt(variances)
+    unexplained = residual.var(axis=0) / target.var(axis=0)
+    return t_values, float(np.sum(unexplained))
 
 
 def saturated(episodes: Episodes) -> tuple[Array, list[str]]:

@@ -99,7 +99,8 @@ def speed_of(angle: Array, sample_time: float) -> Array:
     if len(angle) < 5:
         return np.asarray(np.gradient(angle, sample_time, axis=0))
     weights = np.array([2.0, 1.0, 0.0, -1.0, -2.0]) / (10.0 * sample_time)
-    inner = np.stack([np.convolve(column, weights, "valid") for column in angle.T], axis=1)
+    slopes = [np.convolve(column, weights, "valid") for column in angle.T]
+    inner = np.stack(slopes, axis=1)
     ends = np.gradient(angle, sample_time, axis=0)
     return np.concatenate([ends[:2], inner, ends[-2:]])
 
@@ -219,25 +220,37 @@ def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS
     """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows`
     further rows follow. Pressures are read `delay` rows later, because their sensors lag; the last
     reading is held. Raises IdentificationError if no episode is long enough."""
-    starts = [
-        (n, k)
-        for n, run in enumerate(episodes.runs)
-        for k in range(HISTORY, len(run) - rows - 1, stride)
-    ]
+    runs = episodes.runs
+    step = episodes.sample_time
+    window = np.arange(-HISTORY, rows + 1)
+    later = np.minimum(window + delay, rows)
+    starts = list[tuple[int, int]]()
+    angle, speed, rate, pressure = (list[Array]() for _ in range(4))
+    for number, run in enumerate(runs):
+        firsts = range(HISTORY, len(run) - rows - 1, stride)
+        if not firsts:
+            continue
+        rate_of_run = speed_of(run.angle, step)
+        for first in firsts:
+            starts.append((number, first))
+            angle.append(run.angle[first + window])
+            speed.append(run.speed[first + window])
+            rate.append(rate_of_run[first + window])
+            pressure.append(run.pressure[first + later])
     if not starts:
         long_enough(episodes, rows)  # raises
-    runs = episodes.runs
-    at = np.arange(-HISTORY, rows + 1)
-    step = episodes.sample_time
-    rates = {number: speed_of(runs[number].angle, step) for number, _ in starts}
-    angle, speed = (
-        np.array([getattr(runs[n], name)[k + at] for n, k in starts]) for name in ("angle", "speed")
+    episode, first_rows = np.array(starts).T
+    angles = np.array(angle)
+    return Windows(
+        angles,
+        np.array(speed),
+        np.array(rate),
+        np.array(pressure),
+        episode,
+        first_rows,
+        step,
+        np.ones(angles.shape[:2], dtype=bool),
     )
-    rate = np.array([rates[n][k + at] for n, k in starts])
-    pressure = np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in starts])
-    episode, first = np.array(starts).T
-    counts = np.ones(angle.shape[:2], dtype=bool)
-    return Windows(angle, speed, rate, pressure, episode, first, step, counts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -266,10 +279,12 @@ def start_of(arm: PressureDriven, windows: Windows) -> Mapping[str, Array]:
     assert isinstance(mechanism, WithStickSlip)
     before = windows.angle[:, : HISTORY + 1]
     state = {}
-    for j, (c, element) in enumerate(zip(mechanism.coordinates, mechanism.elements, strict=True)):
-        state[c.name] = before[:, -1, j]
-        state[c.speed] = windows.speed[:, HISTORY, j]
-        state[mechanism.inner_states[j].name] = _bristle(before[:, :, j], element.presliding_angle)
+    joints = zip(mechanism.coordinates, mechanism.elements, strict=True)
+    for j, (coordinate, element) in enumerate(joints):
+        bristle = mechanism.inner_states[j]
+        state[coordinate.name] = before[:, -1, j]
+        state[coordinate.speed] = windows.speed[:, HISTORY, j]
+        state[bristle.name] = _bristle(before[:, :, j], element.presliding_angle)
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
         readings = windows.pressure[:, : HISTORY + 1, i]
         state[f"{prefix}pressure"] = lagged(readings, lag, windows.sample_time)
@@ -328,5 +343,8 @@ def coverage(errors: Array, episode: Array) -> Array:
     odd = np.searchsorted(np.unique(episode), episode) % 2 == 1
     if odd.all() or not odd.any():
         return np.full(errors.shape[2], np.nan)
-    inside = [np.abs(errors[part]) <= band(errors[~part]) for part in (odd, ~odd)]
+    inside = []
+    for part in (odd, ~odd):
+        limits = band(errors[~part])
+        inside.append(np.abs(errors[part]) <= limits)
     return np.asarray(np.mean(np.concatenate(inside), axis=(0, 1)))

@@ -265,11 +265,9 @@ def separate(
     of_sample = np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled)
     information = of_sample * (len(windows) / len(sampled)) / max(scale, 1e-9) ** 2
     estimates, covariance, shares = separated(information, paths, values, sizes)
-    return (
-        estimates,
-        not_separated(f"joint {joint + 1}: ", [_name(path) for path in paths], shares),
-        covariance,
-    )
+    names = [_name(path) for path in paths]
+    words = not_separated(f"joint {joint + 1}: ", names, shares)
+    return estimates, words, covariance
 
 
 def separated(
@@ -409,8 +407,10 @@ def shared_parameters(axes: Sequence[tuple[int, int, int]]) -> list[str]:
     no effect.
     """
     links = [f"mechanism.inner.links[{j}]." for j in range(len(axes))]
-    paths = [f"{links[1]}zero_angle", *(f"{link}rotor_inertia" for link in links[1:])]
-    for link, axis in zip(links[1:], axes[1:], strict=True):
-        across = (k for k in range(3) if not axis[k])
-        paths += [f"{link}mass", f"{link}inertia", *(f"{link}centre[{k}]" for k in across)]
+    outer = links[1:]
+    paths = [f"{outer[0]}zero_angle"]
+    paths += [f"{link}rotor_inertia" for link in outer]
+    for link, axis in zip(outer, axes[1:], strict=True):
+        paths += [f"{link}mass", f"{link}inertia"]
+        paths += [f"{link}centre[{k}]" for k in range(3) if not axis[k]]
     return paths

@@ -64,12 +64,13 @@ def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str,
     """
     windows = cut(judge, 0, rows)
     begin = HISTORY - DEPTH + 1
-    arx = fit_arx(
-        [(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1], -LIMIT, LIMIT
-    )
-    predicted = arx.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])
-    by_name = {PERSISTENCE: windows.angle[:, HISTORY : HISTORY + 1], ARX: predicted}
-    return {name: angle - windows.angle[:, HISTORY + 1 :] for name, angle in by_name.items()}
+    past = windows.angle[:, begin : HISTORY + 1]
+    start = windows.angle[:, HISTORY : HISTORY + 1]
+    measured = windows.angle[:, HISTORY + 1 :]
+    training = [(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1]
+    arx = fit_arx(training, -LIMIT, LIMIT)
+    predicted = arx.free_run(past, windows.pressure[:, begin:])
+    return {PERSISTENCE: start - measured, ARX: predicted - measured}
 
 
 # Pressures from commands: a proportional regulator for each muscle, identified from its command and
@@ -417,10 +418,11 @@ def distance(arm: PressureDriven, windows: Windows) -> Array:
     residual = cast(GaussianResidual, cast(WithStickSlip, arm.mechanism).residual)
     scales = np.array([*residual.angle_scales, *residual.pressure_scales])
     centres = np.array(residual.centres).reshape(-1, len(scales))
-    x = (
-        np.concatenate([windows.angle[:, HISTORY:], windows.pressure[:, HISTORY:]], axis=-1)
-        / scales
-    )
-    nearest = np.min([np.mean((x - centre) ** 2, axis=-1) for centre in centres], axis=0)
-    total, count = (np.bincount(windows.episode, w) for w in (np.mean(nearest, axis=1), None))
-    return np.asarray(np.sqrt(total / np.maximum(count, 1))[windows.episode])
+    rows = [windows.angle[:, HISTORY:], windows.pressure[:, HISTORY:]]
+    scaled = np.concatenate(rows, axis=-1) / scales
+    squares = [np.mean((scaled - centre) ** 2, axis=-1) for centre in centres]
+    nearest = np.mean(np.min(squares, axis=0), axis=1)
+    total = np.bincount(windows.episode, nearest)
+    count = np.bincount(windows.episode)
+    of_episodes = np.sqrt(total / np.maximum(count, 1))
+    return np.asarray(of_episodes[windows.episode])

@@ -69,13 +69,14 @@ class ReadPressures(System):
         acting = dict(state)
         readings = dict(inputs)
         for prefix, gain, zero in zip(self.arm.prefixes, self.gains, self.zeros, strict=True):
-            acting[f"{prefix}pressure"] = gain * (state[f"{prefix}pressure"] - zero)
-            readings[f"{prefix}measured_pressure"] = gain * (
-                inputs[f"{prefix}measured_pressure"] - zero
-            )
+            pressure = f"{prefix}pressure"
+            reading = f"{prefix}measured_pressure"
+            acting[pressure] = gain * (state[pressure] - zero)
+            readings[reading] = gain * (inputs[reading] - zero)
         rates = self.arm.rates(acting, readings)
         for prefix, gain in zip(self.arm.prefixes, self.gains, strict=True):
-            rates[f"{prefix}pressure"] = rates[f"{prefix}pressure"] / gain
+            pressure = f"{prefix}pressure"
+            rates[pressure] = rates[pressure] / gain
         return rates
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
@@ -162,13 +163,18 @@ def _pairs(arm: PressureDriven, episodes: Episodes) -> tuple[tuple[int, int], ..
     median angles.
     """
     names = [c.name for c in arm.mechanism.coordinates]
-    at = dict(zip(names, np.median(episodes.rows("angle"), axis=0).tolist(), strict=True))
-    unit = np.eye(len(arm.muscle)).tolist()
-    moments = [
-        arm.mechanism.generalised_forces(at, tensions, arm.resting_lengths) for tensions in unit
-    ]
-    swapped = [moments[2 * j + 1][name] > moments[2 * j][name] for j, name in enumerate(names)]
-    return tuple((2 * j + 1 + bool(swap), 2 * j + 2 - bool(swap)) for j, swap in enumerate(swapped))
+    median = np.median(episodes.rows("angle"), axis=0).tolist()
+    pose = dict(zip(names, median, strict=True))
+    moments = []
+    for tensions in np.eye(len(arm.muscle)).tolist():
+        moments.append(arm.mechanism.generalised_forces(pose, tensions, arm.resting_lengths))
+    pairs = []
+    for j, name in enumerate(names):
+        first = 2 * j + 1
+        second = 2 * j + 2
+        is_swapped = moments[second - 1][name] > moments[first - 1][name]
+        pairs.append((second, first) if is_swapped else (first, second))
+    return tuple(pairs)
 
 
 def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
@@ -204,17 +210,20 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
     arm = system.arm
     step = windows.sample_time
     state = {s.name: np.zeros(len(windows)) for s in arm.states}
-    for j, c in enumerate(arm.mechanism.coordinates):
-        state |= {c.name: windows.angle[:, HISTORY, j], c.speed: windows.speed[:, HISTORY, j]}
+    for j, coordinate in enumerate(arm.mechanism.coordinates):
+        state[coordinate.name] = windows.angle[:, HISTORY, j]
+        state[coordinate.speed] = windows.speed[:, HISTORY, j]
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
-        state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, step)
-    names = [c.name for c in arm.mechanism.coordinates]
-    simulated, slopes = with_slopes(
-        system, paths, windows.pressure[:, HISTORY:], step, state, names
-    )
+        readings = windows.pressure[:, : HISTORY + 1, i]
+        state[f"{prefix}pressure"] = lagged(readings, lag, step)
+    names = [coordinate.name for coordinate in arm.mechanism.coordinates]
+    inputs = windows.pressure[:, HISTORY:]
+    simulated, slopes = with_slopes(system, paths, inputs, step, state, names)
     error = simulated[:, 1:] - windows.angle[:, HISTORY + 1 :]
     counts = windows.counts[:, HISTORY + 1 :, None]
-    return np.where(counts, error, 0.0), np.where(counts[..., None], slopes[:, 1:], 0.0)
+    error = np.where(counts, error, 0.0)
+    slopes = np.where(counts[..., None], slopes[:, 1:], 0.0)
+    return error, slopes
 
 
 class KnownSearch:
@@ -224,26 +233,26 @@ class KnownSearch:
 
     def __init__(self, system: ReadPressures, paths: Sequence[str], windows: Windows) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(system)}
-        self.system, self.paths, self.windows = system, list(paths), windows
+        self.system = system
+        self.paths = list(paths)
+        self.windows = windows
         self.start = np.array([float(leaves[path].value) for path in paths])
-        fields = [path.rsplit(".", 1)[-1].split("[")[0] for path in paths]
-        pairs = zip(fields, np.abs(self.start), strict=True)
-        self.sizes = np.array(
-            [max(value, SIZES.get(field, value or 1.0)) for field, value in pairs]
-        )
-        self.low, self.high = (
-            np.array([leaves[path].declared.bounds[i] for path in paths]) for i in (0, 1)
-        )
+        sizes = []
+        for path, value in zip(paths, np.abs(self.start), strict=True):
+            field = path.rsplit(".", 1)[-1].split("[")[0]
+            sizes.append(max(value, SIZES.get(field, value or 1.0)))
+        self.sizes = np.array(sizes)
+        bounds = [leaves[path].declared.bounds for path in paths]
+        self.low = np.array([low for low, _ in bounds])
+        self.high = np.array([high for _, high in bounds])
         self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros(0))
 
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
         if self._last[0] != scaled.tobytes():
-            error, slope = _run(
-                with_values(self.system, self.paths, scaled * self.sizes), self.paths, self.windows
-            )
-            lost = (
-                ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(slope).all(axis=-1)
-            )
+            system = with_values(self.system, self.paths, scaled * self.sizes)
+            error, slope = _run(system, self.paths, self.windows)
+            is_finite = np.isfinite(error) & np.isfinite(slope).all(axis=-1)
+            lost = ~is_finite | (np.abs(error) > OUTLIER)
             error = np.where(lost, OUTLIER, error)
             slope = np.where(lost[..., None], 0.0, slope)
             self._last = scaled.tobytes(), error, slope * self.sizes

@@ -243,9 +243,9 @@ def _rows(dataset: Any, first: int, end: int) -> Array:
     """Rows of MATLAB, of which a vector has as many as values."""
     if dataset.ndim == 2 and 1 not in dataset.shape:
         return np.asarray(dataset[:, first:end].T)
-    return np.asarray(
-        dataset[..., first:end] if dataset.shape[-1] > 1 else dataset[first:end, ...]
-    ).reshape(-1)
+    is_row = dataset.shape[-1] > 1
+    values = dataset[..., first:end] if is_row else dataset[first:end, ...]
+    return np.asarray(values).reshape(-1)
 
 
 # Objects

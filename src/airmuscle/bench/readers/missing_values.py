@@ -65,22 +65,23 @@ class ExaminedColumn:
 def _examined(
     index: int, heading: Heading, cells: Cells, codes: Sequence[float | str]
 ) -> ExaminedColumn:
-    numeric = [
-        number(code) if isinstance(code, str) else code for code in codes
-    ]  # NaN equals no cell
+    # a code that is no number becomes NaN, which equals no cell
+    numeric = [number(code) if isinstance(code, str) else code for code in codes]
     if not isinstance(cells, list):
         missing = np.isnan(cells) | np.isin(cells, numeric)
         return ExaminedColumn(index, heading, cells, missing, ~np.isfinite(cells) & ~missing)
     texts = {code.strip().lower() for code in codes if isinstance(code, str)}
     values = np.array([number(cell) for cell in cells])
-    marked = np.array(
-        [cell.strip().lower() in texts or bool(_MARKERS.fullmatch(cell.strip())) for cell in cells]
-    )
-    missing = marked | np.isin(values, numeric)
+    marked = []
+    for cell in cells:
+        text = cell.strip()
+        marked.append(text.lower() in texts or bool(_MARKERS.fullmatch(text)))
+    missing = np.array(marked) | np.isin(values, numeric)
     bad = ~np.isfinite(values) & ~missing
     if heading.name == "time" and bad.any():
-        times = np.array([seconds_from_clock((cell,)) is not None for cell in cells])
-        bad = ~times & ~missing if times.any() else bad
+        is_clock = np.array([seconds_from_clock((cell,)) is not None for cell in cells])
+        if is_clock.any():
+            bad = ~is_clock & ~missing
     return ExaminedColumn(index, heading, cells, missing, bad)
 
 

@@ -315,8 +315,11 @@ def _joined(chunks: list[tuple[Cells, ...]]) -> tuple[Cells, ...]:
     columns: list[Cells] = []
     for parts in zip(*chunks, strict=True):
         numbers = [part for part in parts if not isinstance(part, list)]
-        texts = (part if isinstance(part, list) else map(repr, part.tolist()) for part in parts)
-        columns.append(
-            np.concatenate(numbers) if len(numbers) == len(parts) else list(itertools.chain(*texts))
-        )
+        if len(numbers) == len(parts):
+            columns.append(np.concatenate(numbers))
+            continue
+        texts = list[str]()
+        for part in parts:
+            texts += part if isinstance(part, list) else map(repr, part.tolist())
+        columns.append(texts)
     return tuple(columns)

@@ -176,14 +176,17 @@ def _is_vector(dataset: Any) -> bool:
 
 def _values(dataset: Any, reduction: Reduction, field: str | None = None) -> Any:
     """The reduced rows of a dataset, or of one of its fields."""
+    is_row = dataset.ndim == 2 and dataset.shape[0] == 1
+
+    def vector(first: int, end: int) -> Any:
+        values = dataset[0, first:end] if is_row else dataset[first:end]
+        return values.reshape(-1)
+
     if field is not None:
         return reduction.read(lambda first, end: dataset[first:end][field], dataset.shape[0])
     if not _is_vector(dataset):
         return reduction.read(lambda first, end: dataset[first:end], dataset.shape[0])
-    row = dataset.ndim == 2 and dataset.shape[0] == 1
-    return reduction.read(
-        lambda a, b: (dataset[0, a:b] if row else dataset[a:b]).reshape(-1), dataset.size
-    )
+    return reduction.read(vector, dataset.size)
 
 
 def _columns(dataset: Any, reduction: Reduction) -> list[Channel]:

@@ -92,18 +92,18 @@ def _table(origin: str, tags: Tags, lines: NumberedLines, form: TextFormat) -> R
         )
     commented = headings.index("Comment") if "Comment" in headings else len(headings)
     width = max(i for i, name in enumerate(headings[:commented]) if name) + 1
-    comment = rows[0][1][commented : commented + 1]
-    body = [
-        (i, form.delimiter.join([*cells[:width], *[""] * (width - len(cells))]))
-        for i, cells in rows
-    ]
-    columns = parse_columns(
-        origin, TextHeader(tuple(headings[:width]), None, {}, form.delimiter, 0), body, form
-    )
+    comment = "".join(rows[0][1][commented : commented + 1])
+    body = []
+    for number, cells in rows:
+        filled = [*cells[:width], *[""] * (width - len(cells))]
+        body.append((number, form.delimiter.join(filled)))
+    header = TextHeader(tuple(headings[:width]), None, {}, form.delimiter, 0)
+    columns = parse_columns(origin, header, body, form)
     channels = list(_channels(origin, tags, headings[:width], columns))
-    table = merge_channels(origin, channels, {"comment": comment[0]} if any(comment) else {})
+    table = merge_channels(origin, channels, {"comment": comment} if comment else {})
     if len(table.rows) == len(body):
-        table = dataclasses.replace(table, rows=np.array([i for i, _ in body]), row_label="line")
+        numbers = np.array([number for number, _ in body])
+        table = dataclasses.replace(table, rows=numbers, row_label="line")
     return table
 
 

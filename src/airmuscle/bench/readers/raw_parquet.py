@@ -65,9 +65,10 @@ def _flat_columns(pyarrow: Any, name: str, column: Any) -> Iterator[tuple[str, A
     if not pyarrow.types.is_struct(column.type):
         yield name.replace("/", ".").removeprefix(f"{STEPS}."), column
         return
-    names = [column.type.field(i).name for i in range(column.type.num_fields)]
-    for field, part in zip(names, column.flatten(), strict=True):
-        yield from _flat_columns(pyarrow, f"{name}.{field}", part)
+    parts = column.flatten()
+    for i in range(column.type.num_fields):
+        field = column.type.field(i).name
+        yield from _flat_columns(pyarrow, f"{name}.{field}", parts[i])
 
 
 def _rows(pyarrow: Any, path: Path, name: str, column: Any) -> Array | None:

@@ -152,10 +152,13 @@ def _topic_channels(topic: str, messages: list[tuple[float, dict[_Field, float]]
     fields = dict.fromkeys(field for _, numbers in messages for field in numbers)
     channels = []
     for field in fields:
-        rows = [(time, numbers[field]) for time, numbers in messages if field in numbers]
-        time, values = map(
-            np.array, zip(*rows, strict=True)
-        )  # integers remain integers: held between messages
+        rows = []
+        for instant, numbers in messages:
+            if field in numbers:
+                rows.append((instant, numbers[field]))
+        time = np.array([instant for instant, _ in rows])
+        # integers remain integers, which are held between messages
+        values = np.array([value for _, value in rows])
         first = np.concatenate([[True], np.diff(time) > 0])
         name = topic if field.name == "data" else f"{topic}.{field.name}"
         channels.append(Channel(name, values[first], time[first], field.unit, field.is_quantity))

@@ -125,10 +125,14 @@ def _is_numeric(row: list[Any]) -> bool:
     """Whether more than half of the cells of a row are numbers or times, also as texts; the others
     may be names.
     """
-    cells = [c for c in row if c not in (None, "")]
-    texts = [c for c in cells if isinstance(c, str)]
-    numbers = sum(header.is_number(c) or seconds_from_clock((c,)) is not None for c in texts)
-    return 2 * (numbers + sum(isinstance(c, _NUMBERS) for c in cells)) > len(cells)
+    cells = [cell for cell in row if cell not in (None, "")]
+    numbers = 0
+    for cell in cells:
+        if isinstance(cell, str):
+            numbers += header.is_number(cell) or seconds_from_clock((cell,)) is not None
+        else:
+            numbers += isinstance(cell, _NUMBERS)
+    return 2 * numbers > len(cells)
 
 
 def _text(cell: Any) -> str:

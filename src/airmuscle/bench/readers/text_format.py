@@ -211,14 +211,13 @@ def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int
     """The index of the headings of a first row of numbers with `width` filled cells; None if they
     are not above it.
     """
-    last = [row for row in rows[-2:] if row[0] == delimiter]
-    if not last or rows[-1][0] != delimiter or _is_numeric(last[-1][1]):
+    last = [cells for sign, cells in rows[-2:] if sign == delimiter]
+    if not last or rows[-1][0] != delimiter or _is_numeric(last[-1]):
         return None
-    if len(last) == 2 and header.parse_unit_row(last[0][1], last[1][1]):
-        return (
-            len(rows) - 2 if max(header.count_cells(cells) for _, cells in last) >= width else None
-        )
-    return len(rows) - 1 if header.count_cells(last[-1][1]) >= width else None
+    if len(last) == 2 and header.parse_unit_row(last[0], last[1]):
+        widest = max(map(header.count_cells, last))
+        return len(rows) - 2 if widest >= width else None
+    return len(rows) - 1 if header.count_cells(last[-1]) >= width else None
 
 
 def _is_numeric(cells: list[str]) -> bool:

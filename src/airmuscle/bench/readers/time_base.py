@@ -230,8 +230,10 @@ class BlockMeans(Downsampling):
         starts = np.arange(0, len(cells), step)
         sizes: npt.NDArray[np.int64] = np.diff(np.append(starts, len(cells)))
         if isinstance(cells, list):
-            return [cells[row] for row in (starts + (sizes - 1) // 2).tolist()]
-        return np.asarray(np.add.reduceat(cells, starts) / sizes, dtype=float)
+            middles = starts + (sizes - 1) // 2
+            return [cells[row] for row in middles.tolist()]
+        sums = np.add.reduceat(cells, starts)
+        return np.asarray(sums / sizes, dtype=float)
 
 
 def downsample(table: RawTable, downsampling: Downsampling) -> RawTable:

@@ -67,12 +67,14 @@ def _write_csv(recording: Recording, temporary: Path, path: Path, comments: bool
             file.write(f"# {_one_line(recording.origin)}\n")
             for name, value in recording.constants.items():
                 unit = f" [{CONSTANT_UNITS[name]}]" if name in CONSTANT_UNITS else ""
-                file.write(f"# {name}{unit} = {json.dumps(value, ensure_ascii=False)}\n")
+                text = json.dumps(value, ensure_ascii=False)
+                file.write(f"# {name}{unit} = {text}\n")
             for note in recording.notes:
                 file.write(f"# Note: {_one_line(note)}\n")
         table = csv.writer(file, lineterminator="\n")
         table.writerow([column_heading(name) for name in recording])
-        table.writerows(zip(*(recording[name].tolist() for name in recording), strict=True))
+        columns = [recording[name].tolist() for name in recording]
+        table.writerows(zip(*columns, strict=True))
 
 
 def _one_line(text: str) -> str:

@@ -119,8 +119,10 @@ def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval
     separate = [run.interval for run in runs if run.kind in (ISOMETRIC, ISOTONIC)]
     if 2 * sum(len(interval) for interval in separate) <= len(recording):
         separate = []
-    inner = {row for a, b in itertools.pairwise(separate) for row in (a.stop, b.start)}
-    return [Interval(a, b) for a, b in itertools.pairwise(sorted({0, *inner, len(recording)}))]
+    edges = {0, len(recording)}
+    for earlier, later in itertools.pairwise(separate):
+        edges |= {earlier.stop, later.start}
+    return [Interval(start, stop) for start, stop in itertools.pairwise(sorted(edges))]
 
 
 def motion_direction(
@@ -151,9 +153,10 @@ def _monotonic_intervals(smooth: Array, threshold: float) -> list[tuple[Interval
     if not len(smooth) or not float(np.ptp(smooth)) > threshold:
         return []
     reversals = list(_find_reversals(smooth, threshold))
-    starts = [0, *(row for row, _ in reversals[1:]), len(smooth)]
-    pairs = zip(itertools.pairwise(starts), reversals, strict=True)
-    return [(Interval(a, b), direction) for (a, b), (_, direction) in pairs]
+    directions = [direction for _, direction in reversals]
+    edges = [0, *(row for row, _ in reversals[1:]), len(smooth)]
+    intervals = [Interval(start, stop) for start, stop in itertools.pairwise(edges)]
+    return list(zip(intervals, directions, strict=True))
 
 
 def _find_reversals(pressure: Array, threshold: float) -> Iterator[tuple[int, int]]:

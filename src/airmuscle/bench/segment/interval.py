@@ -22,6 +22,14 @@ Analysis = TypeVar("Analysis", bound=Callable[..., Any])
 _Known = dict[tuple[int | str, ...], tuple[tuple[weakref.ref[Recording], ...], Any]]
 
 
+def _are_alive(
+    references: tuple[weakref.ref[Recording], ...], recordings: tuple[Recording, ...]
+) -> bool:
+    """Whether weak references are still those of these recordings."""
+    pairs = zip(references, recordings, strict=True)
+    return all(reference() is recording for reference, recording in pairs)
+
+
 def remembered(analyse: Analysis) -> Analysis:
     """The function of a recording, or of several, whose result is remembered as long as the first
     of them.
@@ -38,12 +46,13 @@ def remembered(analyse: Analysis) -> Analysis:
         several = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
         if not several:
             return analyse(*arguments)
-        known, key = results.setdefault(several[0], {}), (*map(id, several), *texts)
+        known = results.setdefault(several[0], {})
+        key = (*map(id, several), *texts)
         stored = known.get(key)
-        if stored is None or any(
-            ref() is not recording for ref, recording in zip(stored[0], several, strict=True)
-        ):
-            stored = known[key] = tuple(map(weakref.ref, several)), analyse(recordings, *texts)
+        # an id is given again after its recording has gone, so the recordings are compared, too
+        if stored is None or not _are_alive(stored[0], several):
+            references = tuple(map(weakref.ref, several))
+            stored = known[key] = references, analyse(recordings, *texts)
         return stored[1]
 
     return remembering  # type: ignore[return-value]
@@ -122,8 +131,10 @@ def running_median(values: Array, width: int) -> Array:
     medians = []
     for first in range(0, len(values), rows):
         ordered = np.sort(windows[first : first + rows], axis=1)  # NaN last
-        count = np.maximum(np.count_nonzero(~np.isnan(ordered), axis=1), 1)[:, None]
-        low, high = np.take_along_axis(ordered, np.hstack([(count - 1) // 2, count // 2]), axis=1).T
+        values_in_window = np.count_nonzero(~np.isnan(ordered), axis=1)
+        count = np.maximum(values_in_window, 1)[:, None]
+        middle = np.hstack([(count - 1) // 2, count // 2])
+        low, high = np.take_along_axis(ordered, middle, axis=1).T
         medians.append(np.where(low == high, low, 0.5 * (low + high)))
     return np.concatenate(medians)
 

@@ -215,9 +215,13 @@ def _standard_errors(
     steps = [np.vstack(_matrices(holds, shifted)) - base for shifted in changed]
     slopes = [step @ coefficients / (1e-4 * time) for step, time in zip(steps, times, strict=True)]
     jacobian = np.hstack([base, np.column_stack(slopes)])
-    variance = float(residuals @ residuals) / max(residuals.size - jacobian.shape[1], 1)
-    deviations = np.sqrt(np.maximum(np.diag(np.linalg.pinv(jacobian.T @ jacobian)), 0.0) * variance)
-    return np.concatenate([deviations[: times.size], deviations[-times.size :]])
+    degrees_of_freedom = max(residuals.size - jacobian.shape[1], 1)
+    variance = float(residuals @ residuals) / degrees_of_freedom
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    deviations = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance)
+    of_stiffnesses = deviations[: times.size]
+    of_times = deviations[-times.size :]
+    return np.concatenate([of_stiffnesses, of_times])
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

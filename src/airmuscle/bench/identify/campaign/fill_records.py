@@ -177,11 +177,14 @@ class ValveUnknowns:
     @property
     def shared(self) -> list[str | tuple[str, ...]]:
         """The paths of critical ratios, the tube and, with a fill, of the supply."""
-        constant = ["pressure"]
-        sinking = ["supply.pressure", "feed.conductance", "volume"]
-        names = [f"{self.circuit}.supply.{name}" for name in (sinking if self.sinks else constant)]
-        tube = [TUBE_VOLUME, TUBE_CONDUCTANCE] if self.tube else []
-        return [*self.paths(RATIO), *tube, *(names if self.fill else [])]
+        paths = list(self.paths(RATIO))
+        if self.tube:
+            paths += [TUBE_VOLUME, TUBE_CONDUCTANCE]
+        if self.fill:
+            of_volume = ["supply.pressure", "feed.conductance", "volume"]
+            names = of_volume if self.sinks else ["pressure"]
+            paths += [f"{self.circuit}.supply.{name}" for name in names]
+        return paths
 
     @property
     def supposed(self) -> list[str]:
@@ -307,8 +310,9 @@ def detected_experiment(record: CampaignRecord, plant: Plant) -> dynamic.Experim
     before = record.recording["time"] < began
     initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
     conditions = dynamic.InitialConditions.at_rest(plant, initial)
-    recording = thin(record.recording.with_columns(**{sensor_of(plant): pressure}), FIT_ROWS)
-    return dynamic.Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
+    complete = record.recording.with_columns(**{sensor_of(plant): pressure})
+    command = Schedule(valve_commands(record))
+    return dynamic.Experiment(thin(complete, FIT_ROWS), command, conditions, began, plant)
 
 
 def with_instants(
@@ -369,11 +373,14 @@ def describe_skills(errors: Sequence[float], baselines: Sequence[Mapping[str, fl
     """The errors of the baselines and the skill of predictions with these errors, as a phrase;
     empty without them.
     """
-    parts = [
-        f"{name} {min(known) / 1e3:.3g} to {max(known) / 1e3:.3g} kPa"
-        for name in (PERSISTENCE, ARX)
-        if (known := [baseline[name] for baseline in baselines if name in baseline])
-    ]
+    parts = []
+    for name in (PERSISTENCE, ARX):
+        known = [baseline[name] for baseline in baselines if name in baseline]
+        if known:
+            parts.append(f"{name} {min(known) / 1e3:.3g} to {max(known) / 1e3:.3g} kPa")
     pairs = zip(errors, baselines, strict=True) if baselines else ()
-    skills = [value for rms, baseline in pairs if (value := skill(rms, baseline)) is not None]
-    return f" ({', '.join(parts)}; skill {min(skills):.2g} to {max(skills):.2g})" if skills else ""
+    values = [skill(rms, baseline) for rms, baseline in pairs]
+    skills = [value for value in values if value is not None]
+    if not skills:
+        return ""
+    return f" ({', '.join(parts)}; skill {min(skills):.2g} to {max(skills):.2g})"

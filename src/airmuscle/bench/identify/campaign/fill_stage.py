@@ -278,11 +278,12 @@ def _fit_jointly(
     common_ratio = ""
 
     def fitted(experiments: Sequence[Experiment], chosen: Sequence[int] = everything) -> DynamicFit:
-        unknowns = fills.ValveUnknowns.of(
-            [records[i] for i in chosen], experiments[0].plant, common_ratio
-        )
+        fitted_records = [records[i] for i in chosen]
+        fitted_experiments = [experiments[i] for i in chosen]
+        unknowns = fills.ValveUnknowns.of(fitted_records, experiments[0].plant, common_ratio)
         free = [*unknowns.shared, *unknowns.paths(fills.CONDUCTANCE)]
-        return fills.fit_pressure(records, [experiments[i] for i in chosen], free)
+        # the noise and the sample time are those of all records, also in a fit to a part of them
+        return fills.fit_pressure(records, fitted_experiments, free)
 
     fit, experiments = _with_supply(records, experiments, fitted)
     valves = fills.ValveUnknowns.of(records, experiments[0].plant)

@@ -113,8 +113,9 @@ def _band(purpose: str, residuals: Array, groups: int, least: float = 0.0) -> Er
     """The band of these residuals [N], with a half width of at least `least` [N]."""
     size = residuals.size
     share = min(np.ceil((size + 1) * LEVEL) / size, 1.0)
-    half = max(float(np.quantile(np.abs(residuals), share)), least)
-    return ErrorBand(purpose, half, float(np.sqrt(np.mean(residuals**2))), size, groups)
+    quantile = float(np.quantile(np.abs(residuals), share))
+    rms = float(np.sqrt(np.mean(residuals**2)))
+    return ErrorBand(purpose, max(quantile, least), rms, size, groups)
 
 
 def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] | None]:

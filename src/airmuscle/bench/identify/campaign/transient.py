@@ -5,6 +5,7 @@ fits.
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -194,51 +195,62 @@ def find_pressure_steps(
     steps = []
     for crossing, (a, b) in zip(crossings, itertools.pairwise(ends), strict=True):
         rows = slice(a, b + 1)
-        step = _measure(time[rows], fraction[rows], transient[rows], rising=above[crossing + 2])
-        if step is None:
+        course = _measure(time[rows], fraction[rows], transient[rows], rising=above[crossing + 2])
+        if course is None:
             return ()
-        start, duration, first, last = step
-        steps.append(
-            PressureStep(start, duration, (last - first) * (high - low), low + last * (high - low))
-        )
+        change = (course.last - course.first) * (high - low)
+        final_pressure = low + course.last * (high - low)
+        steps.append(PressureStep(course.start, course.duration, change, final_pressure))
     return tuple(steps)
 
 
-def _measure(
-    time: Array, fraction: Array, transient: Mask, rising: bool
-) -> tuple[float, float, float, float] | None:
-    """Start, duration, first and last value of a step; None if it is not that of a valve."""
+class _Course(NamedTuple):
+    """The course of a step: start and duration [s], and its first and its last value."""
+
+    start: float
+    duration: float
+    first: float
+    last: float
+
+
+def _measure(time: Array, fraction: Array, transient: Mask, rising: bool) -> _Course | None:
+    """The course of a step; None if it is not that of a valve."""
     values = fraction if rising else 1.0 - fraction
     first = float(np.min(values))
     last = float(np.max(values))
-    marks = [first + share * (last - first) for share in (0.05, 0.5, 0.95)]
-    begin = int(np.flatnonzero(values <= marks[0])[-1]) if (values <= marks[0]).any() else 0
-    later = [begin + int(np.argmax(values[begin:] >= mark)) for mark in marks[1:]]
-    duration = float(time[later[1]] - time[begin])
-    half = float(time[later[0]] - time[begin])
-    if (
-        later[1] <= begin
-        or transient[begin : later[1] + 1].mean() < MIN_TRANSIENT
-        or half > MAX_MIDDLE * duration
-    ):
+    change = last - first
+    at_first = np.flatnonzero(values <= first + 0.05 * change)
+    begin = int(at_first[-1]) if at_first.size else 0
+    middle = begin + int(np.argmax(values[begin:] >= first + 0.5 * change))
+    end = begin + int(np.argmax(values[begin:] >= first + 0.95 * change))
+    duration = float(time[end] - time[begin])
+    half = float(time[middle] - time[begin])
+    rows = slice(begin, end + 1)
+    if end <= begin or half > MAX_MIDDLE * duration:
         return None
-    step_rows = slice(begin, later[1] + 1)
-    if count_pulses(time[step_rows], values[step_rows]) > MAX_PULSES:
+    if transient[rows].mean() < MIN_TRANSIENT:
         return None
-    slope = (values[later[0]] - values[begin]) / max(half, 1e-9)
-    start = float(time[begin]) - float(values[begin] - first) / max(float(slope), 1e-9)
-    ends = (first, last) if rising else (1.0 - first, 1.0 - last)
-    return max(start, float(time[0])), duration, *ends
+    if count_pulses(time[rows], values[rows]) > MAX_PULSES:
+        return None
+    slope = float((values[middle] - values[begin]) / max(half, 1e-9))
+    start = float(time[begin]) - float(values[begin] - first) / max(slope, 1e-9)
+    start = max(start, float(time[0]))
+    if not rising:
+        return _Course(start, duration, 1.0 - first, 1.0 - last)
+    return _Course(start, duration, first, last)
 
 
 def count_pulses(time: Array, values: Array) -> int:
     """Number of rises above the mean rate after a rest, in a rising signal; a fill through an open
     valve has none.
     """
-    even = np.interp(np.linspace(time[0], time[-1], PULSE_POINTS), time, values)
+    even_times = np.linspace(time[0], time[-1], PULSE_POINTS)
+    even = np.interp(even_times, time, values)
     mean = PULSE_WINDOW * float(even[-1] - even[0]) / PULSE_POINTS
     changes = even[PULSE_WINDOW:] - even[:-PULSE_WINDOW]
-    marked = np.where(changes > 1.5 * mean, 1, np.where(changes < 0.3 * mean, -1, 0))
+    is_rest = changes < 0.3 * mean
+    is_rise = changes > 1.5 * mean
+    marked = np.where(is_rise, 1, np.where(is_rest, -1, 0))
     known = marked[marked != 0]
     return int(np.count_nonzero(np.diff(known) > 0))
 

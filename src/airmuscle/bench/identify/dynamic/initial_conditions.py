@@ -291,9 +291,12 @@ def _split(
     begins = [inner[i - 1] for i in cuts]
     first_rows = [0, *np.searchsorted(rows, begins).tolist(), rows.size]
     columns = [None, *(switches[begin] for begin in begins)]
+    parts = [slice(*ends) for ends in itertools.pairwise([0, *cuts, segments.ends.size])]
+    rows_of_parts = [slice(*ends) for ends in itertools.pairwise(first_rows)]
     intervals = []
-    parts = itertools.pairwise([0, *cuts, segments.ends.size]), itertools.pairwise(first_rows)
-    for begin, column, (a, b), (first, last) in zip([0.0, *begins], columns, *parts, strict=True):
-        part = PiecewiseLinear(segments.ends[a:b], segments.values[a:b], segments.slopes[a:b])
-        intervals.append(CommandInterval(begin, part, rows[first:last], column))
+    for begin, column, part, of_part in zip(
+        [0.0, *begins], columns, parts, rows_of_parts, strict=True
+    ):
+        course = PiecewiseLinear(segments.ends[part], segments.values[part], segments.slopes[part])
+        intervals.append(CommandInterval(begin, course, rows[of_part], column))
     return tuple(intervals)

@@ -276,8 +276,8 @@ class DynamicFitProblem:
         the Jacobian (K, P) by the scaled unknowns.
         """
         indices = np.flatnonzero(self.has_prior)
-        priors = np.array([u.prior for u in self.unknowns if u.prior is not None]).reshape(-1, 2)
-        values, deviations = priors.T
+        priors = [unknown.prior for unknown in self.unknowns if unknown.prior is not None]
+        values, deviations = np.array(priors).reshape(-1, 2).T
         relative = self.scales[indices] / values
         ratios = np.maximum(scaled[indices] * relative, MIN_RATIO)
         jacobian = np.zeros((indices.size, scaled.size))

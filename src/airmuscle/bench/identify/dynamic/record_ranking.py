@@ -252,10 +252,12 @@ def _candidate_sensitivities(
 
 def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) -> PairPrecision:
     covariance = np.linalg.inv(information)
-    i, k = (names.index(name) for name in pair)
+    i = names.index(pair[0])
+    k = names.index(pair[1])
     first = float(np.sqrt(covariance[i, i]))
     second = float(np.sqrt(covariance[k, k]))
-    return PairPrecision((first, second), float(covariance[i, k] / (first * second)))
+    correlation = float(covariance[i, k] / (first * second))
+    return PairPrecision((first, second), correlation)
 
 
 def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str]:

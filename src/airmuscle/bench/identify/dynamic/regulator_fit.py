@@ -359,12 +359,11 @@ def _initial_regulator(
 
 def _experiment(plant: Plant, recording: Recording, zero: float) -> Experiment:
     times, values = _changes(recording)
-    command = Schedule(
-        {"setpoint": tuple(zip(times.tolist(), np.maximum(values, 0.0).tolist(), strict=True))}
-    )
-    shifted = Recording(
-        {**recording.columns, "pressure": recording["pressure"] - zero}, recording.origin
-    )
+    setpoints = np.maximum(values, 0.0)
+    points = tuple(zip(times.tolist(), setpoints.tolist(), strict=True))
+    command = Schedule({"setpoint": points})
+    columns = {**recording.columns, "pressure": recording["pressure"] - zero}
+    shifted = Recording(columns, recording.origin)
     level = max(float(recording["setpoint"][0]), 0.0)
     guess = plant.state_at(pressure=level)
     resting = tuple(name for name in guess if name.endswith("_position"))

@@ -54,18 +54,24 @@ class DynamicProfile:
         """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays
         below, or where the plant cannot be simulated before it is reached."""
         best = int(np.argmin(self.cost_increase))
-        distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
-        below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
-        return below, self._find_crossing(self.values[best:], distance[best:])
+        increase = self.cost_increase - self.cost_increase[best]
+        distance = np.sqrt(np.maximum(increase, 0.0))
+        downward = slice(best, None, -1)
+        upward = slice(best, None)
+        low = self._find_crossing(self.values[downward], distance[downward])
+        high = self._find_crossing(self.values[upward], distance[upward])
+        return low, high
 
     @staticmethod
     def _find_crossing(values: Array, distance: Array) -> float:
         above = np.flatnonzero(distance > NORMAL_95)
         if not above.size or not np.isfinite(distance[above[0]]):
             return float("nan")
-        i = int(above[0])
-        fraction = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
-        return float(values[i - 1] + fraction * (values[i] - values[i - 1]))
+        after = int(above[0])
+        before = after - 1
+        step = distance[after] - distance[before]
+        fraction = (NORMAL_95 - distance[before]) / step
+        return float(values[before] + fraction * (values[after] - values[before]))
 
     def __str__(self) -> str:
         low, high = (f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in self.interval)

@@ -65,9 +65,10 @@ def find_holds(recording: Recording) -> tuple[Hold, ...]:
     holds = list[Hold]()
     for plateau in find_plateaus(recording, columns=("pressure",)):
         rows = plateau.interval.rows
+        is_long = len(plateau.interval) >= MIN_ROWS
         has_constant_force = np.ptp(force[rows]) <= RELATIVE_BAND * np.abs(force).max()
         relaxes = _drifts(force[rows]) and not _drifts(contraction[rows])
-        if len(plateau.interval) >= MIN_ROWS and has_constant_force and not relaxes:
+        if is_long and has_constant_force and not relaxes:
             holds.append(Hold(plateau.interval, "contraction"))
         else:
             levels = level_intervals(contraction, LENGTH_TOLERANCE, within=plateau.interval)
@@ -231,14 +232,20 @@ def _fit_elements(time: Array, values: Array, count: int) -> Creep:
     min_step = np.log(MIN_RATIO)
     grid = np.linspace(low, high, GRID_SIZE)[1:-1]
     steps = grid - low + 1.01 * min_step
-    starts = (
-        [(g,) for g in grid]
-        if count == 1
-        else [(a, b) for a in grid for b in steps[::3] if a + b < high]
-    )
-    best = min(starts, key=lambda x: float(np.sum(_residuals(np.array(x), time, values) ** 2)))
-    bounds = ([low, min_step][:count], [high, max(high - low, 2.0 * min_step)][:count])
-    logarithms = np.cumsum(least_squares(_residuals, best, bounds=bounds, args=(time, values)).x)
+    starts: list[tuple[float, ...]]
+    if count == 1:
+        starts = [(logarithm,) for logarithm in grid]
+    else:
+        starts = [(a, b) for a in grid for b in steps[::3] if a + b < high]
+
+    def sum_of_squares(start: tuple[float, ...]) -> float:
+        return float(np.sum(_residuals(np.array(start), time, values) ** 2))
+
+    best = min(starts, key=sum_of_squares)
+    greatest_step = max(high - low, 2.0 * min_step)
+    bounds = ([low, min_step][:count], [high, greatest_step][:count])
+    solution = least_squares(_residuals, best, bounds=bounds, args=(time, values))
+    logarithms = np.cumsum(solution.x)
     coefficients = np.linalg.lstsq(_design_matrix(logarithms, time), values, rcond=None)[0]
     return Creep(float(coefficients[0]), tuple(coefficients[1:]), tuple(np.exp(logarithms)))
 

@@ -311,8 +311,10 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
     low, high = np.quantile(np.concatenate(pressures), PRESSURE_QUANTILES)
     margin = RELATIVE_BAND * max(abs(low), abs(high), 1e3)
     speed = combine_limits(tuple(run.limits for run in runs)).high_speed
-    range_of_speed = {"max_speed": speed} if np.isfinite(speed) and speed > 0 else {}
-    return IdentifiedFriction(friction, float(low - margin), float(high + margin), **range_of_speed)
+    identified = IdentifiedFriction(friction, float(low - margin), float(high + margin))
+    if np.isfinite(speed) and speed > 0:
+        return dataclasses.replace(identified, max_speed=speed)
+    return identified
 
 
 def _fit_law(usable: Sequence[LoopFit], law_fits: Sequence[HysteresisFit]) -> JointFit:

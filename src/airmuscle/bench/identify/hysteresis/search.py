@@ -64,9 +64,12 @@ def _bin_means(path: Array, values: Array, edges: Array) -> tuple[Array, Array]:
     margin = EDGE * (edges[1] - edges[0])  # a row on an edge is above it, whatever the rounding
     bins = np.digitize(path, edges[1:-1] - margin)
     inside = (path >= edges[0] - margin) & (path <= edges[-1] + margin)
-    counts = np.bincount(bins[inside], minlength=edges.size - 1)
-    sums = np.bincount(bins[inside], values[inside], minlength=edges.size - 1)
-    means = np.divide(sums, counts, out=np.full(counts.size, np.nan), where=counts > 0)
+    bins = bins[inside]
+    bin_count = edges.size - 1
+    counts = np.bincount(bins, minlength=bin_count)
+    sums = np.bincount(bins, values[inside], minlength=bin_count)
+    empty = np.full(bin_count, np.nan)
+    means = np.divide(sums, counts, out=empty, where=counts > 0)
     return means, np.asarray(counts, dtype=float)
 
 
@@ -128,8 +131,10 @@ class LoopSeries:
         """Least-squares coefficients (C,) of the static curve with this friction, or without
         friction; and the residuals, measured - modelled force [N], at every row, shape (N,)."""
         force = 0.0 if friction is None else self.friction_force(friction)
-        coefficients = self._pseudoinverse @ (self.target + force)[self.fitted_rows]
-        return coefficients, self.target - self.design_matrix @ coefficients + force
+        static = self.target + force
+        coefficients = self._pseudoinverse @ static[self.fitted_rows]
+        residuals = self.target - self.design_matrix @ coefficients + force
+        return coefficients, residuals
 
     def fitted_residuals(self, friction: Friction | None) -> Array:
         """Residuals [N] at the fitted rows, with the least-squares coefficients of the static

@@ -58,11 +58,13 @@ def _bernstein_coefficients(columns: Columns, degree: int, size: int, cells: int
     t = np.linspace(0.0, 1.0, size) if size > 1 else np.array([0.5])
     order = np.arange(size)
     binomials = np.array([math.comb(size - 1, int(j)) for j in order])
-    bernstein = binomials * t[:, None] ** order * (1.0 - t[:, None]) ** (size - 1 - order)
-    edges = itertools.pairwise(np.linspace(-1.0, 1.0, cells + 1))
-    return np.vstack(
-        [np.linalg.solve(bernstein, columns(a + (b - a) * t, degree)) for a, b in edges]
-    )
+    at = t[:, None]
+    bernstein = binomials * at**order * (1.0 - at) ** (size - 1 - order)
+    coefficients = []
+    for low, high in itertools.pairwise(np.linspace(-1.0, 1.0, cells + 1)):
+        values = columns(low + (high - low) * t, degree)
+        coefficients.append(np.linalg.solve(bernstein, values))
+    return np.vstack(coefficients)
 
 
 def solve_constrained_least_squares(
@@ -235,7 +237,8 @@ def _surface_figure(shaped: ForceLaw, unconstrained: Fit) -> Any:
         solid = {"label": f"{pressure / 1e3:.4g} kPa"}
         dashed = {"linestyle": DASHES[1]}
         for law, style in ((shaped, solid), (unconstrained.model, dashed)):
-            axes.plot(100 * contraction, law.force(rows, contraction), color=colour, **style)
+            force = law.force(rows, contraction)
+            axes.plot(100 * contraction, force, color=colour, **style)
     axes.set(xlabel="contraction [%]", ylabel="force [N]")
     legend_outside(axes, title="gauge pressure")
     return figure
