@@ -107,6 +107,18 @@ class Channel:
     is_quantity: bool = True
 
 
+def _have_equal_rows(channels: Sequence[Channel]) -> bool:
+    """Whether channels have as many values at the same times."""
+    times = [channel.time for channel in channels if channel.time is not None]
+    has_equal_times = all(np.array_equal(time, times[0]) for time in times)
+    return has_equal_times and len({len(channel.values) for channel in channels}) == 1
+
+
+def _is_time(channel: Channel) -> bool:
+    word = channel.name.partition(" ")[0].partition("_")[0]
+    return find_quantity_name(word) == "time"
+
+
 def merge_channels(
     origin: str,
     channels: Sequence[Channel],
@@ -126,32 +138,26 @@ def merge_channels(
     channels = [c for c in channels if np.ndim(c.values) == 1 and len(c.values)]
     if not channels:
         raise ColumnError(f"{origin}: no channel contains a vector of numbers.")
-    times = [c.time for c in channels if c.time is not None]
     notes = tuple[str, ...]()
-    time = times[0] if times else None
-    if len({len(c.values) for c in channels}) > 1 or not all(
-        np.array_equal(stamps, times[0]) for stamps in times
-    ):
+    time = next((c.time for c in channels if c.time is not None), None)
+    if not _have_equal_rows(channels):
         channels, time, notes = _on_common_rows(origin, channels, mapped)
-    has_time = any(
-        find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels
-    )
-    if time is not None and not has_time:
+    if time is not None and not any(map(_is_time, channels)):
         channels = [Channel("time", time - time[0], unit="s"), *channels]
-    dated = [
-        np.asarray(c.values).dtype.kind in "Mm" for c in channels
-    ]  # `to_cells` makes seconds of them
-    headings = tuple(
-        split_unit(c.name)[0] if d else c.name for c, d in zip(channels, dated, strict=True)
-    )
-    units = tuple("s" if d else c.unit for c, d in zip(channels, dated, strict=True))
+    headings = []
+    units = []
+    for channel in channels:
+        # `to_cells` makes seconds of dates and durations
+        is_dated = np.asarray(channel.values).dtype.kind in "Mm"
+        headings.append(split_unit(channel.name)[0] if is_dated else channel.name)
+        units.append("s" if is_dated else channel.unit)
     columns = tuple(to_cells(c.values) for c in channels)
     rows = np.arange(1, len(channels[0].values) + 1)
     fields = frozenset(c.name for c in channels if not c.is_quantity)
     return RawTable(
         origin,
-        headings,
-        units if any(units) else None,
+        tuple(headings),
+        tuple(units) if any(units) else None,
         columns,
         rows,
         row_label,

@@ -4,7 +4,7 @@ units.
 
 import csv
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -26,7 +26,14 @@ from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
 from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
-from .text_format import TextFormat, has_content, is_comment, parse_header, split_cells
+from .text_format import (
+    TextFormat,
+    TextHeader,
+    has_content,
+    is_comment,
+    parse_header,
+    split_cells,
+)
 
 MAX_UNREADABLE = 100
 MAX_HEADER_LINES = 1000
@@ -99,26 +106,35 @@ class RowReader:
         self._delimiter = header.delimiter
         self._comma = header.delimiter != ","
         first = [float(self._point(cell)) for cell in cells]
-        headings = tuple(
-            self._names.get(text, self._names.get(str(i), text))
-            for i, text in enumerate(header.headings, 1)
-        )
-        headings = headings[: len(first)] if not any(headings[len(first) :]) else headings
-        missing = [
-            name
-            for name in self._names
-            if name not in {*header.headings, *map(str, range(1, len(first) + 1))}
-        ]
-        if missing:
-            raise ColumnError(
-                f"{self.origin}: there is no column '{missing[0]}'; the columns are"
-                f" {listed(header.headings)}."
-            )
+        headings = self._mapped_headings(header.headings, len(first))
         if len(headings) != len(first):
             raise ColumnError(
                 f"{place}: the line must have {len(headings)} cells ({listed(headings)}); it has"
                 f" {len(first)}."
             )
+        self._prepare(header, headings, first)
+        return self._read_row(line)
+
+    def _mapped_headings(self, texts: Sequence[str], width: int) -> tuple[str, ...]:
+        """The headings as the mapping names them, by heading or number, without empty ones beyond
+        the cells of a row. Raises ColumnError where the table lacks a mapped column.
+        """
+        numbers = [str(number) for number in range(1, width + 1)]
+        for name in self._names:
+            if name not in texts and name not in numbers:
+                raise ColumnError(
+                    f"{self.origin}: there is no column '{name}'; the columns are {listed(texts)}."
+                )
+        headings = tuple(
+            self._names.get(text, self._names.get(str(number), text))
+            for number, text in enumerate(texts, 1)
+        )
+        return headings if any(headings[width:]) else headings[:width]
+
+    def _prepare(
+        self, header: TextHeader, headings: tuple[str, ...], first: Sequence[float]
+    ) -> None:
+        """Interpret the first row, and keep the conversions for the rows after it."""
         columns = tuple(np.array([value]) for value in first)
         rows = np.array([self._line], dtype=np.int64)
         table = RawTable(
@@ -131,15 +147,11 @@ class RowReader:
         stated_names = {find_quantity_name(name) for name in self.mapping.constants}
         self._held = {name: float(recording[name][0]) for name in recording if name in stated_names}
         self._width = len(headings)
-        known = (
-            (i, heading)
+        self._conversions = [
+            (i, heading.name, unit_conversion(table, heading, ambient))
             for i, heading in enumerate(resolve_headings(table, self.mapping.units))
             if heading.known
-        )
-        self._conversions = [
-            (i, heading.name, unit_conversion(table, heading, ambient)) for i, heading in known
         ]
-        return self._read_row(line)
 
     def _read_row(self, line: str) -> dict[str, float] | None:
         try:

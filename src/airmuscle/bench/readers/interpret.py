@@ -6,7 +6,7 @@ Units are converted, absolute pressures become gauge pressures, and implausible 
 import contextlib
 import datetime
 import difflib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -49,49 +49,26 @@ def interpret(
     constants = mapping.constants_of() if constants is None else constants
     check_width(table)
     table = without_repeated_columns(table)
-    held_constants = {
-        n: value
-        for n, value in constants.items()
-        if parse_constant_name(n) is None and parse_heading(n).known
-    }
-    run_constants = fixed.collect_constants(
-        table.origin,
-        {
-            **table.constants,
-            **{n: value for n, value in constants.items() if n not in held_constants},
-        },
-    )
+    held_constants = {n: value for n, value in constants.items() if _is_held_quantity(n)}
+    stated = {n: value for n, value in constants.items() if n not in held_constants}
+    run_constants = fixed.collect_constants(table.origin, {**table.constants, **stated})
     headings = resolve_headings(table, mapping.units)
     table = mapping.missing.treat(table, headings)
-    for heading, cells in zip(headings, table.columns, strict=True):
-        if not heading.known and not isinstance(cells, list):
-            constant = constant_from_column(table, heading.text, heading.unit, cells)
-            run_constants = (
-                {constant[0]: constant[1], **run_constants} if constant else run_constants
-            )
+    # what is stated precedes what a constant column contains
+    run_constants = {**_constants_in_columns(table, headings), **run_constants}
     fixed.check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns, notes = _converted_columns(table, headings, ambient, "ambient" in run_constants)
     for text, value in held_constants.items():
-        heading = parse_heading(text)
-        where = f"{table.origin}: {heading.name}"
-        if heading.name in columns:
-            raise ColumnError(
-                f"{where} is stated as a constant, but a column contains it. Omit one of them."
-            )
-        si = fixed.held_value(heading, value, ambient, where)
-        columns[heading.name] = np.full(len(table.rows), si)
-        unit = "" if heading.target == "1" else f" {heading.target}"
-        notes.append(
-            f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user."
-        )
+        notes.append(_hold_quantity(table, text, value, ambient, columns))
     columns, displaced = headed.displacement_columns(columns, run_constants)
     notes += displaced
     if "time" in columns:
         time, note = mapping.time.apply(table, columns["time"])
-        columns = {
-            name: values for name, values in {**columns, "time": time}.items() if values is not None
-        }
+        if time is None:
+            columns = {name: values for name, values in columns.items() if name != "time"}
+        else:
+            columns = {**columns, "time": time}
         notes += [note] if note else []
     check_plausible(
         table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered
@@ -100,34 +77,65 @@ def interpret(
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
 
 
+def _is_held_quantity(name: str) -> bool:
+    """Whether a constant is a quantity that was held, such as `length`."""
+    return parse_constant_name(name) is None and parse_heading(name).known
+
+
+def _constants_in_columns(table: RawTable, headings: Sequence[Heading]) -> dict[str, float | str]:
+    """The constants of a run that unknown columns of numbers state, the last column first."""
+    constants = dict[str, float | str]()
+    for heading, cells in zip(headings, table.columns, strict=True):
+        if heading.known or isinstance(cells, list):
+            continue
+        constant = constant_from_column(table, heading.text, heading.unit, cells)
+        if constant:
+            name, value = constant
+            constants = {name: value, **constants}
+    return constants
+
+
+def _hold_quantity(
+    table: RawTable, text: str, value: float | str, ambient: float, columns: dict[str, Array]
+) -> str:
+    """Add the column of a quantity that was held; its note. Raises ColumnError where a column
+    contains the quantity.
+    """
+    heading = parse_heading(text)
+    where = f"{table.origin}: {heading.name}"
+    if heading.name in columns:
+        raise ColumnError(
+            f"{where} is stated as a constant, but a column contains it. Omit one of them."
+        )
+    si = fixed.held_value(heading, value, ambient, where)
+    columns[heading.name] = np.full(len(table.rows), si)
+    unit = "" if heading.target == "1" else f" {heading.target}"
+    return f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user."
+
+
 def _converted_columns(
     table: RawTable, headings: list[Heading], ambient: float, is_stated: bool
 ) -> tuple[dict[str, Array], list[str]]:
     """The columns in SI units, and notes on overridden and assumed units, on unknown columns, and
     on the ambient pressure of absolute pressures where it is not stated."""
     columns: dict[str, Array] = {}
-    notes = [*table.notes]
+    notes = [*table.notes, *_overridden_units(table, headings)]
     unknown = list[str]()
-    for h, below in zip(headings, [*(table.units or ()), *[""] * len(headings)], strict=False):
-        if (unit := below or parse_heading(h.text).unit) and h.unit and unit != h.unit:
-            notes.append(
-                f"The {h.name} is read in {h.unit}, as specified by the user; the file states"
-                f" {unit}."
-            )
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
             columns[heading.name], note = _convert_column(table, heading, cells, ambient)
         else:
             note = _keep_unknown_column(table, heading, cells, columns, unknown)
-        notes += [note] if note and note not in notes else []
-    if unknown:
-        is_single = len(unknown) == 1
-        what = (
-            "Column {} is not a known quantity and is"
-            if is_single
-            else "Columns {} are not known quantities and are"
+        if note and note not in notes:
+            notes.append(note)
+    if len(unknown) == 1:
+        notes.append(
+            f"Column {listed(unknown)} is not a known quantity and is kept without conversion."
         )
-        notes.append(f"{what.format(listed(unknown))} kept without conversion.")
+    elif unknown:
+        notes.append(
+            f"Columns {listed(unknown)} are not known quantities and are kept without conversion."
+        )
     absolute = [
         h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, ambient).offset
     ]
@@ -140,6 +148,20 @@ def _converted_columns(
     return columns, notes
 
 
+def _overridden_units(table: RawTable, headings: Sequence[Heading]) -> list[str]:
+    """A note on each unit of the file, in its unit row or its heading, that the user overrides."""
+    notes = []
+    unit_row = [*(table.units or ()), *[""] * len(headings)]
+    for heading, below in zip(headings, unit_row, strict=False):
+        unit = below or parse_heading(heading.text).unit
+        if unit and heading.unit and unit != heading.unit:
+            notes.append(
+                f"The {heading.name} is read in {heading.unit}, as specified by the user; the file"
+                f" states {unit}."
+            )
+    return notes
+
+
 def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     """The headings with their units, from the user, the unit row or the heading itself, in this
     order of precedence.
@@ -149,16 +171,7 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
         for h in table.headings
     ]
     user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
-    names = [heading.name for heading in parsed]
-    for key in (
-        user_name
-        for user_name in user_units
-        if user_name not in {*names, *(heading.text for heading in parsed)}
-    ):
-        raise ColumnError(
-            f"{table.origin}: a unit is given for '{key}', but the columns are"
-            f" {listed(names)}.{suggestion(key, names)}"
-        )
+    _check_user_units(table, parsed, user_units)
     row = table.units or ()
     headings = []
     below_all = [*row, *[""] * (len(parsed) - len(row))]
@@ -170,20 +183,40 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
             _check_unit_row(table, h, below)
         headings.append(Heading(h.text, h.name, stated or below or h.unit, h.known))
     check_unique(table, headings)
-    if not any(heading.known for heading in headings):
-        texts = [heading.text for heading in headings]
-        near = [
-            n for text in texts for n in difflib.get_close_matches(text.lower(), QUANTITIES, n=1)
-        ]
-        hint = f" Did you mean '{near[0]}'?" if near else ""
-        raise ColumnError(
-            f"{table.origin}: no column is a known quantity ({listed(texts, MAX_QUOTED)}); known"
-            f" quantities are {', '.join(QUANTITIES)}.{hint}",
-            hint=Hint(
-                "To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"
-            ),
-        )
+    _check_any_known(table, headings)
     return headings
+
+
+def _check_user_units(
+    table: RawTable, headings: Sequence[Heading], user_units: Mapping[str, str]
+) -> None:
+    """Raise ColumnError where the user states the unit of a column that the table lacks."""
+    names = [heading.name for heading in headings]
+    texts = [heading.text for heading in headings]
+    for key in user_units:
+        if key not in names and key not in texts:
+            raise ColumnError(
+                f"{table.origin}: a unit is given for '{key}', but the columns are"
+                f" {listed(names)}.{suggestion(key, names)}"
+            )
+
+
+def _check_any_known(table: RawTable, headings: Sequence[Heading]) -> None:
+    """Raise ColumnError where no column is a known quantity."""
+    if any(heading.known for heading in headings):
+        return
+    texts = [heading.text for heading in headings]
+    near = list[str]()
+    for text in texts:
+        near += difflib.get_close_matches(text.lower(), QUANTITIES, n=1)
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    raise ColumnError(
+        f"{table.origin}: no column is a known quantity ({listed(texts, MAX_QUOTED)}); known"
+        f" quantities are {', '.join(QUANTITIES)}.{hint}",
+        hint=Hint(
+            "To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"
+        ),
+    )
 
 
 def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
@@ -279,17 +312,8 @@ def _keep_unknown_column(
     """Keep an unknown column without conversion; its note, or if it has numbers and none, its text
     in `unknown`.
     """
-    if isinstance(cells, list) and not any(cells):
-        return ""
-    if isinstance(cells, list):  # a few different texts are kept as their numbers
-        values, numbers, counts = np.unique(
-            fixed.label_texts(cells), return_inverse=True, return_counts=True
-        )
-        if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
-            return f"Column '{heading.text}' contains text and is ignored."
-        columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
-        texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
-        return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."
+    if isinstance(cells, list):
+        return _keep_labels(heading, cells, columns) if any(cells) else ""
     constant = constant_from_column(table, heading.text, heading.unit, cells)
     if constant:
         return (
@@ -298,20 +322,37 @@ def _keep_unknown_column(
         )
     columns[heading.text or "unnamed"] = cells
     if heading.text in table.fields:
-        quantity = next(
-            (name for name, declared in QUANTITIES.items() if declared.unit == heading.unit), ""
-        )
-        mapped = f"'{heading.text}' = '{quantity or 'force'} [{heading.unit if quantity else 'N'}]'"
-        unit = f" in {heading.unit}" if heading.unit else ""
-        return (
-            f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns]"
-            f" {mapped} maps it."
-        )
+        return _field_note(heading)
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = headed.proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
     if not hint:
         unknown.append(f"'{heading.text}'")
+        return ""
+    return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+
+
+def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
+    """Keep the numbers of a few different texts that repeat; the note on a column of texts."""
+    labels = fixed.label_texts(cells)
+    values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
+        return f"Column '{heading.text}' contains text and is ignored."
+    columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
+    texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
+    return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."
+
+
+def _field_note(heading: Heading) -> str:
+    """The note on a field of a message, with the mapping to a quantity of its unit."""
+    quantity = "force"
+    unit = "N"
+    for name, declared in QUANTITIES.items():
+        if declared.unit == heading.unit:
+            quantity = name
+            unit = declared.unit
+            break
+    stated = f" in {heading.unit}" if heading.unit else ""
     return (
-        hint
-        and f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+        f"Column '{heading.text}'{stated} is a field of a message and kept as it is; [columns]"
+        f" '{heading.text}' = '{quantity} [{unit}]' maps it."
     )

@@ -29,6 +29,7 @@ import dataclasses
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
+from types import UnionType
 from typing import Any
 
 from ...core import (
@@ -245,21 +246,30 @@ def mapping_of_tables(
     return mapping
 
 
+def _required_kind(key: str, value: Any) -> str:
+    """The kind of value that a key requires, as a phrase; empty where the value is of this kind."""
+    if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
+        return "a quoted text"
+    if key == "skip_rows" and not _is_of(value, int):
+        return "a number of lines, such as 7"
+    if key == "missing_codes":
+        is_list = isinstance(value, list | tuple)
+        if not is_list or not all(_is_of(code, float | int | str) for code in value):
+            return 'a list, such as [-999, "OL"]'
+    return ""
+
+
+def _is_of(value: Any, kind: type | UnionType) -> bool:
+    """Whether a value is of this kind; true and false are no numbers."""
+    return isinstance(value, kind) and not isinstance(value, bool)
+
+
 def _check_entry(key: str, value: Any, where: str) -> None:
     """Raise ParameterError or ColumnError for an unknown key of a mapping file, or a value of the
     wrong kind.
     """
     check_known(f"{where}: unknown key", key, _KEYS, "allowed are")
-    required = ""
-    if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
-        required = "a quoted text"
-    if key == "skip_rows" and (not isinstance(value, int) or isinstance(value, bool)):
-        required = "a number of lines, such as 7"
-    codes = value if isinstance(value, list | tuple) else [None]
-    if key == "missing_codes" and not all(
-        isinstance(c, float | int | str) and not isinstance(c, bool) for c in codes
-    ):
-        required = 'a list, such as [-999, "OL"]'
+    required = _required_kind(key, value)
     if required:
         raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be {required}.")
     if key in _WORDS and value not in _WORDS[key]:

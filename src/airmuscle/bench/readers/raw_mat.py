@@ -8,7 +8,7 @@ writes `data` and `colheaders`), and the structure with time that Simulink saves
 timetables with the package mat-io.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -262,25 +262,25 @@ def _of_one_length(
     return [c for c in channels if len(c.values) == length], (note,)
 
 
+def _lists_of_texts(values: Iterable[Any]) -> Iterator[list[str]]:
+    """The lists of texts, which may name the columns of a matrix."""
+    for value in values:
+        is_array = isinstance(value, np.ndarray) and value.dtype.kind in "UO"
+        entries = value.tolist() if is_array else value
+        if isinstance(entries, list) and all(isinstance(text, str) for text in entries):
+            yield [text.strip() for text in entries]
+
+
 def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
     units_field = fields.get("units", fields.get("unit", {}))
     units = units_field if isinstance(units_field, Mapping) else {}
-    lists = (
-        field.tolist() if isinstance(field, np.ndarray) and field.dtype.kind in "UO" else field
-        for field in fields.values()
-    )
-    columns = [
-        [text.strip() for text in entries]
-        for entries in lists
-        if isinstance(entries, list) and all(isinstance(text, str) for text in entries)
-    ]
+    columns = list(_lists_of_texts(fields.values()))
     for name, value in fields.items():
         if _is_array(value) and value.ndim == 1:
             yield Channel(name, value, unit=str(units.get(name, "")))
         elif _is_array(value):
-            width = value.shape[
-                1
-            ]  # without a list of texts next to the matrix, expressions of MATLAB: `data(:,1)`
+            width = value.shape[1]
+            # without a list of texts next to the matrix, expressions of MATLAB: `data(:,1)`
             indexed = [f"{name}(:,{j})" for j in range(1, width + 1)]
             names = next((headings for headings in columns if len(headings) == width), indexed)
             yield from (Channel(names[j], value[:, j]) for j in range(width))

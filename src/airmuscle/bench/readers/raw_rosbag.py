@@ -72,33 +72,18 @@ def read_rosbag_tables(path: Path, selection: Selection = Selection()) -> tuple[
         raise FileError(
             f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag."
         )
-    if path.suffix != ".bag" and path != min(
-        p for p in folder.iterdir() if p.suffix == path.suffix
-    ):
-        return ()
-    topics: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
+    if path.suffix != ".bag":
+        parts = [part for part in folder.iterdir() if part.suffix == path.suffix]
+        if path != min(parts):
+            return ()  # the first file of the folder stands for all of them
     with reading(path, "ROS bag"):
         typestore = import_lab_package("rosbags.typesys", path)
         default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
         with highlevel.AnyReader([folder], default_typestore=default) as bag:
-            names = dict.fromkeys(connection.topic for connection in bag.connections)
-            selected = selection.groups(folder.name, "topic", names)
-            chosen = [
-                connection
-                for connection in bag.connections
-                if connection.topic in selected
-                and (selection.group is not None or not connection.msgtype.endswith(LOGS))
-            ]
-            for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
-                numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
-                topic = connection.topic.strip("/").replace("/", ".")
-                if numbers:
-                    topics.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
-    channels = [
-        channel
-        for topic, messages in topics.items()
-        for channel in _topic_channels(topic, messages)
-    ]
+            topics = _messages_by_topic(bag, folder.name, selection)
+    channels = list[Channel]()
+    for topic, messages in topics.items():
+        channels += _topic_channels(topic, messages)
     if not channels:
         raise FileError(f"{path}: no topic contains numbers.")
     table = merge_channels(folder.name, channels, {}, "message", selection.columns)
@@ -117,29 +102,54 @@ def _repeated_times(topics: Mapping[str, Sequence[tuple[float, Any]]]) -> Iterat
             )
 
 
+Topics = dict[str, list[tuple[float, dict[_Field, float]]]]
+"""The times [s] and the numbers of the messages of each topic."""
+
+
+def _messages_by_topic(bag: Any, origin: str, selection: Selection) -> Topics:
+    """The times [s] and the numbers of the messages of the selected topics."""
+    names = dict.fromkeys(connection.topic for connection in bag.connections)
+    selected = selection.groups(origin, "topic", names)
+    chosen = [connection for connection in bag.connections if connection.topic in selected]
+    if selection.group is None:  # logs are read on demand only
+        chosen = [c for c in chosen if not c.msgtype.endswith(LOGS)]
+    topics: Topics = {}
+    if not chosen:  # without connections, a bag returns the messages of all of them
+        return topics
+    for connection, stamp, raw in bag.messages(connections=chosen):
+        numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
+        topic = connection.topic.strip("/").replace("/", ".")
+        if numbers:
+            time = (stamp - bag.start_time) * 1e-9
+            topics.setdefault(topic, []).append((time, numbers))
+    return topics
+
+
+def _is_vector(item: Any) -> bool:
+    """Whether a field is a vector of numbers that is short enough for columns of a table."""
+    is_numeric = isinstance(item, np.ndarray) and item.dtype.kind in "biuf"
+    return is_numeric and 0 < item.size <= MAX_ELEMENTS
+
+
 def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, float]]:
     """The numbers of a message by their fields; headers are left out."""
     names = getattr(value, "name", None)
     kind = str(getattr(value, "__msgtype__", ""))
     labels = [str(n) for n in names] if isinstance(names, list | tuple) else []
     for field in getattr(value, "__dataclass_fields__", {}):
+        if field in ("header", "layout", "__msgtype__") or field.endswith("covariance"):
+            continue
         item = getattr(value, field)
         within = FIELD_UNITS.get(kind, {}).get(field, unit)
         stated = bool(within) and field in QUANTITY_FIELDS
-        inner = ".".join([*([path] if path else []), QUANTITY_FIELDS[field] if stated else field])
-        if field in ("header", "layout", "__msgtype__") or field.endswith("covariance"):
-            continue
+        name = QUANTITY_FIELDS[field] if stated else field
+        inner = f"{path}.{name}" if path else name
         if isinstance(item, bool | int | float | np.number):
             number = item.item() if isinstance(item, np.number) else item
-            is_named = len(field) > 1 and not kind.startswith(
-                STANDARD
-            )  # x, y and z are parts of a vector in every message
+            # x, y and z are parts of a vector in every message
+            is_named = len(field) > 1 and not kind.startswith(STANDARD)
             yield _Field(inner, within, stated or is_named), number
-        elif (
-            isinstance(item, np.ndarray)
-            and item.dtype.kind in "biuf"
-            and 0 < item.size <= MAX_ELEMENTS
-        ):
+        elif _is_vector(item):
             words = labels if len(labels) == item.size else [str(i) for i in range(item.size)]
             fields = (_Field(f"{inner}.{word}", within, False) for word in words)
             yield from zip(fields, item.ravel().tolist(), strict=True)

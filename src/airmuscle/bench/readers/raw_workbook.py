@@ -3,6 +3,7 @@ one.
 """
 
 import datetime
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from .separate_process import import_lab_package, reading
 from .text_format import TextFormat
 from .time_base import seconds_from_clock
 
+_EMPTY = (None, "")
 _NUMBERS = float | int | datetime.date | datetime.time | datetime.timedelta
 Rows = list[tuple[int, list[Any]]]
 """Non-empty rows of a worksheet with their numbers, counted from 1."""
@@ -74,37 +76,16 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
         raise FileError(
             f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows."
         )
-    start = stated or 0
-    if (
-        stated is None
-    ):  # the last row above the numbers that is as wide as they are, or the row above the unit row
-        numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
-        width = header.count_cells(rows[numeric][1])
-        above = [i for i in range(numeric) if header.count_cells(rows[i][1]) >= width]
-        start = above[-1] if above else numeric
-        adjacent = len(above) > 1 and above[-2] == above[-1] - 1
-        if adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:])):
-            start = above[-2]
-    constants = dict(
-        filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start]))
-    )
+    start = _heading_row(rows) if stated is None else stated
+    constants = [header.parse_constant_cells(_texts(row)) for _, row in rows[:start]]
     first, cells = rows[start]
-    used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
+    used = [j for j, cell in enumerate(cells) if cell not in _EMPTY]
     beginning = [[_text(row[j]) for j in used] for _, row in rows[start : start + 3]]
     headings, units, count = header.parse_headings(
         origin, f"row {first}", beginning, text_format.headerless
     )
     body = rows[start + count :]
-    for i, row in body:
-        outside = next(
-            (cell for j, cell in enumerate(row) if cell not in (None, "") and j not in used), None
-        )
-        if outside is not None:
-            raise ColumnError(
-                f"{origin}, row {i}: the cell '{_text(outside)}' has no heading (the headings are"
-                f" {listed(headings)}). Add a heading to its column, or move the cell outside the"
-                " rows of the table."
-            )
+    _check_cells_below_headings(origin, body, used, headings)
     columns = tuple(_column([row[j] for _, row in body]) for j in used)
     numbers = tuple(j + 1 for j in used)
     if headings == [str(i) for i in range(1, len(used) + 1)]:  # of a table without headings
@@ -116,16 +97,48 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
         columns,
         np.array([i for i, _ in body]),
         "row",
-        constants,
+        dict(filter(None, constants)),
         numbers=numbers,
     )
+
+
+def _heading_row(rows: Rows) -> int:
+    """The index of the headings: the last row above the numbers that is as wide as they are, or the
+    row above the unit row.
+    """
+    numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
+    width = header.count_cells(rows[numeric][1])
+    above = [i for i in range(numeric) if header.count_cells(rows[i][1]) >= width]
+    if not above:
+        return numeric
+    last = above[-1]
+    if last - 1 in above and header.parse_unit_row(
+        _texts(rows[last - 1][1]), _texts(rows[last][1])
+    ):
+        return last - 1
+    return last
+
+
+def _check_cells_below_headings(
+    origin: str, body: Rows, used: Sequence[int], headings: Sequence[str]
+) -> None:
+    """Raise ColumnError where a row has a cell in a column without a heading."""
+    for number, row in body:
+        for j, cell in enumerate(row):
+            if cell in _EMPTY or j in used:
+                continue
+            raise ColumnError(
+                f"{origin}, row {number}: the cell '{_text(cell)}' has no heading (the headings are"
+                f" {listed(headings)}). Add a heading to its column, or move the cell outside the"
+                " rows of the table."
+            )
 
 
 def _is_numeric(row: list[Any]) -> bool:
     """Whether more than half of the cells of a row are numbers or times, also as texts; the others
     may be names.
     """
-    cells = [cell for cell in row if cell not in (None, "")]
+    cells = [cell for cell in row if cell not in _EMPTY]
     numbers = 0
     for cell in cells:
         if isinstance(cell, str):

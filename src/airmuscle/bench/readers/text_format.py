@@ -141,6 +141,17 @@ def check_cell_sizes(origin: str, lines: NumberedLines) -> None:
             )
 
 
+def _with_blanks(text_format: TextFormat, body: NumberedLines) -> TextFormat:
+    """The format with the delimiter blank, if blanks separate the first numbers."""
+    for _, line in body:
+        delimiter = text_format.detect_delimiter(line)
+        if delimiter == " ":
+            text_format = dataclasses.replace(text_format, delimiter=delimiter)
+        if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
+            break
+    return text_format
+
+
 def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> TextHeader:
     """Parse the header of a table from its first non-empty lines. Raises FileError or
     ColumnError.
@@ -153,14 +164,8 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
             f"{origin}: the file contains no table. A table consists of a row of headings and rows"
             " of numbers."
         )
-    for _, line in (
-        body if text_format.delimiter is None else ()
-    ):  # blanks, if they separate the first numbers
-        delimiter = text_format.detect_delimiter(line)
-        if delimiter == " ":
-            text_format = dataclasses.replace(text_format, delimiter=delimiter)
-        if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
-            break
+    if text_format.delimiter is None:
+        text_format = _with_blanks(text_format, body)
     above = _lines_above_headings(body, text_format)
     if text_format.skip_rows is not None and body[-1][0] <= text_format.skip_rows:
         raise FileError(

@@ -11,7 +11,7 @@ last row before the quantity leaves the level of the dwell. A branch column in t
 
 import dataclasses
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -77,39 +77,48 @@ def find_branches(
         return ()
     runs = find_runs(recording) if runs is None else runs
     time = recording.columns.get("time")
-    moved = moved_column(recording)
-    isobaric = [run.interval for run in runs if run.kind == ISOBARIC and moved in run.swept_columns]
-    column = "pressure"
-    parts = _split_at_runs(recording, runs)
-    if moved and 2 * sum(map(len, isobaric)) > len(recording):
-        column = moved
-        parts = isobaric
-    smooth = [
-        _remove_spikes(recording[column][p.rows], None if time is None else time[p.rows])
-        for p in parts
-    ]
-    if column == "pressure":
+    column, parts = _driven_quantity(recording, runs)
+    smooth = []
+    for part in parts:
+        time_of_part = None if time is None else time[part.rows]
+        smooth.append(_remove_spikes(recording[column][part.rows], time_of_part))
+    if column == "pressure":  # of all parts, which are one sweep of one sensor
+        std = sensor.std if sensor else 0.0
         if sensor is None and any(run.kind == AT_REST for run in runs):
-            sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
-        combined = np.concatenate(smooth)
-        least = max(10.0 * (sensor.std if sensor else 0.0), rounding(column, combined))
-        thresholds = [max(reversal * float(np.ptp(combined)), least)] * len(parts)
+            std = estimate_noise(recording["pressure"])
+        threshold = _reversal_threshold(column, np.concatenate(smooth), std, reversal)
+        thresholds = [threshold] * len(parts)
     else:
-        noise = [0.0 if time is None else estimate_noise(values) for values in smooth]
-        thresholds = [
-            max(reversal * float(np.ptp(v)), 10.0 * std, rounding(column, v))
-            for v, std in zip(smooth, noise, strict=True)
-        ]
+        thresholds = []
+        for values in smooth:
+            std = 0.0 if time is None else estimate_noise(values)
+            thresholds.append(_reversal_threshold(column, values, std, reversal))
     branches = []
     for part, values, threshold in zip(parts, smooth, thresholds, strict=True):
         pressure = values if column == "pressure" else recording["pressure"][part.rows]
-        for stretch, direction in _monotonic_intervals(values, threshold):
-            ends = float(pressure[stretch.start]), float(pressure[stretch.stop - 1])
+        for stretch, sign in _monotonic_intervals(values, threshold):
+            first = float(pressure[stretch.start])
+            last = float(pressure[stretch.stop - 1])
             interval = Interval(part.start + stretch.start, part.start + stretch.stop)
-            branches.append(
-                Branch(interval, -direction if column == "length" else direction, *ends, column)
-            )
+            direction = -sign if column == "length" else sign
+            branches.append(Branch(interval, direction, first, last, column))
     return tuple(branches)
+
+
+def _driven_quantity(recording: Recording, runs: tuple[Run, ...]) -> tuple[str, Sequence[Interval]]:
+    """The driven quantity and the intervals in which it is: the motion if most rows are of isobaric
+    runs, otherwise the pressure.
+    """
+    moved = moved_column(recording)
+    isobaric = [run.interval for run in runs if run.kind == ISOBARIC and moved in run.swept_columns]
+    if moved and 2 * sum(map(len, isobaric)) > len(recording):
+        return moved, isobaric
+    return "pressure", _split_at_runs(recording, runs)
+
+
+def _reversal_threshold(column: str, values: Array, std: float, reversal: float) -> float:
+    """The change that a reversal exceeds: of the range, of the noise, and of the rounding."""
+    return max(reversal * float(np.ptp(values)), 10.0 * std, rounding(column, values))
 
 
 def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval]:

@@ -240,41 +240,38 @@ def _rows(parts: Sequence[Any]) -> dict[str, list[int]]:
     return {"first row": first, "last row": last}
 
 
+def _limit_column(limits: Sequence[float | None]) -> TableColumn:
+    """The column of limits of sensors, in the brief view where a sensor saturates."""
+    finite = [limit if limit is not None and np.isfinite(limit) else None for limit in limits]
+    return TableColumn(finite, BY_ROW, brief=any(limit is not None for limit in finite))
+
+
 def _column_table(inspection: Inspection) -> Table:
     recording = inspection.recording
     names = list(inspection.recording)
     values = [recording[name] for name in names]
     sensors = [inspection.sensors.get(name) for name in names]
-    limits = {
-        end: [
-            limit if s and np.isfinite(limit := getattr(s, f"{end}_limit")) else None
-            for s in sensors
-        ]
-        for end in ("lower", "upper")
-    }
+    units = [recording.units.get(name, "") for name in names]
+    least = [float(readings.min()) if readings.size else None for readings in values]
+    greatest = [float(readings.max()) if readings.size else None for readings in values]
+    resolutions = [(sensor and sensor.resolution) or None for sensor in sensors]
+    noise = [(sensor and sensor.noise) or None for sensor in sensors]
+    deviations = [(sensor and sensor.std) or None for sensor in sensors]
     columns: dict[str, Any] = {
         "column": names,
-        "unit in file": [
-            unit if (unit := recording.units.get(name, "")) != "1" else "" for name in names
-        ],
-        "min": TableColumn(
-            [float(readings.min()) if readings.size else None for readings in values], BY_ROW
-        ),
-        "max": TableColumn(
-            [float(readings.max()) if readings.size else None for readings in values], BY_ROW
-        ),
+        "unit in file": ["" if unit == "1" else unit for unit in units],
+        "min": TableColumn(least, BY_ROW),
+        "max": TableColumn(greatest, BY_ROW),
         "unit": unit_column(names),
-        "resolution": TableColumn(
-            [(s and s.resolution) or None for s in sensors], BY_ROW, digits=3
+        "resolution": TableColumn(resolutions, BY_ROW, digits=3),
+        "noise": TableColumn(noise, BY_ROW, digits=2),
+        "deviation": TableColumn(deviations, BY_ROW, digits=2, brief=False),
+        "lower limit": _limit_column(
+            [sensor.lower_limit if sensor else None for sensor in sensors]
         ),
-        "noise": TableColumn([(s and s.noise) or None for s in sensors], BY_ROW, digits=2),
-        "deviation": TableColumn(
-            [(s and s.std) or None for s in sensors], BY_ROW, digits=2, brief=False
+        "upper limit": _limit_column(
+            [sensor.upper_limit if sensor else None for sensor in sensors]
         ),
-        **{
-            f"{end} limit": TableColumn(values, BY_ROW, brief=any(v is not None for v in values))
-            for end, values in limits.items()
-        },
     }
     return Table(
         "columns", "Columns", columns, "Limits: where the sensor saturates.", brief=len(names)
@@ -341,20 +338,17 @@ def _overview(inspections: Sequence[Inspection]) -> Chapter:
     """Return the chapter of several files: one row each, and each note once with the files that it
     concerns.
     """
-    constants: dict[str, dict[str, None]] = {}
-    for inspection in inspections:
-        for name, value in inspection.recording.constants.items():
-            unit, shown = _units(name, value)
-            text = quantity_text(value, unit, shown) if unit else str(value)
-            constants.setdefault(name, {})[text] = None
-    values = []
-    for name, texts in constants.items():
-        listed_texts = [*list(texts)[:MAX_LISTED], *(["..."] if len(texts) > MAX_LISTED else [])]
-        values.append(NamedValue(name.replace("_", " "), "; ".join(listed_texts)))
     names = [
         ", ".join(name for name in inspection.recording if name != "time")
         for inspection in inspections
     ]
+    problems = []
+    notes = []
+    for inspection in inspections:
+        findings = inspection.findings
+        problems.append([finding.text for finding in findings if finding.serious])
+        remarks = [finding.text for finding in findings if not finding.serious]
+        notes.append([*inspection.recording.notes, *remarks])
     rates = [inspection.sampling and inspection.sampling.rate for inspection in inspections]
     columns: dict[str, Any] = {
         "file": [inspection.recording.origin for inspection in inspections],
@@ -368,23 +362,26 @@ def _overview(inspections: Sequence[Inspection]) -> Chapter:
         name="overview",
         title=f"{len(inspections)} recordings",
         summary=f"Columns: {'; '.join(list(dict.fromkeys(names))[:MAX_LISTED])}.",
-        values=tuple(values),
+        values=tuple(_common_constants(inspections)),
         tables=(Table("files", "Recordings", columns, brief=MAX_FILES),),
-        problems=_common(
-            [[f.text for f in inspection.findings if f.serious] for inspection in inspections],
-            inspections,
-        ),
-        notes=_common(
-            [
-                [
-                    *inspection.recording.notes,
-                    *(f.text for f in inspection.findings if not f.serious),
-                ]
-                for inspection in inspections
-            ],
-            inspections,
-        ),
+        problems=_common(problems, inspections),
+        notes=_common(notes, inspections),
     )
+
+
+def _common_constants(inspections: Sequence[Inspection]) -> Iterator[NamedValue]:
+    """The constants of all recordings, each with its different values."""
+    constants: dict[str, dict[str, None]] = {}
+    for inspection in inspections:
+        for name, value in inspection.recording.constants.items():
+            unit, shown = _units(name, value)
+            text = quantity_text(value, unit, shown) if unit else str(value)
+            constants.setdefault(name, {})[text] = None
+    for name, texts in constants.items():
+        listed_texts = list(texts)[:MAX_LISTED]
+        if len(texts) > MAX_LISTED:
+            listed_texts.append("...")
+        yield NamedValue(name.replace("_", " "), "; ".join(listed_texts))
 
 
 def _describe_runs(runs: Sequence[Run]) -> str | None:

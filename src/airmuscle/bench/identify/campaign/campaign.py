@@ -30,6 +30,20 @@ _WEIGHTS = (0.05, 0.05, 0.35, 0.3, 0.15, 0.08, 0.02)
 """Shares of the stages in the computing time (chosen)."""
 
 
+def _check_used(recordings: Sequence[Recording], records: Sequence[CampaignRecord]) -> None:
+    """Raise IdentificationError where no record can be used."""
+    support = support_of(recordings)
+    used = [record for record in records if record.kind is not RecordKind.UNUSED]
+    if all(record.kind.is_static for record in used):
+        support.check(DataUse.FIT)  # with the cause in the data
+    if not used:
+        reasons = "; ".join(f"{record.origin}: {record.reason}" for record in records)
+        raise IdentificationError(
+            f"no record of the campaign can be used ({reasons or 'there is no recording'}). Give"
+            " records with pressure, length and force, and the resting length."
+        )
+
+
 def identify_campaign(
     recordings: Sequence[Recording],
     *,
@@ -59,19 +73,7 @@ def identify_campaign(
     """
     records = classify_records(named(recordings))
     steps = _Steps(progress, finished, (records, geometry))
-    support = support_of(recordings)
-    is_unused = [record.kind is RecordKind.UNUSED for record in records]
-    if all(record.kind.is_static or record.kind is RecordKind.UNUSED for record in records):
-        support.check(DataUse.FIT)
-    if all(is_unused):
-        reasons = (
-            "; ".join(f"{record.origin}: {record.reason}" for record in records)
-            or "there is no recording"
-        )
-        raise IdentificationError(
-            f"no record of the campaign can be used ({reasons}). Give records with pressure, length"
-            " and force, and the resting length."
-        )
+    _check_used(recordings, records)
     check_one_rig(records)
     steps.end("records", records)
     of_kind = {kind: [record for record in records if record.kind is kind] for kind in RecordKind}
@@ -86,12 +88,13 @@ def identify_campaign(
             "static characteristic",
             lambda show: fit_static_stage(records, friction, elements, show, executor),
         )
-    filled, main = of_kind[RecordKind.FILL], main_length(of_kind[RecordKind.FILL])
+    filled = of_kind[RecordKind.FILL]
+    main = main_length(filled)
     if len({r.resting_length for r in filled} - {None}) > 1:  # one muscle, that of the most records
         filled = [r for r in filled if r.resting_length == main]
-    change = (
-        static.volume_change(main) if isinstance(static, StaticStage) and main is not None else None
-    )
+    change = None
+    if isinstance(static, StaticStage) and main is not None:
+        change = static.volume_change(main)
     fills = steps.fit(
         "fills and volume", lambda show: fit_fill_stage(filled, geometry, change, show)
     )

@@ -36,6 +36,7 @@ from ..hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_
 from ..static_fit_chapter import MuscleDescription, fit_chapter
 from . import (
     Campaign,
+    CampaignRecord,
     CreepStage,
     FillStage,
     FrictionStage,
@@ -202,38 +203,43 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
     return Plot("campaign-characteristic", f"Static characteristic{text}: {contents}.", figure)
 
 
+def _length_and_level(record: CampaignRecord) -> tuple[float, float]:
+    """Resting length and constant value of a record, which order the panels."""
+    return record.resting_length or 0.0, record.level[1] if record.level else 0.0
+
+
+def _draw_prediction(axes: Any, record: CampaignRecord, campaign: Campaign) -> None:
+    """Draw the measured force of a record, the predicted force and its band."""
+    recording = record.recording
+    prediction = campaign.predict(recording)
+    is_ramp = record.kind is RecordKind.ISOMETRIC
+    x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
+    dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
+    axes.plot(x, recording["force"], label="measured", **dots)
+    order = np.argsort(x, kind="stable")
+    low = running_extreme(prediction.low[order], np.minimum)
+    high = running_extreme(prediction.high[order], np.maximum)
+    axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
+    axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
+    axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
+    length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
+    title = "" if record.level is None else f"{level_text(*record.level)}{length}"
+    axes.set_title(title, fontsize=8)
+
+
 def prediction_plot(campaign: Campaign) -> Plot | None:
     """Return measured loops, the force predicted with friction and creep, and its 95 % band."""
     static = [record for record in campaign.records if record.kind.is_static]
     usable = [record for record in static if record.kind is RecordKind.ISOBARIC] or static
     if not usable or not isinstance(campaign.static, StaticStage):
         return None
-    ordered = sorted(
-        usable, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0)
-    )
+    ordered = sorted(usable, key=_length_and_level)
     shown = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
     figure, panels = new_figure(rows, columns, width=7.4, height=2.3 * rows + 0.4, squeeze=False)
     for axes, record in zip(panels.ravel(), shown, strict=False):
-        recording = record.recording
-        prediction = campaign.predict(record.recording)
-        is_ramp = record.kind is RecordKind.ISOMETRIC
-        x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
-        dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
-        axes.plot(x, recording["force"], label="measured", **dots)
-        order = np.argsort(x, kind="stable")
-        low = running_extreme(prediction.low[order], np.minimum)
-        high = running_extreme(prediction.high[order], np.maximum)
-        axes.fill_between(
-            x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band"
-        )
-        axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
-        axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
-        length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
-        axes.set_title(
-            "" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8
-        )
+        _draw_prediction(axes, record, campaign)
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[:, 0]:

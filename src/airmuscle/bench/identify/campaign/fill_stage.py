@@ -165,6 +165,20 @@ class FillStage(ShortRepr):
         return " ".join(filter(None, (predicted, volume, self.misfit, *self.supposed)))
 
 
+def _is_rising(record: CampaignRecord) -> bool:
+    return any(step.change > 0 for step in record.steps)
+
+
+def _why_no_volume(contractions: Array, change: VolumeChange | None) -> str:
+    """The reason why fills at these contractions give no volume, as a phrase."""
+    ratio = "the ratio of conductance and volume only"
+    if change is None:
+        return f"the fills determine {ratio}, and no static law gives the volume"
+    ends = [100 * contractions.min(), 100 * contractions.max()]
+    at = f"at contractions of {ends[0]:.3g} to {ends[1]:.3g} %"
+    return f"the fills {at} determine {ratio}; give the braid of the muscle"
+
+
 def fit_fill_stage(
     records: Sequence[CampaignRecord],
     geometry: Geometry | None,
@@ -185,34 +199,21 @@ def fit_fill_stage(
         return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)
     estimate = None
     try:
-        rising = [
-            record for record in records if any(step.change > 0 for step in record.steps)
-        ] or list(records)
+        rising = [record for record in records if _is_rising(record)] or list(records)
         relative = _fit_relative(rising)
         contractions = np.array([fills.held_contraction(record) for record in rising])
-        volume_estimates = [
-            volume_estimate
-            for volume_estimate in relative.estimates
-            if volume_estimate.name.startswith(VOLUME)
-        ]
-        volumes = np.array([volume_estimate.value for volume_estimate in volume_estimates])
-        errors = np.array([volume_estimate.stderr for volume_estimate in volume_estimates])
+        of_volume = [e for e in relative.estimates if e.name.startswith(VOLUME)]
+        volumes = np.array([e.value for e in of_volume])
+        errors = np.array([e.stderr for e in of_volume])
         progress(0.5)
         if geometry is not None:  # the factor that makes the relative volumes its own
             known = np.array([float(geometry.volume(contraction)) for contraction in contractions])
             scale = float(known @ volumes / (volumes @ volumes))
         else:
-            estimate = (
-                None if change is None else relate_volumes(volumes, errors, contractions, change)
-            )
+            if change is not None:
+                estimate = relate_volumes(volumes, errors, contractions, change)
             if estimate is None or change is None:
-                ratio = "the ratio of conductance and volume only"
-                ends = [100 * contractions.min(), 100 * contractions.max()]
-                reason = f"the fills determine {ratio}, and no static law gives the volume"
-                if change is not None:
-                    at = f"at contractions of {ends[0]:.3g} to {ends[1]:.3g} %"
-                    reason = f"the fills {at} determine {ratio}; give the braid of the muscle"
-                return LeftOutStage(NAME, reason, REMEDY)
+                return LeftOutStage(NAME, _why_no_volume(contractions, change), REMEDY)
             geometry = change.geometry(estimate.volume_at_rest)
             scale = estimate.scale
         experiments = _experiments(records, rising, relative, geometry, scale)
@@ -303,17 +304,17 @@ def _fit_jointly(
     supposed += [*valves.supposed, *describe_ambient([record.recording for record in records])]
     cross = tuple(rms for prediction in predictions for rms in prediction.rms.values())
     baselines = fills.fill_baselines(fit) if len(cross) == len(records) else ()
-    parts = (
-        tuple(records),
-        tuple(experiments),
-        geometry,
-        estimate,
-        contractions,
-        cross,
-        baselines,
-        tuple(supposed),
+    return FillStage(
+        fit=fit,
+        records=tuple(records),
+        experiments=tuple(experiments),
+        geometry=geometry,
+        estimate=estimate,
+        contractions=contractions,
+        cross_rms=cross,
+        baselines=baselines,
+        supposed=tuple(supposed),
     )
-    return FillStage(fit, *parts)
 
 
 def _with_supply(

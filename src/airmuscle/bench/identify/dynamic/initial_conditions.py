@@ -4,7 +4,7 @@ clock of the run.
 
 import dataclasses
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,6 +102,15 @@ class InitialConditions:
             )
 
 
+def _states_at_raised_pressure(
+    plant: Plant, pressures: Sequence[float], motion: Mapping[str, float]
+) -> Iterator[Mapping[str, float]]:
+    """The states of a plant with the pressure of one muscle after the other raised by a step."""
+    for k, pressure in enumerate(pressures):
+        raised = [*pressures[:k], pressure + PRESSURE_STEP, *pressures[k + 1 :]]
+        yield plant.state_at(pressure=raised, **motion)
+
+
 def _steady_conditions(
     plant: Plant, state: Mapping[str, float], pressures: Sequence[float], at_rest: bool
 ) -> InitialConditions:
@@ -109,25 +118,23 @@ def _steady_conditions(
     settled or known if no pressure changes it, equal pressure of a tube, else stationary, as the
     speeds of a mechanism at rest are.
     """
-    motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
-    motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
-    increased = [
-        [p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)]
-        for k in range(len(pressures))
-    ]
-    varied_states = [plant.state_at(pressure=raised, **motion) for raised in increased]
+    coordinates = plant.mechanism.coordinates
+    names = [c.name for c in coordinates]
+    speeds = [c.speed for c in coordinates]
+    motion = {name: state[name] for name in (*names, *speeds)}
+    varied_states = list(_states_at_raised_pressure(plant, pressures, motion))
     outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
     of_circuits = _circuit_states(plant)
-    known = {
-        f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)
-    }
+    muscles = zip(plant.prefixes, pressures, strict=True)
+    known = {f"{prefix}pressure": pressure for prefix, pressure in muscles}
+    left_out = {f"{prefix}air_mass" for prefix in plant.prefixes}
+    if at_rest:
+        left_out |= motion.keys()
     stationary = list[str]()
     equal = list[tuple[str, str]]()
     settled = list[str]()
     for name, value in state.items():
-        if (at_rest and name in motion) or name in [
-            f"{prefix}air_mass" for prefix in plant.prefixes
-        ]:
+        if name in left_out:
             continue
         if all(varied[name] == value for varied in varied_states):
             if name in of_circuits:
@@ -139,9 +146,10 @@ def _steady_conditions(
             equal.append((tube_pressure, f"{prefix}pressure"))
         else:
             stationary.append(name)
-    speeds = [c.speed for c in plant.mechanism.coordinates] if at_rest else []
-    known |= dict.fromkeys(speeds, 0.0)
-    return InitialConditions(known, state, (*stationary, *speeds), tuple(equal), tuple(settled))
+    if at_rest:
+        known |= dict.fromkeys(speeds, 0.0)
+        stationary += speeds
+    return InitialConditions(known, state, tuple(stationary), tuple(equal), tuple(settled))
 
 
 def _circuit_states(plant: Plant) -> dict[str, Any]:

@@ -66,31 +66,32 @@ class RecordModel:
             raise error.located(experiment.recording.origin) from None
         self._nominal = self._system.nominal
         leaf_index = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
-        changed = [
-            (leaf_index[path], k) for k in self.unknown_indices for path in unknowns[k].paths
-        ]
-        self._changed = (
-            np.array([i for i, _ in changed], dtype=int),
-            np.array([k for _, k in changed], dtype=int),
-        )
+        changed_leaves = []
+        changing_unknowns = []
+        for k in self.unknown_indices:
+            for path in unknowns[k].paths:
+                changed_leaves.append(leaf_index[path])
+                changing_unknowns.append(k)
+        self._changed = np.array(changed_leaves, dtype=int), np.array(changing_unknowns, dtype=int)
         self._leaves = tree.flatten(self.plant)
         self._conditions = compile_conditions(self.plant, experiment.initial_conditions)
         known = experiment.initial_conditions.known
+        known_names = list(known)
         self._known = np.array(list(known.values()), dtype=float)
-        targets = [(j, unknowns[k].target) for j, k in enumerate(self.sensitivity_indices)]
-        self._initial_values = [
-            (j, list(known).index(t.name)) for j, t in targets if isinstance(t, InitialValue)
-        ]
-        self._instant_columns = [
-            (j, target) for j, target in targets if isinstance(target, CommandInstant)
-        ]
+        self._initial_values = list[tuple[int, int]]()
+        self._instant_columns = list[tuple[int, CommandInstant]]()
         self._leaf_by_column = np.zeros((self._leaves.size, len(self.sensitivity_indices)))
-        for j, k in enumerate(self.sensitivity_indices):
-            self._leaf_by_column[[leaf_index[path] for path in unknowns[k].paths], j] = 1.0
-        self._state_nominal = np.array([s.nominal for s in self.plant.states])
-        self._guess = np.array(
-            [experiment.initial_conditions.guess[s.name] for s in self.plant.states]
-        )
+        for column, k in enumerate(self.sensitivity_indices):
+            target = unknowns[k].target
+            if isinstance(target, InitialValue):
+                self._initial_values.append((column, known_names.index(target.name)))
+            elif isinstance(target, CommandInstant):
+                self._instant_columns.append((column, target))
+            changed = [leaf_index[path] for path in unknowns[k].paths]
+            self._leaf_by_column[changed, column] = 1.0
+        guess = experiment.initial_conditions.guess
+        self._state_nominal = np.array([state.nominal for state in self.plant.states])
+        self._guess = np.array([guess[state.name] for state in self.plant.states])
         self._last_grid: TimeGrid | None = None
         self._idle: list[BoundIntegrator] = []
         """Bound integrators that no simulation uses at present."""

@@ -6,7 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import AirmuscleError, Array, IdentificationError, ParameterError, alternatives, tree
+from ....core import (
+    AirmuscleError,
+    Array,
+    IdentificationError,
+    ParameterError,
+    System,
+    alternatives,
+    tree,
+)
 from ....report.chapter import Chapter, Table, TableColumn
 from ...reported import Reported
 from .candidate_records import CandidateRecord, candidate_records
@@ -187,6 +195,24 @@ def _without(matrix: Array, nuisance: Array, prior: Array | float = PRIOR) -> Ar
     return np.asarray(information - cross @ np.linalg.solve(weight, cross.T))
 
 
+def _unknowns_in_plant(
+    fit: DynamicFit, plant: System, replaced: str, common: Sequence[int]
+) -> list[int]:
+    """The indices of the unknowns, common or of the first record, whose parameters a plant has
+    outside a replaced part.
+    """
+    paths = {leaf.path for leaf in tree.leaves(plant)}
+    if replaced:
+        paths = {path for path in paths if not path.startswith(replaced)}
+    of_record = [i for i, u in enumerate(fit.unknowns) if u.paths and u.record == 0]
+    indices = []
+    for i in (*common, *of_record):
+        needed = fit.unknowns[i].paths
+        if needed and paths.issuperset(needed):
+            indices.append(i)
+    return indices
+
+
 def _candidate_information(
     fit: DynamicFit, candidate: CandidateRecord, common: Sequence[int]
 ) -> Array:
@@ -194,25 +220,18 @@ def _candidate_information(
     none.
     """
     plant = candidate.experiment.plant
-    part = candidate.replaced
     assert plant is not None
-    known = {leaf.path for leaf in tree.leaves(plant) if not (part and leaf.path.startswith(part))}
-    record_unknowns = [i for i, u in enumerate(fit.unknowns) if u.paths and u.record == 0]
-    known_unknowns = [
-        i
-        for i in (*common, *record_unknowns)
-        if fit.unknowns[i].paths and set(fit.unknowns[i].paths) <= known
-    ]
+    known_unknowns = _unknowns_in_plant(fit, plant, candidate.replaced, common)
     unknowns = [dataclasses.replace(fit.unknowns[i], record=None) for i in known_unknowns]
     named = {path for unknown in unknowns for path in unknown.paths}
     further = [path for path in candidate.changed if path not in named]
-    unknowns += make_unknowns(plant, [candidate.experiment], further, (), {}) if further else ()
+    if further:
+        unknowns += make_unknowns(plant, [candidate.experiment], further, (), {})
     matrix = _candidate_sensitivities(fit, candidate, unknowns)
-    shared = [
-        k
-        for k, i in enumerate(known_unknowns)
-        if i in common and not set(unknowns[k].paths) & set(candidate.changed)
-    ]
+    shared = []
+    for k, i in enumerate(known_unknowns):
+        if i in common and set(unknowns[k].paths).isdisjoint(candidate.changed):
+            shared.append(k)
     nuisance = [k for k in range(len(unknowns) + 1) if k not in shared]
     prior = np.where(np.array(nuisance) == len(unknowns), START_MARGIN, PRIOR)
     information = np.zeros((len(common), len(common)))

@@ -3,7 +3,7 @@ loop.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ....report.chapter import Chapter, Table, TableColumn
@@ -36,10 +36,11 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
     AICc.
     """
     best = [loop_fit.recommended or next(iter(loop_fit.fits), None) for loop_fit in loop_fits]
+    loops = [loop_fit.loop for loop_fit in loop_fits]
     columns: dict[str, Any] = {
-        "run": [loop_fit.loop.recording.origin for loop_fit in loop_fits],
-        "kind": [loop_fit.loop.description for loop_fit in loop_fits],
-        "rows": [int(loop_fit.loop.fitted_rows.sum()) for loop_fit in loop_fits],
+        "run": [loop.recording.origin for loop in loops],
+        "kind": [loop.description for loop in loops],
+        "rows": [int(loop.fitted_rows.sum()) for loop in loops],
         "law": [fit and fit.name for fit in best],
         "rms error without friction": TableColumn(
             [fit and fit.rmse_without_friction for fit in best],
@@ -53,21 +54,23 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
             [loop_fit.usable_in_plant for loop_fit in loop_fits], brief=False
         ),
     }
-    failed: dict[tuple[str, str], list[str]] = {}
-    for loop_fit in loop_fits if len(loop_fits) > SEPARATE_LOOPS else ():
-        for law in loop_fit.failed.items():
-            failed.setdefault(law, []).append(loop_fit.loop.recording.origin)
-    runs = {
-        law: origins[0] if len(origins) == 1 else f"{len(origins)} runs"
-        for law, origins in failed.items()
-    }
-    notes = tuple(
-        f"{name} was not fitted to {which}: {reason}" for (name, reason), which in runs.items()
-    )
+    # the chapters of a few loops name the failed laws themselves
+    notes = tuple(_failed_laws(loop_fits)) if len(loop_fits) > SEPARATE_LOOPS else ()
     justified = sum(loop_fit.recommended is not None for loop_fit in loop_fits)
     summary = f"{len(loop_fits)} loops; the data justify a friction law for {justified} of them."
     tables = (Table("loops", "Best law of each loop", columns, brief=12),)
     return Chapter("loops", "Hysteresis loops", summary, tables=tables, notes=notes)
+
+
+def _failed_laws(loop_fits: Sequence[LoopFit]) -> Iterator[str]:
+    """A note on each law that was not fitted, with the run, or the number of runs."""
+    failed: dict[tuple[str, str], list[str]] = {}
+    for loop_fit in loop_fits:
+        for law in loop_fit.failed.items():
+            failed.setdefault(law, []).append(loop_fit.loop.recording.origin)
+    for (name, reason), origins in failed.items():
+        runs = origins[0] if len(origins) == 1 else f"{len(origins)} runs"
+        yield f"{name} was not fitted to {runs}: {reason}"
 
 
 def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] = ()) -> Chapter:
