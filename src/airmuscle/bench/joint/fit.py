@@ -104,10 +104,11 @@ def fit_joint(
     train, clipped = without_saturated(cut(fitted, delay, rows), ordered)
     with thread_pool(len(STRENGTHS)) if workers == 1 else process_pool(workers) as executor:
         arm, paths = _search(fitted, train, tuple(axes), seed, progress, executor)
-    separated = [separate(arm, joint, joint_paths, train) for joint, joint_paths in paths.items()]
+    of_joints = [separate(arm, joint, joint_paths, train) for joint, joint_paths in paths.items()]
     gain = None
-    apart = [text for _, texts, _ in separated for text in texts]
-    remarks = [*short, *inspection.remarks, *clipped, SCALE, *apart]
+    remarks = [*short, *inspection.remarks, *clipped, SCALE]
+    for of_joint in of_joints:
+        remarks += of_joint.remarks
     if residual:
         physics = arm
         arm, gain, words = stored_result(
@@ -130,12 +131,12 @@ def fit_joint(
         judge.episode,
         baseline_errors(fitted, left, rows),
         band(errors),
-        tuple(e for estimates, _, _ in separated for e in estimates),
+        tuple(estimate for of_joint in of_joints for estimate in of_joint.estimates),
         tuple(dict.fromkeys(remarks)),
         split,
         regulators,
         None if commanded is None else run_errors(arm, commanded),
-        block_diag(*(covariance for *_, covariance in separated)),
+        block_diag(*(of_joint.covariance for of_joint in of_joints)),
         gain,
     )
 
@@ -249,11 +250,30 @@ WORDS = {
 }
 
 
+class SeparatedEstimates(NamedTuple):
+    """Estimates, their covariance (P, P) along what a record separates, and remarks on what it does
+    not separate.
+    """
+
+    estimates: list[ArmParameter]
+    covariance: Array
+    remarks: list[str]
+
+
+class Separation(NamedTuple):
+    """Estimates, their covariance (P, P) along what a record separates, and the share (P,) of each
+    in the directions that it does not separate.
+    """
+
+    estimates: list[ArmParameter]
+    covariance: Array
+    shares: Array
+
+
 def separate(
     arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows
-) -> tuple[list[ArmParameter], list[str], Array]:
-    """Estimates of one joint, what the record does not separate, in words, and the covariance (P,
-    P) along what it separates; from the Fisher information."""
+) -> SeparatedEstimates:
+    """Estimates of one joint from the Fisher information."""
     sampled = windows.sample(WINDOWS)
     leaves = {leaf.path: leaf for leaf in tree.leaves(arm)}
     values = np.array([float(leaves[path].value) for path in paths])
@@ -264,28 +284,22 @@ def separate(
     scale = np.sqrt(np.mean(error**2) * windows.rows)  # the errors of one window count as one
     of_sample = np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled)
     information = of_sample * (len(windows) / len(sampled)) / max(scale, 1e-9) ** 2
-    estimates, covariance, shares = separated(information, paths, values, sizes)
+    separation = separated(information, paths, values, sizes)
     names = [_name(path) for path in paths]
-    words = not_separated(f"joint {joint + 1}: ", names, shares)
-    return estimates, words, covariance
+    remarks = not_separated(f"joint {joint + 1}: ", names, separation.shares)
+    return SeparatedEstimates(separation.estimates, separation.covariance, remarks)
 
 
-def separated(
-    information: Array, paths: Sequence[str], values: Array, sizes: Array
-) -> tuple[list[ArmParameter], Array, Array]:
-    """Estimates by the Fisher information (P, P) of parameters over their sizes (P,), their
-    covariance along what it separates, and the share of each in the directions that it does not
-    separate."""
+def separated(information: Array, paths: Sequence[str], values: Array, sizes: Array) -> Separation:
+    """Estimates by the Fisher information (P, P) of parameters over their sizes (P,)."""
     levels, directions = np.linalg.eigh(information)
     weak = levels < 1.0 / UNSEPARATED**2
     inverse = sizes[:, None] * directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
-    rows = zip(paths, values.tolist(), np.sqrt(np.sum(inverse**2, axis=1)).tolist(), strict=True)
+    errors = np.sqrt(np.sum(inverse**2, axis=1))
+    rows = zip(paths, values.tolist(), errors.tolist(), strict=True)
     known = inverse[:, ~weak]
-    return (
-        [ArmParameter(*row) for row in rows],
-        known @ known.T,
-        np.sum(directions[:, weak] ** 2, axis=1),
-    )
+    shares = np.sum(directions[:, weak] ** 2, axis=1)
+    return Separation([ArmParameter(*row) for row in rows], known @ known.T, shares)
 
 
 def not_separated(where: str, names: Sequence[str], shares: Array) -> list[str]:

@@ -24,9 +24,9 @@ from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, with_slopes, with_values
 from .episode_inspection import checked_inspection, without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
-from .fit import not_separated, separated
+from .fit import SeparatedEstimates, not_separated, separated
 from .free_run import baseline_errors
-from .result import ArmFit, ArmParameter
+from .result import ArmFit
 
 FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")
 """Fields of a mechanism that are estimated unless others are named."""
@@ -273,7 +273,7 @@ class KnownSearch:
         )
         return with_values(self.system, self.paths, solution.x * self.sizes)
 
-    def separate(self, system: ReadPressures) -> tuple[list[ArmParameter], Array, list[str]]:
+    def separate(self, system: ReadPressures) -> SeparatedEstimates:
         """Estimates, their covariance along what the record separates, and remarks; a window is one
         observation.
         """
@@ -284,32 +284,32 @@ class KnownSearch:
         names = [path.removeprefix("arm.") for path in self.paths]
         information = flat.T @ flat / (np.mean(error**2) * self.windows.rows)
         estimates, covariance, shares = separated(information, names, values, self.sizes)
-        remarks = [
-            f"{field[:-1]} of pressure {int(number[:-1]) + 1}: {estimate.value:.4g} ± "
-            f"{float(f'{estimate.standard_error:.2g}'):g}{READINGS[field]}"
-            for estimate in estimates
-            for field, _, number in [estimate.path.partition("[")]
-            if field in READINGS
-        ]
+        remarks = []
+        for estimate in estimates:
+            field, _, number = estimate.path.partition("[")
+            if field in READINGS:
+                standard_error = float(f"{estimate.standard_error:.2g}")
+                remarks.append(
+                    f"{field[:-1]} of pressure {int(number[:-1]) + 1}: {estimate.value:.4g} ±"
+                    f" {standard_error:g}{READINGS[field]}"
+                )
         far = []  # estimates that no such joint has
-        for name, value, first_value, *ends in zip(
-            names, values, self.start, self.low, self.high, strict=True
-        ):
-            if abs(value) > FAR * abs(first_value) > 0.0 or (
-                ends[0] > 0.0 and value < first_value / FAR
-            ):
+        starts = zip(names, values, self.start, self.low, self.high, strict=True)
+        for name, value, first_value, low, high in starts:
+            is_greater = abs(value) > FAR * abs(first_value) > 0.0
+            is_smaller = low > 0.0 and value < first_value / FAR
+            if is_greater or is_smaller:
                 far.append(
                     f"{name} is {value:.3g}, {value / first_value:.3g} times its first value"
                 )
-            elif value and np.isclose(value, ends, 1e-3).any():
+            elif value and np.isclose(value, [low, high], 1e-3).any():
                 far.append(f"{name} ends at the limit of its range, {value:.3g}")
         text = (
             f"{'; '.join(far)}: another joint, or a wrong sample time (inertia grows with its"
             " square, damping and lags with it), or a wrong scale of angles or pressures; do not"
             " use the numbers before this is explained"
         )
-        return (
-            estimates,
-            covariance,
-            [*remarks, *([text] if far else []), *not_separated("", names, shares)],
-        )
+        if far:
+            remarks.append(text)
+        remarks += not_separated("", names, shares)
+        return SeparatedEstimates(estimates, covariance, remarks)

@@ -4,6 +4,7 @@ constant load.
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -254,7 +255,7 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     sentences = []
     reasons = list[str]()
     holds = list[HeldRows]()
-    loaded = list[tuple[float, str, CreepElements]]()
+    loaded = list[_LoadedHold]()
     for recording in recordings:
         hold = max(
             find_holds(recording), key=lambda candidate: len(candidate.interval), default=None
@@ -275,9 +276,11 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     stage = fit_held_rows(holds) if holds else None
     if isinstance(stage, CreepStage) and stage.elements.stiffnesses:
         return HeldCreep(tuple(sentences), stage.elements, stage.verdict, stage.standard_errors)
-    usable = [loaded_hold for loaded_hold in loaded if loaded_hold[2].stiffnesses]
+    usable = [loaded_hold for loaded_hold in loaded if loaded_hold.elements.stiffnesses]
     if usable:
-        _, origin, elements = max(usable, key=lambda loaded_hold: loaded_hold[0])
+        longest = max(usable, key=lambda loaded_hold: loaded_hold.duration)
+        origin = longest.origin
+        elements = longest.elements
         verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
         return HeldCreep(
             tuple(sentences), elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan)
@@ -310,10 +313,16 @@ def _held_rows(recording: Recording, hold: Hold) -> HeldRows:
     return HeldRows.after(recording.rows(slice(0, hold.interval.stop)), start)
 
 
-def _elements_under_load(
-    recording: Recording, hold: Hold, law: ForceLaw | None
-) -> tuple[float, str, CreepElements]:
-    """Duration [s], origin and elements of a hold under a constant load."""
+class _LoadedHold(NamedTuple):
+    """Duration [s], origin and creep elements of a hold under a constant load."""
+
+    duration: float
+    origin: str
+    elements: CreepElements
+
+
+def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None) -> _LoadedHold:
+    """The creep elements of a hold under a constant load."""
     if law is None:
         raise IdentificationError(
             f"{recording.origin}: the creep under a constant load needs the stiffness of the"
@@ -328,7 +337,7 @@ def _elements_under_load(
     pressure, contraction = (float(np.median(rows[name])) for name in ("pressure", "contraction"))
     stiffness = float(law.stiffness(pressure, contraction)) / length
     elements = creep_elements(fit, step=change * length, stiffness=stiffness, resting_length=length)
-    return fit.duration, recording.origin, elements
+    return _LoadedHold(fit.duration, recording.origin, elements)
 
 
 def _single_motion(recording: Recording, start: int, shortest: float) -> float:

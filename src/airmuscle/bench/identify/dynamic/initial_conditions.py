@@ -201,6 +201,16 @@ def compile_conditions(system: System, initial: InitialConditions) -> Function:
     return _compiled_conditions[key]
 
 
+class SolvedInitialState(NamedTuple):
+    """An initial state (n,), and its derivatives by the known values (n, k) and by the leaves of
+    the plant (n, p).
+    """
+
+    state: Array
+    by_known: Array
+    by_leaf: Array
+
+
 def solve_initial_state(
     function: Function,
     initial: InitialConditions,
@@ -208,10 +218,9 @@ def solve_initial_state(
     known: Array,
     guess: Array,
     nominal: Array,
-) -> tuple[Array, Array, Array]:
-    """The initial state (n,) by `compile_conditions` for states of `nominal` size, and its
-    derivatives by the known values (n, k) and the leaves (n, p) (implicit function theorem). Raises
-    IdentificationError if there is none.
+) -> SolvedInitialState:
+    """The initial state by `compile_conditions` for states of `nominal` size, and its derivatives
+    (implicit function theorem). Raises IdentificationError if there is none.
     """
     n = guess.size
     x = guess.copy()
@@ -236,7 +245,7 @@ def solve_initial_state(
             f" {status.message}. Change the conditions or the guess."
         )
     inverse = nominal[:, None] * np.linalg.inv(by_state * nominal)
-    return x, inverse[:, : known.size], -inverse @ by_leaf
+    return SolvedInitialState(x, inverse[:, : known.size], -inverse @ by_leaf)
 
 
 MIN_DURATION = 1e-9

@@ -18,7 +18,7 @@ method, IMM-REP-1999-05, DTU 1999.
 import dataclasses
 import functools
 from collections.abc import Callable, Sequence
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -46,11 +46,18 @@ increases by no more than it: the Jacobian still gives the direction, the sum no
 step ends the search unless its predicted reduction is less than half of the last one."""
 
 
-def _normal_equations(
-    evaluated: tuple[Array, Array] | None, count: int
-) -> tuple[float, Array, Array]:
-    """Sum of squares, normal matrix (P, P) and half the gradient (P,); an infinite sum where
-    residuals or Jacobian are missing, not finite, or overflow when squared."""
+class _NormalEquations(NamedTuple):
+    """Sum of squares, normal matrix (P, P) and half the gradient (P,)."""
+
+    cost: float
+    normal: Array
+    gradient: Array
+
+
+def _normal_equations(evaluated: tuple[Array, Array] | None, count: int) -> _NormalEquations:
+    """The normal equations; an infinite sum where residuals or Jacobian are missing, not finite, or
+    overflow when squared.
+    """
     if evaluated is not None:
         r, j = evaluated
         with np.errstate(over="ignore", invalid="ignore"):
@@ -58,8 +65,8 @@ def _normal_equations(
             normal = j.T @ j
             gradient = j.T @ r
         if cost < np.inf and np.isfinite(normal).all():
-            return cost, normal, gradient
-    return np.inf, np.zeros((count, count)), np.zeros(count)
+            return _NormalEquations(cost, normal, gradient)
+    return _NormalEquations(np.inf, np.zeros((count, count)), np.zeros(count))
 
 
 class LevenbergMarquardt:

@@ -3,7 +3,7 @@ the pressure: its agreement with each run, and selection of the friction that is
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -367,24 +367,29 @@ def _fit_law(usable: Sequence[LoopFit], law_fits: Sequence[HysteresisFit]) -> Jo
     )
 
 
-def select_friction(
-    fits: Sequence[LoopFit], joint: Sequence[JointFit]
-) -> tuple[Friction, str, str] | None:
-    """The friction to write with the range of its data, its origin and verdict: that of all runs
-    together or, if they are not several, of the only run a plant can use."""
+class SelectedFriction(NamedTuple):
+    """A friction with the range of its data, its origin and verdict."""
+
+    friction: Friction
+    origin: str
+    verdict: str
+
+
+def select_friction(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> SelectedFriction | None:
+    """The friction to write: that of all runs together or, if they are not several, of the only run
+    a plant can use.
+    """
     if joint:
         best = preferred_fit(joint)
         if best is None:
             return None
-        return (
-            identified_friction(best.friction, best.series),
-            f"{len(best.series)} runs",
-            best.verdict,
-        )
+        friction = identified_friction(best.friction, best.series)
+        return SelectedFriction(friction, f"{len(best.series)} runs", best.verdict)
     usable = [
         fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant
     ]
     if not usable:
         return None
     only = max(usable, key=lambda fit: fit.effective_sample_size)
-    return identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict
+    friction = identified_friction(only.friction, (only.series,))
+    return SelectedFriction(friction, only.series.origin, only.verdict)

@@ -5,7 +5,7 @@ of several.
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -311,14 +311,15 @@ def _fit_iteratively(
     all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
     coordinates = [_search_coordinate(all_leaves[i], limits) for i in free]
-    start, low, high, sizes = np.reshape(
-        coordinates, (-1, 4)
-    ).T.tolist()  # four empty lists where none is free
+    start = [coordinate.start for coordinate in coordinates]
+    low = [coordinate.low for coordinate in coordinates]
+    high = [coordinate.high for coordinate in coordinates]
 
     def law(x: Sequence[float]) -> Friction:
         values = [leaf.value for leaf in all_leaves]
-        for i, size, coordinate in zip(free, sizes, map(float, x), strict=True):
-            values[i] = coordinate * size if size else float(np.exp(coordinate))
+        for i, coordinate, value in zip(free, coordinates, map(float, x), strict=True):
+            size = coordinate.size
+            values[i] = value * size if size else float(np.exp(value))
         return tree.unflatten(friction, values)
 
     weight = _prior_weight(runs) / PRIOR
@@ -363,13 +364,23 @@ def _residuals_without(runs: Sequence[LoopSeries]) -> Array:
     return np.concatenate([run.fitted_residuals(None) for run in runs])
 
 
-def _search_coordinate(leaf: Leaf, limits: DataLimits) -> tuple[float, float, float, float]:
-    """Start, bounds and size of a parameter in the search, relative to its size; of one with a
-    positive lower bound those of its logarithm, and a size of 0."""
+class _SearchCoordinate(NamedTuple):
+    """Start and bounds of a parameter in the search, relative to its size; of one with a positive
+    lower bound those of its logarithm, and a size of 0.
+    """
+
+    start: float
+    low: float
+    high: float
+    size: float
+
+
+def _search_coordinate(leaf: Leaf, limits: DataLimits) -> _SearchCoordinate:
+    """The coordinate of a parameter in the search, within the limits of the data."""
     low, high = limits.bounds(leaf)
     value = min(max(leaf.value, low), high)
     if low > 0:
-        return float(np.log(value)), float(np.log(low)), float(np.log(high)), 0.0
+        return _SearchCoordinate(float(np.log(value)), float(np.log(low)), float(np.log(high)), 0.0)
     narrowed = high < leaf.declared.bounds[1]
     size = abs(value) or (0.1 * high if narrowed else 1.0)
-    return value / size, low / size, high / size, size
+    return _SearchCoordinate(value / size, low / size, high / size, size)
