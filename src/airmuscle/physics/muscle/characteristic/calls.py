@@ -32,7 +32,8 @@ class Slopes(NamedTuple):
 _STATED = "_stated_range"
 _OWN = "_own_range"
 _REPORTED = "_reported_range"
-"""What is stored with a law: the range of its muscle, its own, and that a call outside was told."""
+"""What is stored with a law: range and permitted force that its muscle states, the range in calls,
+and that a call outside was told."""
 _SEARCH_MARGIN = 0.05
 """Contraction [1] below the range down to which a stretched sleeve is searched for (chosen)."""
 _PRESSURE_STEP = 10.0
@@ -62,16 +63,17 @@ def with_stated_range(law: Law, stated: ValidityRange | None, permitted_force: A
     if stated is None and permitted_force is None:
         return law
     known = copy.copy(law)
-    known.__dict__[_STATED] = ForceRange.of(law, stated, permitted_force)
-    known.__dict__.pop(_REPORTED, None)
+    known.__dict__[_STATED] = stated, permitted_force
+    for derived in (_OWN, _REPORTED):
+        known.__dict__.pop(derived, None)
     return known
 
 
 def stated_range(law: Any) -> ForceRange:
     """The range of a law in calls: that of its muscle, or its own."""
-    own: ForceRange | None = law.__dict__.get(_STATED) or law.__dict__.get(_OWN)
+    own: ForceRange | None = law.__dict__.get(_OWN)
     if own is None:
-        own = law.__dict__[_OWN] = ForceRange.of(law)
+        own = law.__dict__[_OWN] = ForceRange.of(law, *law.__dict__.get(_STATED, ()))
     return own
 
 
@@ -81,7 +83,7 @@ def recorded_force(law: Any, model: Any, pressure: Value, contraction: Value) ->
     """
     if law.refuses_beyond:
         return model.force(pressure, contraction)
-    limits = law.__dict__.get(_STATED) or ForceRange.of(model)
+    limits = stated_range(law) if _STATED in law.__dict__ else ForceRange.of(model)
     extended = extended_force(model, limits, pressure, contraction)
     inside = ops.both(contraction >= limits.min_contraction, contraction <= limits.max_contraction)
     for low, high in (limits.pressure,) if limits.pressure is not None else ():
