@@ -232,8 +232,10 @@ def test_many_files_have_one_line_each_and_each_finding_once(tmp_path: Path, mon
     text = airmuscle("inspect", *sorted(tmp_path.glob("*.csv"))).stdout
     lines = text.splitlines()
     rows = [line.split() for line in lines if re.match("[abc].csv ", line)]
-    assert [row[:2] for row in rows] == [[f"{name}.csv", "400"] for name in "abc"]
-    assert [row[3] for row in rows] == ["1", "1", "0"]
+    runs, levels = rows[:3], rows[3:]
+    assert [row[:2] for row in runs] == [[f"{name}.csv", "400"] for name in "abc"]
+    assert [row[3] for row in runs] == ["1", "1", "0"]
+    assert [row[0] for row in levels] == ["a.csv", "b.csv", "c.csv"], "what each record gives"
     assert text.count("saturates at its lower limit") == 1
     assert "resting length   300 mm" in lines
-    assert len(lines) <= 14
+    assert len(lines) <= 24

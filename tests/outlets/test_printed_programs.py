@@ -297,7 +297,9 @@ def test_constants_are_read_back_as_they_were(language):
         assert [float(t.strip("()")) for t in texts[:6]] == [0.0, -0.0, 1.0, -2.5, 1e300, 5e-324]
         assert texts[1] == "(-0.0)"
     infinity, nan = {
-        "CLanguage": ("INFINITY" if language == CLanguage("float") else "HUGE_VAL", "NAN"),
+        "CLanguage": ("INFINITY", "(float)NAN")
+        if language == CLanguage("float")
+        else ("HUGE_VAL", "(double)NAN"),
         "JavaScriptLanguage": ("Infinity", "NaN"),
         "MatlabLanguage": ("Inf", "NaN"),
     }[type(language).__name__]

@@ -6,6 +6,7 @@ import abc
 import dataclasses
 import functools
 import json
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -151,9 +152,22 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower
     # limit of the force.
     known = nodes.logical_and(*(nodes.logical_or(argument >= 0, argument < 0) for argument in x))
-    values = [nodes.where(known, result, x[0] + x[1]) for result in (value, first, second)]
+    answered = refused_beyond(model, method, x, (value, first, second))
+    values = [nodes.where(known, result, x[0] + x[1]) for result in answered]
     lines = provenance(title, law)
     return PrintedLaw(name, arguments, results, x, parameters, values, tuple(leaves(law)), lines)
+
+
+def refused_beyond(
+    law: Characteristic, method: str, x: Sequence[Node], results: Sequence[Node]
+) -> list[Node]:
+    """The results of a printed law; NaN beyond the range of a law for the contraction that refuses
+    what lies there.
+    """
+    if method != "contraction" or not hasattr(law, "inside_validity_range"):
+        return list(results)
+    inside = nodes.as_node(law.inside_validity_range(*x))
+    return [nodes.where(inside, result, math.nan) for result in results]
 
 
 class Target(abc.ABC):

@@ -51,7 +51,7 @@ from ...engine.compile.text.languages import JavaScriptLanguage
 from ...files.library import Entry, to_toml
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
-from ..export.targets import FORMS
+from ..export.targets import FORMS, refused_beyond
 
 _FIRST = 7.0e250
 """The first of the marks: numbers that no file contains."""
@@ -331,8 +331,9 @@ def _functions(model: Any, shape: Any) -> list[LawFunction]:
     for name in DIRECTIONS:
         values = _traced(lambda *at, direction=name: [getattr(model, direction)(*at)], *x)
         if values is not None:
-            gradient = slopes.gradient(values[0], x)
-            functions.append(LawFunction(name, {"x": x}, [*values, *gradient]))
+            results = [*values, *slopes.gradient(values[0], x)]
+            answered = refused_beyond(model, name, x, results)
+            functions.append(LawFunction(name, {"x": x}, answered))
     limits = _traced(lambda: _limits(model))
     if limits is not None:
         functions.append(LawFunction("limits", {}, limits))

@@ -53,6 +53,10 @@ class CLanguage(TextLanguage):
             self.infinity if text == "inf" else text + ("" if set(".e") & set(text) else ".0") + "f"
         )
 
+    def constant(self, value: float) -> str:
+        """A number; NAN is a float, too."""
+        return f"({self.number})NAN" if math.isnan(value) else super().constant(value)
+
     def call(self, function: str, x: Sequence[str]) -> str:
         suffix = "f" if self.number == "float" else ""
         return f"{'fabs' if function == 'abs' else function}{suffix}({', '.join(x)})"
