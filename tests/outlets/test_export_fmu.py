@@ -385,7 +385,7 @@ def test_the_reference_results_are_met_with_the_inputs_beside_them(fmi, fmus, tm
 def test_the_log_states_once_what_left_its_validity_range(tmp_path):
     printed.require("gcc")
     plant = plants.EXAMPLES["dmsp-20-300"]
-    limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, -0.1, 0.3))
+    limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, 0.0, 0.3))
     problem = replace(problem_of(), system=replace(plant, muscle=limited))
     instance = Instance(
         write_fmu(problem, tmp_path / "a.fmu", name="plant").path, tmp_path / "unzipped"
@@ -470,7 +470,7 @@ def test_after_a_step_that_failed_the_instance_stands_where_it_stood(instance):
 
 def test_only_parameters_that_act_on_the_run_are_tunable(tmp_path):
     plant = plants.EXAMPLES["dmsp-20-300"]
-    limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, -0.1, 0.3))
+    limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, 0.0, 0.3))
     write_fmu(
         replace(problem_of(), system=replace(plant, muscle=limited)),
         tmp_path / "a.fmu",

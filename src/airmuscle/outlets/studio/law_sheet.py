@@ -19,6 +19,7 @@ A direction that the law does not give in closed form is missing; the page searc
 """
 
 import dataclasses
+import functools
 import hashlib
 import json
 import math
@@ -49,6 +50,7 @@ from ...core import (
 from ...engine.compile.functions import Printer
 from ...engine.compile.text.languages import JavaScriptLanguage
 from ...files.library import Entry, to_toml
+from ...physics.muscle.characteristic.calls import recorded_force
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 from ..export.targets import FORMS, refused_beyond
@@ -292,7 +294,7 @@ def print_law(law: Law, geometry: am.geometry.Geometry | None) -> tuple[str, lis
     model, shape = law_and_geometry(model, geometry)
     printer = Printer(JavaScriptLanguage(exported=False))
     names = []
-    for name, inputs, outputs in _functions(model, shape):
+    for name, inputs, outputs in _functions(law, model, shape):
         printer.add(name, {**inputs, "p": p}, {"f": outputs})
         names.append(name)
     if not set(names) & set(DIRECTIONS):
@@ -324,12 +326,17 @@ class LawFunction(NamedTuple):
     results: list[Node]
 
 
-def _functions(model: Any, shape: Any) -> list[LawFunction]:
-    """Every function that can be traced."""
+def _functions(law: Law, model: Any, shape: Any) -> list[LawFunction]:
+    """Every function of a law that can be traced; `model` is the law with symbols for its
+    parameters.
+    """
     functions = list[LawFunction]()
     x = nodes.symbols("x", 2)
     for name in DIRECTIONS:
-        values = _traced(lambda *at, direction=name: [getattr(model, direction)(*at)], *x)
+        answer = getattr(model, name)
+        if name == "force" and isinstance(law, am.characteristic.ForceLaw):
+            answer = functools.partial(recorded_force, law, model)
+        values = _traced(lambda *at, answer=answer: [answer(*at)], *x)
         if values is not None:
             results = [*values, *slopes.gradient(values[0], x)]
             answered = refused_beyond(model, name, x, results)
