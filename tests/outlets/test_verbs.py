@@ -269,7 +269,6 @@ def verbs(folder: Path) -> Mapping[str, Verb]:
                 "geometry": None,
                 "progress": None,
                 "finished": None,
-                "known": None,
             },
         ),
         "free_of_creep": (

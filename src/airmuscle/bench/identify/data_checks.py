@@ -82,7 +82,7 @@ class Scatter:
             return None
         if least > MAX_MISFIT * expected:
             return LawMisfit(
-                f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the"
+                f"The rms error, {rmse:.3g} N, is {rmse / expected:.3g} times the scatter of the"
                 f" data ({parts}): the law does not follow them. "
                 + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
                 + "Compare other laws, and check the remarks on contradicting or suspicious data.",
@@ -91,7 +91,7 @@ class Scatter:
         if rmse <= MIN_UNREPEATABLE * greatest:
             return None
         return LawMisfit(
-            f"The rms error, {rmse:.3g} N, is {rmse / within:.2g} times the scatter within a run"
+            f"The rms error, {rmse:.3g} N, is {rmse / within:.3g} times the scatter within a run"
             f" ({parts}), although repeated runs differ by a similar amount.",
             rmse / expected,
         )
