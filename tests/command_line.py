@@ -6,9 +6,8 @@ import json
 import re
 from typing import Any
 
-from click.testing import Result
+from click.testing import CliRunner, Result
 from json_keys import undocumented
-from typer.testing import CliRunner
 
 from airmuscle.outlets.cli import app
 

@@ -4,13 +4,10 @@ each command.
 
 from __future__ import annotations
 
-import enum
 import inspect
 import re
 from collections.abc import Iterator
 from typing import Any
-
-import typer
 
 from airmuscle.outlets.cli import COMMANDS, app
 
@@ -21,10 +18,9 @@ from .tables import table
 def pages() -> Iterator[tuple[str, str]]:
     """(path without suffix, text) of all pages."""
     yield "commands/index", overview()
-    group = typer.main.get_command(app)
-    context = group.make_context("airmuscle", ["list"], resilient_parsing=True)
+    context = app.make_context("airmuscle", ["list"], resilient_parsing=True)
     for row in COMMANDS:
-        yield f"commands/{row.name}", command_page(row.name, group.get_command(context, row.name))
+        yield f"commands/{row.name}", command_page(row.name, app.get_command(context, row.name))
 
 
 def overview() -> str:
@@ -50,7 +46,7 @@ def command_page(name: str, command: Any) -> str:
     )
     parts = [f"# airmuscle {name}\n", f"```text\n{usage}\n```\n", help_text(command.help or "")]
     if arguments:
-        rows = [(f"`{_metavar(p)}`", escape(getattr(p, "help", None) or "")) for p in arguments]
+        rows = [(f"`{_metavar(p)}`", escape(p.meaning)) for p in arguments]
         parts.append("## Arguments\n\n" + table(("argument", "meaning"), rows))
     if options:
         rows = [(_names(p), escape(p.help or "") + _default(p)) for p in options]
@@ -65,28 +61,13 @@ def _metavar(parameter: Any) -> str:
 
 def _names(option: Any) -> str:
     names = ", ".join(f"`{each}`" for each in [*option.opts, *option.secondary_opts])
-    takes = "" if option.is_flag else f" `{_kind(option)}`"
+    takes = "" if option.is_flag else f" `{option.metavar or option.type.name.upper()}`"
     return names + takes
 
 
-def _kind(option: Any) -> str:
-    """The metavariable of an option; a choice shows its values."""
-    kind = option.type_descriptor.annotation
-    if option.metavar:
-        return str(option.metavar)
-    if inspect.isclass(kind) and issubclass(kind, enum.Enum):
-        return "|".join(str(each.value) for each in kind)
-    return str(getattr(kind, "__name__", "value")).upper()
-
-
 def _default(option: Any) -> str:
-    value = option.default.value if isinstance(option.default, enum.Enum) else option.default
-    if (
-        callable(value)
-        or value in (None, (), [], "", False)
-        or option.is_flag
-        or not isinstance(value, str | int | float)
-    ):
+    value = option.default
+    if value in (None, (), "", False) or option.is_flag or not isinstance(value, str | int | float):
         return ""
     return f" Default: `{value}`."
 

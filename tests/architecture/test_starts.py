@@ -14,7 +14,7 @@ import pytest
 import airmuscle as am
 
 HEAVY = {
-    *("numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "typer", "yaml", "jax"),
+    *("numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "yaml", "jax"),
     "casadi",
 }
 SIMULATION = """
@@ -39,14 +39,14 @@ STARTS = {
             " '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)"
         ),
         {
-            *(HEAVY - {"typer", "rich"}),
+            *HEAVY,
             *("llvmlite", "airmuscle.bench.identify", "airmuscle.bench.readers.formats"),
             "airmuscle.engine.compile.program",
         },
     ),
     "airmuscle convert": (
         "from airmuscle.outlets.cli import app\napp(['convert', '--help'], standalone_mode=False)",
-        (HEAVY | {"airmuscle.bench.identify", "airmuscle.physics"}) - {"typer", "rich"},
+        (HEAVY | {"airmuscle.bench.identify", "airmuscle.physics"}),
     ),
 }
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import plants
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 from widths import widened
 
 from airmuscle.engine import (

@@ -23,9 +23,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import Result
 from command_line import airmuscle
 from scenario_files import BRAID, CIRCUIT
-from typer.testing import Result
 from widths import SAME_LAW, widened
 
 import airmuscle as airmuscle_package
@@ -832,7 +832,7 @@ main()
         pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
         for i, module in enumerate(
             (
-                "typer",
+                "click",
                 "airmuscle.outlets.cli.commands",
                 "airmuscle.outlets.cli.library",
                 "airmuscle.report.text",

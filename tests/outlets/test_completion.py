@@ -18,21 +18,19 @@ from airmuscle.outlets.cli import SHELLS, complete_data, complete_entry, complet
 
 def completed(words: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The completions that bash receives for the last of some words."""
-    from typer._completion_classes import completion_init
-
-    completion_init()
     items = words.split(" ")
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(items) - 1))
-    monkeypatch.setenv("_AIRMUSCLE_COMPLETE", "complete_bash")
-    return airmuscle(prog_name="airmuscle").stdout.split()
+    monkeypatch.setenv("_AIRMUSCLE_COMPLETE", "bash_complete")
+    lines = airmuscle(prog_name="airmuscle").stdout.split()
+    return [line.partition(",")[2] for line in lines]  # each with its kind
 
 
 @pytest.mark.parametrize("shell", SHELLS)
 def test_the_script_of_each_shell_asks_this_program(shell: str):
     script = airmuscle("--completion", shell)
     assert script.exit_code == 0
-    assert f"_AIRMUSCLE_COMPLETE=complete_{shell}" in script.stdout
+    assert f"_AIRMUSCLE_COMPLETE={shell}_complete" in script.stdout
 
 
 def test_the_script_for_bash_is_valid(tmp_path: Path):

@@ -18,7 +18,6 @@ import make_front_figure
 import numpy as np
 import printed
 import pytest
-import typer
 from book import command_pages, function_pages, gallery, model_pages
 from book.accessible import accessible
 from book.ascii_math import FormulaError, to_latex
@@ -152,13 +151,12 @@ def test_laws_of_papers_show_a_formula(models: dict[str, str]):
 
 def test_every_command_and_option_is_on_a_page():
     pages = dict(command_pages.pages())
-    group = typer.main.get_command(app)
-    context = group.make_context("airmuscle", ["list"], resilient_parsing=True)
+    context = app.make_context("airmuscle", ["list"], resilient_parsing=True)
     for row in COMMANDS:
         text = pages[f"commands/{row.name}"]
         options = [
             name
-            for p in group.get_command(context, row.name).params
+            for p in app.get_command(context, row.name).params
             for name in p.opts
             if name.startswith("--")
         ]

@@ -11,7 +11,6 @@ import shutil
 from pathlib import Path
 
 import pytest
-import typer
 from command_line import airmuscle, command_names
 
 from airmuscle import load as load_muscle
@@ -96,9 +95,8 @@ def test_there_are_example_lines_of_every_command():
 def test_an_example_line_is_understood(line: str):
     """By the parser of its command, whose options it names."""
     command, *words = words_of(line)
-    group = typer.main.get_command(app)
-    context = group.make_context("airmuscle", [command], resilient_parsing=True)
-    parsed = group.get_command(context, command).make_context(command, list(words))
+    context = app.make_context("airmuscle", [command], resilient_parsing=True)
+    parsed = app.get_command(context, command).make_context(command, list(words))
     assert parsed.args == []
 
 

@@ -38,7 +38,8 @@ from ..requests import (
 )
 from .delivery import Execution, deliver
 from .measurements import print_row_notes, reading_chapters
-from .options import Folder, Json, argument, with_requests
+from .options import Folder, Json, with_requests
+from .parser import Argument
 from .terminal import in_options, progress_bars
 
 STAGES_FILE = "stages.json"
@@ -48,7 +49,7 @@ scenarios.
 """
 
 FOLDER = "Folder with the files of one rig; or its files, or a glob pattern."
-CampaignFolder = Annotated[list[Path], argument("FOLDER", FOLDER)]
+CampaignFolder = Annotated[list[Path], Argument("FOLDER", FOLDER)]
 
 
 @request

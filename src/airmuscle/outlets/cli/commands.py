@@ -11,21 +11,15 @@ import warnings
 from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
 
-import typer
-from typer.core import TyperGroup
+import click
+from click.shell_completion import CompletionItem
 
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
-from .options import install_completion_classes, print_completion_script
+from .options import PROGRAM, print_completion_script
+from .parser import SETTINGS, CommandOption, command_of, parameter_of
 from .streams import encodable
 from .terminal import RUN_CODE, echo, in_options, warned
-
-SETTINGS: dict[str, Any] = {
-    "add_completion": False,
-    "pretty_exceptions_enable": False,
-    "rich_markup_mode": None,
-    "context_settings": {"help_option_names": ["-h", "--help"], "max_content_width": 110},
-}
 
 
 class CommandRow(NamedTuple):
@@ -127,46 +121,48 @@ COMMANDS = (
 )
 """All commands, in the order of use."""
 _ROWS = {row.name: row for row in COMMANDS}
-_UsageError: Any = typer.BadParameter.__base__
+_UsageError: Any = click.BadParameter.__base__
 
 
-class LazyCommands(TyperGroup):
+class LazyCommands(click.Group):
     """The commands of the table; a command's module is imported when the command is called."""
 
-    def list_commands(self, ctx: Any) -> list[str]:
+    def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_ROWS)
 
-    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         row = _ROWS.get(cmd_name)
         if row is None:
             return None
         function = getattr(importlib.import_module(f".{row.module}", __package__), row.function)
         check_interrupted()
-        command = typer.Typer(**SETTINGS)
-        command.command(row.name)(function)
-        built: Any = typer.main.get_command(command)
-        for parameter in built.params:
-            # a help text shows no Python type after the name of an argument
-            if parameter.param_type_name == "argument":
-                parameter.display_type_rich = lambda ctx: ""
+        command = command_of(function, row.name)
         if row.name in RUN_CODE:
-            built.params.append(_allow_code_option())
-        return built
+            command.params.append(parameter_of("allow_code", AllowCode, False))
+        return command
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         if args[0] not in _ROWS:
             ctx.fail(f"No such command '{args[0]}'.{suggestion(args[0], _ROWS)}")
         return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        commands = [
+            CompletionItem(row.name, help=row.summary)
+            for row in COMMANDS
+            if row.name.startswith(incomplete)
+        ]
+        return commands + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(row.name, row.summary) for row in COMMANDS])
 
-    def make_context(self, *args: Any, **settings: Any) -> Any:
+    def make_context(self, *args: Any, **settings: Any) -> click.Context:
         with _printable_usage_errors():
             return super().make_context(*args, **settings)
 
-    def invoke(self, ctx: Any) -> Any:
+    def invoke(self, ctx: click.Context) -> Any:
         def show(
             message: Warning | str, category: type[Warning], *location: Any, **options: Any
         ) -> None:
@@ -192,7 +188,7 @@ class LazyCommands(TyperGroup):
                 return super().invoke(ctx)
 
 
-def _permit(ctx: typer.Context, value: bool) -> None:
+def _permit(ctx: click.Context, value: bool) -> None:
     """Permit the code of users until a command ends."""
     if value:
         ctx.with_resource(importlib.import_module("...files", __package__).allow_code())
@@ -201,37 +197,17 @@ def _permit(ctx: typer.Context, value: bool) -> None:
 CODE_WORDS = (
     'Run classes that a file names as model = "module:Class"; only for files that you trust.'
 )
-AllowCode = Annotated[
-    bool, typer.Option("--allow-code", help=CODE_WORDS, callback=_permit, is_eager=True)
-]
-
-
-def _allow_code_option() -> Any:
-    """The flag with which a command reads `model = "module:Class"` in its files, taken from a
-    command without name.
-    """
-    bearer = typer.Typer(**SETTINGS)
-
-    @bearer.command()
-    def bear(allow_code: AllowCode = False) -> None: ...
-
-    (flag,) = (
-        parameter
-        for parameter in typer.main.get_command(bearer).params
-        if parameter.name == "allow_code"
-    )
-    flag.expose_value = False
-    return flag
+AllowCode = Annotated[bool, CommandOption("--allow-code", CODE_WORDS, action=_permit)]
 
 
 @contextlib.contextmanager
-def _exit_codes(ctx: Any) -> Iterator[None]:
+def _exit_codes(ctx: click.Context) -> Iterator[None]:
     """Turn errors into one line on stderr and an exit code."""
     try:
         yield
     except AirmuscleError as error:
         echo(f"error: {in_options(error.message, ctx.invoked_subcommand)}", err=True)
-        raise typer.Exit(1) from None
+        raise click.exceptions.Exit(1) from None
     except BrokenPipeError:
         raise
     except OSError as error:  # a full disk, a closed terminal
@@ -239,49 +215,44 @@ def _exit_codes(ctx: Any) -> Iterator[None]:
             "error: " + quotable(f"{error.filename or 'output'}: {error.strerror or error}."),
             err=True,
         )
-        raise typer.Exit(1) from None
+        raise click.exceptions.Exit(1) from None
     except KeyboardInterrupt:
         echo("interrupted", err=True)
-        raise typer.Exit(INTERRUPTED) from None
+        raise click.exceptions.Exit(INTERRUPTED) from None
 
 
 @contextlib.contextmanager
 def _printable_usage_errors() -> Iterator[None]:
     """Escape control characters of arguments that a usage error quotes, and replace those that
-    stderr lacks; typer prints the error itself, in UTF-8 where ASCII is asked for.
+    stderr lacks; the parser prints the error itself, in UTF-8 where ASCII is asked for.
     """
     try:
         yield
-    except _UsageError as error:
-        error.message = encodable(quotable(error.message), sys.stderr)
+    except click.exceptions.NoArgsIsHelpError:
         raise
+    except click.UsageError as error:
+        text = encodable(quotable(error.format_message()), sys.stderr)
+        raise click.UsageError(text, error.ctx) from None
 
 
-install_completion_classes()
-app = typer.Typer(cls=LazyCommands, name="airmuscle", no_args_is_help=True, **SETTINGS)
-
-
-def _print_version(requested: bool) -> None:
+def _print_version(ctx: click.Context, requested: bool) -> None:
     if requested:
         from importlib import metadata
 
         echo(f"airmuscle {metadata.version('airmuscle')}")
-        raise typer.Exit
+        ctx.exit()
 
 
 VERSION = "Print the version and exit."
 COMPLETION = "Print the completion script of bash, zsh or fish and exit."
-Version = Annotated[
-    bool, typer.Option("--version", callback=_print_version, is_eager=True, help=VERSION)
-]
+Version = Annotated[bool, CommandOption("--version", VERSION, action=_print_version)]
 Shell = Annotated[
     str | None,
-    typer.Option(metavar="SHELL", callback=print_completion_script, is_eager=True, help=COMPLETION),
+    CommandOption("--completion", COMPLETION, "SHELL", action=print_completion_script),
 ]
 
 
-@app.callback()
-def airmuscle(version: Version = False, completion: Shell = None) -> None:
+def airmuscle() -> None:
     """Models, identification and simulation of pneumatic artificial muscles.
 
     Pressures are gauge pressures unless the unit is an absolute one (bara, kPa(a), psia).
@@ -296,3 +267,14 @@ def airmuscle(version: Version = False, completion: Shell = None) -> None:
           fit
       airmuscle simulate scenario.toml --out run
     """
+
+
+app = LazyCommands(
+    PROGRAM,
+    callback=airmuscle,
+    help=airmuscle.__doc__,
+    params=[parameter_of("version", Version, False), parameter_of("completion", Shell, None)],
+    no_args_is_help=True,
+    context_settings=SETTINGS,
+)
+"""The program with all its commands."""

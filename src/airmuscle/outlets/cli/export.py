@@ -17,7 +17,8 @@ from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
 from ..requests.declaration import Where, check_rules, many, option, optional, request
-from .options import Folder, Json, argument, complete_entry, with_requests
+from .options import Folder, Json, complete_entry, with_requests
+from .parser import Argument
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
@@ -28,7 +29,7 @@ NAMES = (*TARGETS, "arduino", "fmu", "ssp", "mujoco", *WRITERS, "modelica", *STA
 """All values of the option --to."""
 
 SOURCE = "A scenario file or a plant of the library; with --law a library entry or a muscle file."
-Source = Annotated[str, argument("SOURCE", SOURCE, complete_entry)]
+Source = Annotated[str, Argument("SOURCE", SOURCE, complete_entry)]
 
 
 @request

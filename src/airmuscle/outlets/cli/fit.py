@@ -7,8 +7,6 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
 from ...bench.identify.volume_fit import fit_volume, volume_points
@@ -27,7 +25,8 @@ from ..requests import FitRequest, ReadingRequest, check_one_length, fit_request
 from ..requests.declaration import RequestError, option, optional, request
 from .delivery import Execution, deliver, print_result
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, Name, argument, complete_law, with_requests
+from .options import Folder, Json, Name, complete_law, with_requests
+from .parser import Argument, CommandOption
 from .terminal import progress_bars
 
 
@@ -176,9 +175,9 @@ def fit_volume_command(
 LIMIT = "Limit of the validity range; default: that of the muscle."
 LIMITS = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
 MODEL = "The other model: ContractileSurface, Sarosi2012, or a library entry of it."
-Model = Annotated[str, argument("MODEL", MODEL, complete_law)]
+Model = Annotated[str, Argument("MODEL", MODEL, complete_law)]
 OUT = "Muscle file to write, with the other characteristic."
-Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help=OUT)]
+Out = Annotated[Path | None, CommandOption("--out", OUT, "FILE")]
 
 
 @request

@@ -16,11 +16,12 @@ from ...recording.recording import row_notes
 from ..requests import WEAK, ReadingRequest, many, option, optional, request
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, argument, with_requests
+from .options import Folder, Json, with_requests
+from .parser import Argument
 from .terminal import echo
 
 Study = Annotated[
-    Path, argument("STUDY.toml", "A file with [plant], [observed], [fit] and [[record]].")
+    Path, Argument("STUDY.toml", "A file with [plant], [observed], [fit] and [[record]].")
 ]
 
 

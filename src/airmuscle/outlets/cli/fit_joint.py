@@ -6,11 +6,12 @@ from typing import Annotated
 from ...core import check_writable
 from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import Execution, deliver
-from .options import Folder, Json, argument, with_requests
+from .options import Folder, Json, with_requests
+from .parser import Argument
 from .terminal import echo
 
 Episodes = Annotated[
-    Path, argument("EPISODES", "A folder of episodes or bags, or one file with all.")
+    Path, Argument("EPISODES", "A folder of episodes or bags, or one file with all.")
 ]
 
 

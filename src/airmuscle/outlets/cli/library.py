@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ...core import Reference, check_known, leaves, quantity, reference, with_parameters
 from ...files.library import PARTS, UNITS, Entry, load, load_law, model_class, scale_entry
@@ -22,6 +22,7 @@ from ...report.write import rendered_figure, save_table
 from ..requests import RequestError, Where, many, optional, read_pair, request
 from .delivery import print_result, write_result
 from .options import Json, Name, OptionalFolder, with_requests
+from .parser import CommandOption
 from .terminal import echo, print_json, print_table
 
 
@@ -250,7 +251,7 @@ def _data_row(path: Path) -> dict[str, str]:
     return {"name": path.stem, "title": title, "kind": "data set", "provenance": provenance}
 
 
-Bibtex = Annotated[bool, typer.Option("--bibtex", help="Print BibTeX entries.")]
+Bibtex = Annotated[bool, CommandOption("--bibtex", "Print BibTeX entries.")]
 
 
 def cite(name: Name, json: Json = False, bibtex: Bibtex = False) -> None:
@@ -264,7 +265,7 @@ def cite(name: Name, json: Json = False, bibtex: Bibtex = False) -> None:
       airmuscle cite dmsp-20-300 --bibtex >> references.bib
     """
     if json and bibtex:
-        raise typer.BadParameter("--json and --bibtex exclude each other")
+        raise click.BadParameter("--json and --bibtex exclude each other")
     references = reference.cite(load(name))
     if json:
         print_json([dataclasses.asdict(source) for source in references])

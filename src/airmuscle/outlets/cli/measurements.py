@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
-import typer
+import click
 
 import airmuscle as am
 
@@ -22,13 +22,14 @@ from ...recording.recording import row_notes
 from ...report.chapter import Chapter
 from ..requests import ReadingRequest, option, optional, request
 from .delivery import deliver
-from .options import Json, OptionalFolder, argument, complete_data, with_requests
+from .options import Json, OptionalFolder, complete_data, with_requests
+from .parser import Argument
 from .terminal import echo, print_json, progress_bars
 
 MEASURED = (
     "CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
 )
-Files = Annotated[list[Path], argument("FILES", MEASURED, complete_data)]
+Files = Annotated[list[Path], Argument("FILES", MEASURED, complete_data)]
 _OPTIONS = {
     "units": "unit",
     "columns": "column",
@@ -87,7 +88,7 @@ INSPECTED = (
     "Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard"
     " input."
 )
-AnyFiles = Annotated[list[str], argument("FILES", INSPECTED)]
+AnyFiles = Annotated[list[str], Argument("FILES", INSPECTED)]
 
 
 @with_requests
@@ -130,8 +131,8 @@ def inspect(
     )
 
 
-Source = Annotated[str, argument("FILE", "A file, folder or glob pattern, as for inspect.")]
-Target = Annotated[Path, argument("TARGET", f"The file to write: {', '.join(EXTENSIONS)}.")]
+Source = Annotated[str, Argument("FILE", "A file, folder or glob pattern, as for inspect.")]
+Target = Annotated[Path, Argument("TARGET", f"The file to write: {', '.join(EXTENSIONS)}.")]
 
 
 @request
@@ -168,7 +169,7 @@ def convert(
       airmuscle convert run/recording.csv plain.csv --plain
     """
     if request.plain and target.suffix.lower() != ".csv":
-        raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
+        raise click.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
     all_rows = 2**62  # no file has as many

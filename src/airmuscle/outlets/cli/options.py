@@ -5,16 +5,17 @@ names by the shell.
 import functools
 import inspect
 import math
-import os
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
-import typer
+import click
+from click.shell_completion import get_completion_class
 
 from ...core import alternatives
 from ...files.library.files import list_data, list_laws, list_library, list_plants
 from ..requests.declaration import Option, RequestError, build, options_of
+from .parser import Argument, CommandOption
 from .terminal import echo
 
 SHELLS = ("bash", "zsh", "fish")
@@ -40,50 +41,33 @@ complete_model = _beginning_with(lambda: (*list_laws(), *list_plants()))
 """Names of muscles, laws and plants, for an argument that also takes their files."""
 
 
-def argument(metavar: str, meaning: str, complete: Callable[[str], list[str]] | None = None) -> Any:
-    """Declare an argument of a command: its placeholder, its help text, and the completion of its
-    names.
-    """
-    return typer.Argument(metavar=metavar, help=meaning, autocompletion=complete)
-
-
 NAME = "A library entry, a unique prefix of its name, or a muscle file (TOML)."
-Name = Annotated[str, argument("NAME", NAME, complete_entry)]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON in SI units instead of a table.")]
+Name = Annotated[str, Argument("NAME", NAME, complete_entry)]
+Json = Annotated[bool, CommandOption("--json", "Print JSON in SI units instead of a table.")]
 Folder = Annotated[
-    Path, typer.Option("--out", metavar="DIR", help="Output folder; created if it does not exist.")
+    Path, CommandOption("--out", "Output folder; created if it does not exist.", "DIR")
 ]
 """An output folder that the command always writes."""
 OptionalFolder = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Output folder for figures and data; default: none."),
+    CommandOption("--out", "Output folder for figures and data; default: none.", "DIR"),
 ]
 
 
-def print_completion_script(shell: str | None) -> None:
+def print_completion_script(ctx: click.Context, shell: str | None) -> None:
     """Print the completion script of a shell and exit; nothing happens without a shell. Raises
     BadParameter.
     """
     if shell is None:
         return
-    if shell not in SHELLS:
-        raise typer.BadParameter(
+    kind = get_completion_class(shell) if shell in SHELLS else None
+    if kind is None:
+        raise click.BadParameter(
             f"'{shell}' is not supported{alternatives(shell, SHELLS, 'allowed are')}"
         )
-    from typer._completion_shared import get_completion_script
-
-    echo(get_completion_script(prog_name=PROGRAM, complete_var=REQUEST, shell=shell))
-    raise typer.Exit
-
-
-def install_completion_classes() -> None:
-    """Prepare typer for the completion requests of these scripts, which arrive in environment
-    variables.
-    """
-    if REQUEST in os.environ:
-        from typer._completion_classes import completion_init
-
-        completion_init()
+    script = kind(ctx.command, {}, PROGRAM, REQUEST)
+    echo(script.source_template % script.source_vars())
+    ctx.exit()
 
 
 Command = TypeVar("Command", bound=Callable[..., None])
@@ -119,7 +103,7 @@ def with_requests(command: Command) -> Command:
                 )
             command(**values)
         except RequestError as error:
-            raise typer.BadParameter(str(error)) from None
+            raise click.BadParameter(str(error)) from None
 
     setattr(expanded, "__signature__", inspect.Signature(parameters))  # noqa: B010
     expanded.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
@@ -137,20 +121,19 @@ def _parameter(declared: Option) -> inspect.Parameter:
     kind: Any = str if as_text else declared.kind
     if declared.repeated:
         kind = list[kind]
-    settings: dict[str, Any] = {
-        "metavar": (
-            declared.metavar or ("QUANTITY" if declared.unit else _METAVARS.get(declared.kind))
-        ),
-        "help": declared.meaning,
-    }
-    if declared.complete is not None:
-        settings["autocompletion"] = declared.complete
-    if declared.kind is int:
-        low, high = (int(bound) if math.isfinite(bound) else None for bound in declared.bounds)
-        settings |= {"min": low, "max": high}
+    low, high = (int(bound) if math.isfinite(bound) else None for bound in declared.bounds)
+    parsed = CommandOption(
+        flag_of(declared),
+        declared.meaning,
+        declared.metavar or ("QUANTITY" if declared.unit else _METAVARS.get(declared.kind)),
+        (low, high) if declared.kind is int else (None, None),
+        declared.complete,
+    )
     default = inspect.Parameter.empty if declared.needed else declared.default
     taken: Any = kind if default is not None else kind | None
-    annotation = Annotated[taken, typer.Option(flag_of(declared), **settings)]
     return inspect.Parameter(
-        declared.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
+        declared.name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=default,
+        annotation=Annotated[taken, parsed],
     )

@@ -13,15 +13,16 @@ from ...recording import Recording
 from ..requests import ReadingRequest, RequestError, Where, many, optional, request
 from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
-from .options import Folder, Json, argument, complete_model, with_requests
+from .options import Folder, Json, complete_model, with_requests
+from .parser import Argument
 
 MODEL = (
     "A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the"
     " library."
 )
-Model = Annotated[str, argument("MODEL", MODEL, complete_model)]
+Model = Annotated[str, Argument("MODEL", MODEL, complete_model)]
 RECORDS = "Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic."
-Records = Annotated[list[Path], argument("FILES", RECORDS)]
+Records = Annotated[list[Path], Argument("FILES", RECORDS)]
 
 
 @request

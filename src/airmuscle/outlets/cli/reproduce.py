@@ -19,7 +19,8 @@ from ...report.claims import (
 )
 from ...report.formatting import to_plain
 from ...report.text import GAP
-from .options import Folder, argument
+from .options import Folder
+from .parser import Argument
 from .terminal import echo, print_table, terminal_width
 
 HEADERS = ("claim", "expected", "reproduced", "verdict")
@@ -31,7 +32,7 @@ PREFIXES = {Kind.CLAIM: "", Kind.FINDING: "comparison: ", Kind.CHECK: "check: "}
 
 
 PAPERS = "saga2007, borzikova, hosovsky, or a prefix of one; default: all."
-Papers = Annotated[list[str] | None, argument("PAPER", PAPERS)]
+Papers = Annotated[list[str] | None, Argument("PAPER", PAPERS)]
 
 
 def reproduce(papers: Papers = None, out: Folder = Path("report")) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+import click
 
 from ...bench.readers import write
 from ...core import SimulationError, atomic_folder, check_writable
@@ -15,11 +15,12 @@ from ...report.chapter import Chapter
 from ...report.data import as_json
 from ..requests import many, read_pair, request
 from .delivery import Files, deliver, write_result
-from .options import Folder, Json, argument, complete_plant, with_requests
+from .options import Folder, Json, complete_plant, with_requests
+from .parser import Argument, CommandOption
 from .terminal import echo, print_json
 
 SCENARIO = "A file with [plant], [input] and [run], or the name of a plant of the library."
-ScenarioFile = Annotated[Path, argument("SCENARIO.toml", SCENARIO, complete_plant)]
+ScenarioFile = Annotated[Path, Argument("SCENARIO.toml", SCENARIO, complete_plant)]
 
 
 @request
@@ -76,10 +77,10 @@ def _results(scenario: Scenario, recording: Recording) -> tuple[list[Chapter], s
 
 
 OfMuscles = Annotated[
-    bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")
+    bool, CommandOption("--muscle", "The schema of muscle files; default: of scenario files.")
 ]
 WRITTEN = "Output file; default: print to stdout."
-SchemaFile = Annotated[Path | None, typer.Option("--out", metavar="FILE", help=WRITTEN)]
+SchemaFile = Annotated[Path | None, CommandOption("--out", WRITTEN, "FILE")]
 
 
 def schema(muscle: OfMuscles = False, out: SchemaFile = None) -> None:
@@ -100,7 +101,7 @@ def schema(muscle: OfMuscles = False, out: SchemaFile = None) -> None:
         print_json(content)
         return
     if not out.name:
-        raise typer.BadParameter("--out must be a file name, such as scenario.schema.json")
+        raise click.BadParameter("--out must be a file name, such as scenario.schema.json")
     with atomic_folder(out.parent) as folder:
         (folder / out.name).write_text(as_json(content), encoding="utf-8")
     echo(f"schema: {out}")

@@ -8,11 +8,12 @@ from ..requests.declaration import option, optional, request
 from ..studio import export_page, serve
 from ..studio.page import open_sheets
 from ..studio.server import warning_of
-from .options import argument, complete_law, with_requests
+from .options import complete_law, with_requests
+from .parser import Argument
 from .terminal import echo
 
 OPENED = "Muscles or laws to open: library entries or muscle files (TOML)."
-Names = Annotated[list[str] | None, argument("[NAME]...", OPENED, complete_law)]
+Names = Annotated[list[str] | None, Argument("NAME", OPENED, complete_law)]
 
 
 @request

@@ -8,11 +8,12 @@ from ...design.study import load_study, run_study
 from ...design.study.result import RESULTS_FILE, write_study
 from ...engine.processes import process_pool
 from .delivery import Execution, print_result
-from .options import Folder, Json, argument, with_requests
+from .options import Folder, Json, with_requests
+from .parser import Argument
 from .terminal import counted_progress
 
 StudyFile = Annotated[
-    Path, argument("STUDY.toml", "A file with scenario, [vary], [design] and [metrics].")
+    Path, Argument("STUDY.toml", "A file with scenario, [vary], [design] and [metrics].")
 ]
 
 

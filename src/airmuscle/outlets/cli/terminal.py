@@ -156,7 +156,7 @@ def echo(text: str = "", *, err: bool = False) -> None:
 
 
 def _print(text: str, stream: TextIO) -> None:
-    """Write lines as they are; `typer.echo` would write UTF-8 where ASCII is asked for."""
+    """Write lines as they are; `click.echo` would write UTF-8 where ASCII is asked for."""
     stream.write(text + "\n")
     stream.flush()
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from ...core import check_writable
 from ...design import Perturbations, RobustObjective, Tuning
 from ...design.tuning import (
@@ -22,7 +20,8 @@ from ...report.write import save_table
 from ..requests.declaration import RequestError, many, option, request
 from .delivery import Execution, deliver
 from .interruption import check_interrupted
-from .options import Folder, Json, argument, with_requests
+from .options import Folder, Json, with_requests
+from .parser import Argument, CommandOption
 from .terminal import echo, progress_bars
 
 INDICES: dict[str, type[TrackingIndex]] = {
@@ -32,10 +31,10 @@ INDICES: dict[str, type[TrackingIndex]] = {
 }
 """Tracking indices by their names."""
 ScenarioFile = Annotated[
-    Path, argument("SCENARIO.toml", "A scenario file with [input.controller].")
+    Path, Argument("SCENARIO.toml", "A scenario file with [input.controller].")
 ]
 SAVE = "Scenario with the tuned gains; default: SCENARIO-tuned.toml next to the scenario."
-Save = Annotated[Path | None, typer.Option(metavar="FILE.toml", help=SAVE)]
+Save = Annotated[Path | None, CommandOption("--save", SAVE, "FILE.toml")]
 
 
 def read_factors(text: str, where: str) -> tuple[float, ...]:
