@@ -15,7 +15,7 @@ from sensitivities import DURATION, FREE, SENSORS, case
 
 import airmuscle as am
 from airmuscle.bench import fit_dynamic
-from airmuscle.bench.identify.dynamic.fit import initial_guesses
+from airmuscle.bench.dynamics.fit import initial_guesses
 from airmuscle.core import tree
 
 STARTS = 100

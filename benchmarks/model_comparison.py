@@ -18,7 +18,7 @@ from startup import program
 
 import airmuscle as am
 from airmuscle.bench import find_loops, fit_loop
-from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.statics.candidates import blank_surface
 
 LENGTHS = (0.15, 0.2, 0.3)
 """Resting lengths [m] of the muscles (chosen)."""

@@ -22,9 +22,9 @@ import numpy as np
 import pandas as pd
 
 import airmuscle as am
-from airmuscle.bench.identify.candidate_scores import count_parameters
-from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.compared_points import (
+from airmuscle.bench.statics.candidate_scores import count_parameters
+from airmuscle.bench.statics.candidates import blank_surface
+from airmuscle.bench.statics.compared_points import (
     evaluated_rows,
     force_residuals,
     residuals_of_rows,

@@ -15,9 +15,9 @@ from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
 from airmuscle.bench import Experiment, InitialConditions
-from airmuscle.bench.identify.dynamic.experiment import make_unknowns
-from airmuscle.bench.identify.dynamic.problem import DynamicFitProblem
-from airmuscle.bench.identify.dynamic.record_model import RecordModel
+from airmuscle.bench.dynamics.experiment import make_unknowns
+from airmuscle.bench.dynamics.problem import DynamicFitProblem
+from airmuscle.bench.dynamics.record_model import RecordModel
 from airmuscle.core import tree
 from airmuscle.engine.compile.functions import trace_system
 from airmuscle.engine.compile.ir.instructions import Code, Operand, Operation, instructions

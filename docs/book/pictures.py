@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from airmuscle import characteristic, geometry, physics
-from airmuscle.bench.identify.hysteresis import plot_loops
+from airmuscle.bench.hysteresis import plot_loops
 from airmuscle.core import plotting
 from airmuscle.core.errors import AirmuscleError
 from airmuscle.physics import (

@@ -17,6 +17,18 @@ HEAVY = {
     *("numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "yaml", "jax"),
     "casadi",
 }
+FITS = {
+    f"airmuscle.bench.{room}"
+    for room in (
+        "campaign",
+        "prediction",
+        "statics",
+        "hysteresis",
+        "dynamics",
+        "diagnosis",
+        "estimation",
+    )
+}
 SIMULATION = """
 import airmuscle as am
 valve = am.Valve(conductance=1e-9, critical_ratio=0.4)
@@ -27,11 +39,11 @@ for method in (am.Rodas4(), am.RungeKutta4(1e-3)):
 STARTS = {
     "import airmuscle": (
         "import airmuscle",
-        {*HEAVY, "llvmlite", "numpy.ma", "airmuscle.bench.identify"},
+        {*HEAVY, *FITS, "llvmlite", "numpy.ma"},
     ),
     "simulate": (
         SIMULATION,
-        {*HEAVY, "numpy.ma", "airmuscle.bench.identify", "airmuscle.engine.compile.kernels.rodas4"},
+        {*HEAVY, *FITS, "numpy.ma", "airmuscle.engine.compile.kernels.rodas4"},
     ),
     "airmuscle evaluate": (
         (
@@ -40,13 +52,14 @@ STARTS = {
         ),
         {
             *HEAVY,
-            *("llvmlite", "airmuscle.bench.identify", "airmuscle.bench.readers.formats"),
+            *FITS,
+            *("llvmlite", "airmuscle.bench.readers.formats"),
             "airmuscle.engine.compile.program",
         },
     ),
     "airmuscle convert": (
         "from airmuscle.outlets.cli import app\napp(['convert', '--help'], standalone_mode=False)",
-        (HEAVY | {"airmuscle.bench.identify", "airmuscle.physics"}),
+        HEAVY | FITS - {"airmuscle.bench.diagnosis"} | {"airmuscle.physics"},
     ),
 }
 
@@ -69,8 +82,8 @@ def test_a_process_does_not_import_modules_that_it_does_not_need(start):
 
 def test_names_that_are_imported_on_use_are_available():
     assert am.fit is am.bench.fit
-    assert am.fit.__wrapped__ is sys.modules["airmuscle.bench.identify"].fit
-    assert am.Fit is sys.modules["airmuscle.bench.identify"].Fit
+    assert am.fit.__wrapped__ is sys.modules["airmuscle.bench.statics"].fit
+    assert am.Fit is sys.modules["airmuscle.bench.estimation"].Fit
     assert am.bench is sys.modules["airmuscle.bench"]
     assert {"fit", "Fit"} <= set(dir(am))
     with pytest.raises(AttributeError, match="module 'airmuscle' has no attribute 'fitt'"):

@@ -11,7 +11,7 @@ from dynamic_study import plant_table
 
 from airmuscle import load
 from airmuscle.bench import Campaign, ColumnMapping, LeftOutStage, RowReader, classify_records, read
-from airmuscle.bench.identify.campaign import fit_fill_stage
+from airmuscle.bench.campaign import fit_fill_stage
 from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import ColumnError, ParameterError, UnitError
 from airmuscle.files import load_dynamic_fit, load_plant_model, load_scenario

@@ -13,7 +13,14 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import write
-from airmuscle.bench.baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, fit_arx, skill
+from airmuscle.bench.prediction.baselines import (
+    ARX,
+    PERSISTENCE,
+    TimedRecord,
+    baseline_errors,
+    fit_arx,
+    skill,
+)
 from airmuscle.files import load
 from airmuscle.recording import Recording
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import fit
-from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.statics import blank_surface
 from airmuscle.physics import Sarosi2012
 from airmuscle.recording import Recording
 

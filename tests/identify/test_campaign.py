@@ -27,8 +27,7 @@ from airmuscle.bench import (
     read,
     standard_candidates,
 )
-from airmuscle.bench.identify import PlannedRun
-from airmuscle.bench.identify.campaign import (
+from airmuscle.bench.campaign import (
     VolumeChange,
     count_pulses,
     creep_stretches,
@@ -38,7 +37,8 @@ from airmuscle.bench.identify.campaign import (
     held_steady,
     relate_volumes,
 )
-from airmuscle.bench.identify.campaign.campaign import _levels
+from airmuscle.bench.campaign.campaign import _levels
+from airmuscle.bench.statics import PlannedRun
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import BoucWen, Braid, CreepElements, NoFriction
 from airmuscle.recording import Recording
@@ -527,7 +527,7 @@ def test_a_planned_run_is_described_by_its_levels():
 
 def test_the_specimen_that_does_not_follow_the_others_is_noted(monkeypatch):
     """Four muscles of one type; the third has 70 % of the force."""
-    kept = "airmuscle.bench.identify.model_selection.started_candidates"
+    kept = "airmuscle.bench.statics.model_selection.started_candidates"
     monkeypatch.setattr(kept, lambda runs: (standard_candidates(runs)[2:5], ()))
     random = np.random.default_rng(2)
     time = np.linspace(0.0, 60.0, 60)

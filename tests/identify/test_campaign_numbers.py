@@ -19,18 +19,18 @@ from airmuscle.bench import (
     fit_creep,
     fit_held_creep,
 )
-from airmuscle.bench.identify.campaign import (
+from airmuscle.bench.campaign import (
     check_one_rig,
     find_motion,
     find_pressure_steps,
     volume_change,
     with_force,
 )
-from airmuscle.bench.identify.campaign.friction_and_release import _mass
-from airmuscle.bench.identify.campaign.static_stage import _band, _inner, _left_out_residuals
-from airmuscle.bench.identify.dynamic import SensorLocation, searches_at_lowest
-from airmuscle.bench.identify.dynamic.candidate_records import _Context
-from airmuscle.bench.identify.dynamic.fit import _describe_model_error
+from airmuscle.bench.campaign.friction_and_release import _mass
+from airmuscle.bench.campaign.static_stage import _band, _inner, _left_out_residuals
+from airmuscle.bench.dynamics import SensorLocation, searches_at_lowest
+from airmuscle.bench.dynamics.candidate_records import _Context
+from airmuscle.bench.dynamics.fit import _describe_model_error
 from airmuscle.engine import Schedule
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import (

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.bench.identify.campaign import VolumeChange, relate_volumes
+from airmuscle.bench.campaign import VolumeChange, relate_volumes
 
 CONTRACTIONS = np.array([0.0, 0.1, 0.2])
 CHANGE = VolumeChange((1.5e-4, -1.2e-4), 0.3, 0.2)

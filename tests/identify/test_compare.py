@@ -31,16 +31,15 @@ from airmuscle.bench import (
     standard_candidates,
     write,
 )
-from airmuscle.bench.identify import (
-    ALWAYS_FITTED,
+from airmuscle.bench.estimation import ALWAYS_FITTED, default_split
+from airmuscle.bench.statics import (
     FoldScore,
+    compare_chapter,
     compare_chapters,
-    default_split,
     evaluate_force,
     excess_error,
     recommend,
 )
-from airmuscle.bench.identify.compare_chapter import compare_chapter
 from airmuscle.core import model, parameter
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.outlets.requests import FitRequest, build

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import Creep, creep_elements, find_holds, fit_creep
-from airmuscle.bench.identify.campaign import HeldRows
-from airmuscle.bench.identify.hysteresis import CreepFit
+from airmuscle.bench.campaign import HeldRows
+from airmuscle.bench.hysteresis import CreepFit
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import CreepElements
 from airmuscle.recording import Recording

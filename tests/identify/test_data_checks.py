@@ -45,14 +45,14 @@ from airmuscle.bench import (
     fit,
     read,
 )
-from airmuscle.bench.identify import blank_surface
-from airmuscle.bench.identify.campaign import fit_static_stage
-from airmuscle.bench.identify.data_checks import check_data
+from airmuscle.bench.campaign import fit_static_stage
+from airmuscle.bench.diagnosis.data_checks import check_data
+from airmuscle.bench.statics import blank_surface
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import Braid, CreepElements, NoFriction, TonduLopez2000
 from airmuscle.recording import Recording
 
-EXAMINED = "airmuscle.bench.identify.fit_points.check_data"
+EXAMINED = "airmuscle.bench.statics.fit_points.check_data"
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
 

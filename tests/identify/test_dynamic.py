@@ -23,7 +23,7 @@ from airmuscle.bench import (
     predict_dynamic,
     rank_records,
 )
-from airmuscle.bench.identify.dynamic import DynamicProfile, cross_predict
+from airmuscle.bench.dynamics import DynamicProfile, cross_predict
 from airmuscle.core import StateVariable, System, model, parameter, tree
 from airmuscle.engine import InputSignal, PiecewiseLinear, Schedule, simulate
 from airmuscle.engine.run import BoundIntegrator
@@ -744,12 +744,12 @@ def test_a_start_left_after_a_first_look_goes_on_as_if_it_had_not_been(monkeypat
     free = ("circuit.fill.conductance", "circuit.supply.pressure")
     question = {"free": free, "observed": {"pressure": 300.0}, "starts": 5}
     whole = fit_dynamic(plant, [rigid_fill(plant)], **question)
-    monkeypatch.setattr("airmuscle.bench.identify.dynamic.fit.SCREENING_RUNS", 3)
-    monkeypatch.setattr("airmuscle.bench.identify.dynamic.fit.SCREENING_RATIO", np.inf)
+    monkeypatch.setattr("airmuscle.bench.dynamics.fit.SCREENING_RUNS", 3)
+    monkeypatch.setattr("airmuscle.bench.dynamics.fit.SCREENING_RATIO", np.inf)
     np.testing.assert_array_equal(
         fit_dynamic(plant, [rigid_fill(plant)], **question).costs, whole.costs
     )
-    monkeypatch.setattr("airmuscle.bench.identify.dynamic.fit.SCREENING_RATIO", 1.0)
+    monkeypatch.setattr("airmuscle.bench.dynamics.fit.SCREENING_RATIO", 1.0)
     left = fit_dynamic(plant, [rigid_fill(plant)], **question)
     assert left.costs[-1] > 10 * whole.costs[-1]
     assert left.costs[0] == pytest.approx(whole.costs[0], rel=1e-6)
@@ -778,8 +778,8 @@ def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
         *[10_000] * (len(allowed) - 2),
         1_000_000,
     ]  # the last is that of the result
-    monkeypatch.setattr("airmuscle.bench.identify.dynamic.problem.MIN_STEP_BUDGET", 10)
-    monkeypatch.setattr("airmuscle.bench.identify.dynamic.problem.STEP_BUDGET_FACTOR", 0.5)
+    monkeypatch.setattr("airmuscle.bench.dynamics.problem.MIN_STEP_BUDGET", 10)
+    monkeypatch.setattr("airmuscle.bench.dynamics.problem.STEP_BUDGET_FACTOR", 0.5)
     stays = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert stays[path].value == truth(guess, path)
 

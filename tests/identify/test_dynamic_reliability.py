@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import Estimate, Experiment, InitialConditions, fit_dynamic
-from airmuscle.bench.identify.dynamic import (
+from airmuscle.bench.dynamics import (
     describe_bounds,
     describe_flatness,
     describe_optima,

@@ -11,7 +11,8 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.bench.identify import (
+from airmuscle.bench.estimation.statistics import correlation_index
+from airmuscle.bench.statics import (
     CONTRACTION_FALLS,
     RISES_WITH_FORCE,
     Chebyshev,
@@ -25,7 +26,6 @@ from airmuscle.bench.identify import (
     fit_nonlinear,
     slope_constraints,
 )
-from airmuscle.bench.identify.statistics import correlation_index
 from airmuscle.core import autodiff
 from airmuscle.errors import IdentificationError
 from airmuscle.papers.borzikova_surfaces import sample

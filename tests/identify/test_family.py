@@ -14,7 +14,7 @@ import pytest
 from widths import widened
 
 from airmuscle.bench import Candidate, SpecimenSplit, compare, fit, standard_candidates
-from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.statics import blank_surface
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, to_toml
 from airmuscle.files.library import Location

@@ -26,12 +26,7 @@ from airmuscle.bench import (
     stated_ambient,
     write,
 )
-from airmuscle.bench.identify.campaign import (
-    fit_fill_stage,
-    fit_release_stage,
-    stage_result,
-    volume_change,
-)
+from airmuscle.bench.campaign import fit_fill_stage, fit_release_stage, stage_result, volume_change
 from airmuscle.engine import Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError
 from airmuscle.physics import (
@@ -249,7 +244,7 @@ def test_standard_errors_contain_the_scatter_of_records_from_rooms_of_unstated_t
     errors of the rows.
     """
     monkeypatch.setattr(
-        "airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1
+        "airmuscle.bench.campaign.fill_records.TUBE_STARTS", 1
     )  # for the time of the test
     rooms = (Ambient(temperature=each) for each in (290.15, 296.15, 302.15))
     recordings = [
@@ -448,7 +443,7 @@ def test_the_air_of_a_tank_at_rest_follows_its_supply_in_every_iterate():
 def test_records_that_the_model_does_not_follow_are_reported_as_a_misfit(monkeypatch):
     """The valve closes to a third while the muscle fills; the model has one conductance."""
     monkeypatch.setattr(
-        "airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1
+        "airmuscle.bench.campaign.fill_records.TUBE_STARTS", 1
     )  # for the time of the test
     throttled = {"fill": ((0.5, 1.0), (0.7, 0.3), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
     stage = stage_of([record(c, throttled, i) for i, c in enumerate(CONTRACTIONS[:2])])

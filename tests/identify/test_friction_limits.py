@@ -23,8 +23,8 @@ from airmuscle.bench import (
     fit_loop,
     preferred_fit,
 )
-from airmuscle.bench.identify.campaign import fit_friction_stage
-from airmuscle.bench.identify.hysteresis import data_limits, make_loop_series
+from airmuscle.bench.campaign import fit_friction_stage
+from airmuscle.bench.hysteresis import data_limits, make_loop_series
 from airmuscle.physics import BoucWen, CreepElements, Dahl, LuGre, MaxwellSlip
 from airmuscle.recording import Recording
 

@@ -24,8 +24,8 @@ from airmuscle.bench import (
     initial_friction_laws,
     motion_direction,
 )
-from airmuscle.bench.identify import aicc, effective_sample_size, f_test_p_value
-from airmuscle.bench.identify.hysteresis import branch_gap, loop_path, plot_loops, repeat_difference
+from airmuscle.bench.estimation import aicc, effective_sample_size, f_test_p_value
+from airmuscle.bench.hysteresis import branch_gap, loop_path, plot_loops, repeat_difference
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import (
     BoucWen,

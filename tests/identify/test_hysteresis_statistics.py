@@ -26,8 +26,7 @@ from airmuscle.bench import (
     fit_jointly,
     identified_friction,
 )
-from airmuscle.bench.identify import VolumePoints, fit_volume, volume_points
-from airmuscle.bench.identify.hysteresis import (
+from airmuscle.bench.hysteresis import (
     Axis,
     DataLimits,
     agreement_of_run,
@@ -35,7 +34,8 @@ from airmuscle.bench.identify.hysteresis import (
     force_amplitude,
     parameters_on_bounds,
 )
-from airmuscle.bench.identify.hysteresis.creep import _drifts, _fit_elements
+from airmuscle.bench.hysteresis.creep import _drifts, _fit_elements
+from airmuscle.bench.statics import VolumePoints, fit_volume, volume_points
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import Dahl, IdentifiedFriction, MaxwellSlip, NoFriction
 from airmuscle.recording import Recording

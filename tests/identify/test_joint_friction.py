@@ -21,7 +21,7 @@ from airmuscle.bench import (
     fit_loop,
     identified_friction,
 )
-from airmuscle.bench.identify.hysteresis import make_loop_series, search_parameters
+from airmuscle.bench.hysteresis import make_loop_series, search_parameters
 from airmuscle.physics import (
     BoucWen,
     Dahl,

@@ -38,7 +38,7 @@ from laboratories import (
 )
 
 from airmuscle.bench import ColumnMapping, Fit, fit, read
-from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.statics import blank_surface
 from airmuscle.errors import AirmuscleError, AirmuscleWarning
 
 MAX_ERROR = 0.02

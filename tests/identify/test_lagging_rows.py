@@ -12,7 +12,7 @@ import pytest
 from laboratories import MUSCLE, RESTING_LENGTH
 
 from airmuscle.bench import Candidate, compare, fit, predict_static
-from airmuscle.bench.identify import blank_surface, find_lagging_rows
+from airmuscle.bench.statics import blank_surface, find_lagging_rows
 from airmuscle.recording import Recording
 
 PULSE = 4e4

@@ -37,10 +37,10 @@ from airmuscle.bench import (
     fit_regulator,
     identify_campaign,
 )
-from airmuscle.bench.identify import fit_volume, optimal_design, volume_points
-from airmuscle.bench.identify.campaign import campaign_chapters
-from airmuscle.bench.identify.hysteresis import find_holds, find_loops, fit_creep, fit_loop
-from airmuscle.bench.identify.prediction import predict_static
+from airmuscle.bench.campaign import campaign_chapters
+from airmuscle.bench.hysteresis import find_holds, find_loops, fit_creep, fit_loop
+from airmuscle.bench.prediction import predict_static
+from airmuscle.bench.statics import fit_volume, optimal_design, volume_points
 from airmuscle.core import tree
 from airmuscle.design import LoopCase, tune
 from airmuscle.design.sizing import LiftRequirement, SizingConditions, size_muscles

@@ -22,7 +22,7 @@ from airmuscle.bench import (
     find_length_errors,
     select_for_both,
 )
-from airmuscle.bench.identify import blank_surface, compare_chapter, corrected_length
+from airmuscle.bench.statics import blank_surface, comparison_chapter, corrected_length
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, EffectiveLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording
@@ -125,7 +125,7 @@ def test_a_law_that_is_not_determined_for_one_purpose_is_not_the_one_law(monkeyp
     assert found.comparisons[0].ranking[0].candidate is family
     assert found.recommended[0].candidate is surface
     monkeypatch.setattr(
-        compare_chapter,
+        comparison_chapter,
         "compare_splits",
         lambda runs, _, splits, **__: tuple(
             compare(two, [family if split == RunSplit() else surface], leave_out=split)

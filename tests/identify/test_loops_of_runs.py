@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import classify_records, find_loops, fit_jointly, fit_loop
-from airmuscle.bench.identify.campaign import fit_friction_stage
-from airmuscle.bench.identify.hysteresis import preferred_fit
+from airmuscle.bench.campaign import fit_friction_stage
+from airmuscle.bench.hysteresis import preferred_fit
 from airmuscle.errors import AirmuscleWarning, IdentificationError
 from airmuscle.physics import CreepElements, MaxwellSlip
 from airmuscle.recording import Recording

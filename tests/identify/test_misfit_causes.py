@@ -23,7 +23,7 @@ from laboratories import (
 )
 
 from airmuscle.bench import ColumnMapping, compare, fit, read
-from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.statics import blank_surface
 from airmuscle.errors import AirmuscleWarning
 
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)

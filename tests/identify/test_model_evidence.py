@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import f as fisher
 
-from airmuscle.bench.identify import aicc, effective_sample_size, f_test_p_value, format_p_value
+from airmuscle.bench.estimation import aicc, effective_sample_size, f_test_p_value, format_p_value
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from command_line import airmuscle
 from joints import chosen_muscle
 
 from airmuscle.bench import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
-from airmuscle.bench.identify.dynamic.candidate_records import candidate_records
+from airmuscle.bench.dynamics.candidate_records import candidate_records
 from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import load

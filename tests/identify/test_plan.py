@@ -13,8 +13,8 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import BenchLimits, fit, read_csv
-from airmuscle.bench.identify import candidate_runs, optimal_design
-from airmuscle.bench.identify.experiment_design import _log_determinant, _select_runs
+from airmuscle.bench.statics import candidate_runs, optimal_design
+from airmuscle.bench.statics.experiment_design import _log_determinant, _select_runs
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording

@@ -25,15 +25,9 @@ from airmuscle.bench import (
     select_for_both,
     standard_candidates,
 )
-from airmuscle.bench.identify import (
-    EffectRows,
-    Runs,
-    compared_points,
-    estimate_pooled_covariance,
-    predict_effects,
-    static_fit,
-)
-from airmuscle.bench.identify.static_fit_chapter import equation_section
+from airmuscle.bench.estimation import EffectRows, Runs, estimate_pooled_covariance
+from airmuscle.bench.statics import compared_points, predict_effects, static_fit
+from airmuscle.bench.statics.static_fit_chapter import equation_section
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
 from airmuscle.outlets.requests import FitRequest, build

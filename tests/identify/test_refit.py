@@ -16,20 +16,18 @@ from widths import widened
 
 import airmuscle as am
 from airmuscle.bench import Candidate, RunSplit, bootstrap, compare
-from airmuscle.bench.identify import (
-    FitPoints,
+from airmuscle.bench.estimation import (
     GroupRefits,
     KnownMinima,
     LeastSquaresSolution,
-    blank_surface,
     bootstrapping,
     find_initial_values,
     fitted_quantity_of,
-    refit,
     solve_iteratively,
     solve_least_squares,
 )
-from airmuscle.bench.identify.gauss_newton import gauss_newton
+from airmuscle.bench.estimation.least_squares_descent import gauss_newton
+from airmuscle.bench.statics import FitPoints, blank_surface, refit
 from airmuscle.core import autodiff, tree
 from airmuscle.physics import (
     Braid,

@@ -9,19 +9,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.bench import segment
-from airmuscle.bench.identify import (
-    LevelSplit,
-    contradictions,
-    cross_validation,
-    data_checks,
-    levels_of,
-    matched_rows,
-    problem,
-    weighting,
-)
-from airmuscle.bench.identify.dynamic import regulator_fit
-from airmuscle.bench.identify.hysteresis import find_holds, find_loops, loop_data
+from airmuscle.bench import inspection
+from airmuscle.bench.diagnosis import contradictions, data_checks, matched_rows
+from airmuscle.bench.dynamics import regulator_fit
+from airmuscle.bench.estimation import LevelSplit, cross_validation, levels_of, problem, weighting
+from airmuscle.bench.hysteresis import find_holds, find_loops, loop_data
 from airmuscle.bench.joint import episode_inspection
 from airmuscle.recording import Recording
 
@@ -96,7 +88,7 @@ def rows_near(value: float, scale: int = 10) -> int:
 
 
 def sensor_limits(jitter):
-    sensors = segment.estimate_sensors(isometric(jitter))
+    sensors = inspection.estimate_sensors(isometric(jitter))
     return {
         name: (
             sensors[name].upper_limit == pytest.approx(LIMIT, abs=COUNTS["force"] * 1.01)
@@ -109,40 +101,40 @@ def sensor_limits(jitter):
 
 
 def resolutions(jitter):
-    sensors = segment.estimate_sensors(isometric(jitter))
+    sensors = inspection.estimate_sensors(isometric(jitter))
     return {name: float(f"{sensors[name].resolution:.4g}") for name in ("pressure", "force")}
 
 
 def saturated_rows(jitter):
     recording = isometric(jitter)
-    signs = segment.estimate_sensors(recording)["force"].censoring(recording["force"])
+    signs = inspection.estimate_sensors(recording)["force"].censoring(recording["force"])
     limits = weighting.force_limits([recording])
     assert np.array_equal(limits.signs(recording["force"]), signs)
     return rows_near(np.count_nonzero(signs == -1.0), 20), np.count_nonzero(signs == 1.0)
 
 
 def saturation_findings(jitter):
-    texts = [finding.text for finding in segment.inspect(isometric(jitter)).findings]
+    texts = [finding.text for finding in inspection.inspect(isometric(jitter)).findings]
     return [text.partition(" limit, ")[0] for text in texts]
 
 
 def run_kinds(jitter):
     return [
-        [(run.kind.name, run.constant_column, run.swept_columns) for run in segment.find_runs(r)]
+        [(run.kind.name, run.constant_column, run.swept_columns) for run in inspection.find_runs(r)]
         for r in (isometric(jitter), hold(jitter))
     ]
 
 
 def branch_names(jitter):
     return [
-        [(b.name, rows_near(b.interval.start)) for b in segment.find_branches(r)]
+        [(b.name, rows_near(b.interval.start)) for b in inspection.find_branches(r)]
         for r in (isometric(jitter), hold(jitter))
     ]
 
 
 def quasi_static(jitter):
     return [
-        rows_near(np.count_nonzero(segment.quasi_static_rows(r)), 15)
+        rows_near(np.count_nonzero(inspection.quasi_static_rows(r)), 15)
         for r in (isometric(jitter), hold(jitter))
     ]
 
@@ -151,7 +143,7 @@ def plateaus(jitter):
     return [
         [
             tuple(map(rows_near, (p.interval.start, p.interval.stop)))
-            for p in segment.find_plateaus(r, columns=("pressure", "length"))
+            for p in inspection.find_plateaus(r, columns=("pressure", "length"))
         ]
         for r in (isometric(jitter), hold(jitter))
     ]
@@ -159,11 +151,11 @@ def plateaus(jitter):
 
 def rates(jitter):
     recording = isometric(jitter)
-    return [float(f"{segment.rate_of_change(recording, n):.1g}") for n in ("pressure", "length")]
+    return [float(f"{inspection.rate_of_change(recording, n):.1g}") for n in ("pressure", "length")]
 
 
 def outliers(jitter):
-    return [segment.find_outliers(r) for r in (isometric(jitter), hold(jitter))]
+    return [inspection.find_outliers(r) for r in (isometric(jitter), hold(jitter))]
 
 
 def holds(jitter):
@@ -232,7 +224,7 @@ def clipped_pressure(jitter: str) -> Recording:
 
 def end_of_an_episode(jitter):
     values = clipped_pressure(jitter)["pressure"]
-    sensor = segment.estimate_sensors(clipped_pressure(jitter))["pressure"]
+    sensor = inspection.estimate_sensors(clipped_pressure(jitter))["pressure"]
     return round(episode_inspection._end_of_readings(values, sensor) / 1e3)
 
 
@@ -248,8 +240,8 @@ def sampling(jitter):
     if jitter == "rounding":
         doubled = doubled * (1.0 + 1e-12 * np.random.default_rng(3).standard_normal(ROWS))
     both = (
-        segment.analyse_sampling(recording),
-        segment.analyse_sampling(recording.with_columns(time=doubled)),
+        inspection.analyse_sampling(recording),
+        inspection.analyse_sampling(recording.with_columns(time=doubled)),
     )
     return [(len(s.gaps), len(s.repeated_rows), len(s.backward_rows), s.rounded) for s in both]
 
@@ -308,4 +300,4 @@ def test_a_hold_with_noise_is_no_saturation(noise):
     level = np.interp(np.arange(2000), [0, 600, 1400, 2000], [0.0, 300.0, 300.0, 0.0])
     force = np.round(level + random.normal(0.0, noise, 2000))
     recording = Recording({"time": 0.01 * np.arange(2000), "force": force}, "hold")
-    assert segment.estimate_sensors(recording)["force"].upper_limit == np.inf
+    assert inspection.estimate_sensors(recording)["force"].upper_limit == np.inf

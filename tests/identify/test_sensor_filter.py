@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 from laboratories import FORCE, LENGTH, MUSCLE, PRESSURE, RESTING_LENGTH, TIME, filtered, ramps
 
-from airmuscle.bench.identify import (
-    DELAY,
-    EITHER,
-    FILTER,
-    delay_notes,
-    find_delay,
-)
+from airmuscle.bench.diagnosis import DELAY, EITHER, FILTER, delay_notes, find_delay
 from airmuscle.recording import Recording
 
 SPEEDS = {2.0: 0.01, 10.0: 0.05}

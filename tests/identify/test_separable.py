@@ -25,8 +25,7 @@ from airmuscle.bench import (
     fit,
     standard_candidates,
 )
-from airmuscle.bench.identify import (
-    blank_surface,
+from airmuscle.bench.estimation import (
     find_initial_values,
     is_linear_parameter,
     label_folds,
@@ -34,6 +33,7 @@ from airmuscle.bench.identify import (
     shortened_step,
     solve_censored_least_squares,
 )
+from airmuscle.bench.statics import blank_surface
 from airmuscle.core import leaves
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import (

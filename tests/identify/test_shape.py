@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import approximate, find_shape_violations, fit, fit_shape_constrained
-from airmuscle.bench.identify import (
+from airmuscle.bench.statics import (
     FORCE_FALLS,
     RISES_WITH_CONTRACTION,
     blank_surface,

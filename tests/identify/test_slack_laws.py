@@ -25,18 +25,17 @@ from airmuscle.bench import (
     fit,
     standard_candidates,
 )
-from airmuscle.bench.identify import (
+from airmuscle.bench.estimation import batch_sample_size, solve_least_squares
+from airmuscle.bench.statics import (
     FitPoints,
     Slackness,
     SlackPull,
     SpecimenErrors,
-    batch_sample_size,
     eligible_models,
     excess_error,
     odd_specimen_notes,
     recommend,
     slack_pull,
-    solve_least_squares,
 )
 from airmuscle.core import tree
 from airmuscle.errors import IdentificationError

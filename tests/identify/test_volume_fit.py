@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench.identify import VolumePoints, fit_volume, volume_points
+from airmuscle.bench.statics import VolumePoints, fit_volume, volume_points
 from airmuscle.errors import ColumnError, IdentificationError
 from airmuscle.files import load
 from airmuscle.physics import Braid, ChebyshevGeometry, ValidityRange, VirtualWork

@@ -14,7 +14,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import estimate_sensors, fit, write
-from airmuscle.bench.identify import sensor_deviations
+from airmuscle.bench.estimation import sensor_deviations
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
 

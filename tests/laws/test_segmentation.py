@@ -34,7 +34,7 @@ from airmuscle.bench import (
     plateau_points,
     quasi_static_rows,
 )
-from airmuscle.bench.segment import (
+from airmuscle.bench.inspection import (
     branch_column_agreement,
     estimate_noise,
     estimate_resolution,

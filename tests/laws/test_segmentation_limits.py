@@ -23,7 +23,7 @@ from airmuscle.bench import (
     inspect,
     quasi_static_rows,
 )
-from airmuscle.bench.segment import estimate_noise
+from airmuscle.bench.inspection import estimate_noise
 from airmuscle.recording import Recording
 
 RANDOM = np.random.default_rng

@@ -18,8 +18,8 @@ from airmuscle.bench import (
     find_runs,
     inspect,
 )
-from airmuscle.bench.identify.campaign import fit_static_stage
-from airmuscle.bench.segment import find_static_points
+from airmuscle.bench.campaign import fit_static_stage
+from airmuscle.bench.inspection import find_static_points
 from airmuscle.physics import CreepElements, NoFriction
 from airmuscle.recording import Recording
 

@@ -113,7 +113,7 @@ def test_an_interruption_keeps_the_finished_stages(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_static_stage", interrupted)
+    monkeypatch.setattr("airmuscle.bench.campaign.campaign.fit_static_stage", interrupted)
     rig = write_campaign(tmp_path / "rig")
     for path in rig.glob("*isobar_[3456]*"):
         path.unlink()

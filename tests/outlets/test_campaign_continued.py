@@ -38,10 +38,8 @@ def test_a_killed_campaign_does_not_fit_its_finished_stages_again(tmp_path, monk
     def fitted_again(*_):
         raise AssertionError("a finished stage is fitted again")
 
-    monkeypatch.setattr(
-        "airmuscle.bench.identify.campaign.campaign.fit_friction_stage", fitted_again
-    )
-    monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_creep_stage", fitted_again)
+    monkeypatch.setattr("airmuscle.bench.campaign.campaign.fit_friction_stage", fitted_again)
+    monkeypatch.setattr("airmuscle.bench.campaign.campaign.fit_creep_stage", fitted_again)
     done = airmuscle("campaign", rig, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert f"resuming from the results in {out / 'tasks'}" in done.stderr

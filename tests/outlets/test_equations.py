@@ -22,7 +22,7 @@ import pytest
 
 from airmuscle import load
 from airmuscle.bench import fit, fit_chapter
-from airmuscle.bench.identify.static_fit_chapter import equation_section
+from airmuscle.bench.statics.static_fit_chapter import equation_section
 from airmuscle.files import load_data
 from airmuscle.physics import (
     Characteristic,

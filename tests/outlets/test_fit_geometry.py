@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.statics import blank_surface
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import load, save
 from airmuscle.files.library import scale_to_length

@@ -27,8 +27,9 @@ from airmuscle.bench import (
     weakly_determined,
     write,
 )
-from airmuscle.bench.identify import blank_surface, levels_of
-from airmuscle.bench.identify.static_fit_chapter import band_plot
+from airmuscle.bench.estimation import levels_of
+from airmuscle.bench.statics import blank_surface
+from airmuscle.bench.statics.static_fit_chapter import band_plot
 from airmuscle.files import load
 from airmuscle.physics import ContractileSurface, Sarosi2012, ValidityRange
 from airmuscle.recording import Recording

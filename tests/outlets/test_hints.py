@@ -39,7 +39,7 @@ from airmuscle.bench import (
     standard_candidates,
     write,
 )
-from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.statics import blank_surface
 from airmuscle.core import Diagnostic, DiagnosticCode, Hint, HintedText
 from airmuscle.errors import ColumnError, SimulationError
 from airmuscle.files.library import located_errors

@@ -21,7 +21,7 @@ from laboratories import MUSCLE, PRESSURE, changed, ramps, write
 from widths import widened
 
 import airmuscle as am
-from airmuscle.bench.identify import MAX_ACCEPTED, LawMisfit, Scatter
+from airmuscle.bench.diagnosis import MAX_ACCEPTED, LawMisfit, Scatter
 from airmuscle.errors import AirmuscleWarning
 
 SMOOTH = dataclasses.replace(MUSCLE, friction=0.0)

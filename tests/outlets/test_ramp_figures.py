@@ -18,8 +18,8 @@ from command_line import airmuscle
 
 from airmuscle import load
 from airmuscle.bench import Fit, fit, fit_chapter
-from airmuscle.bench.identify import is_pressure_ramp, levels_of
-from airmuscle.bench.identify.static_fit_chapter import band_plot, ramp_plot
+from airmuscle.bench.estimation import is_pressure_ramp, levels_of
+from airmuscle.bench.statics.static_fit_chapter import band_plot, ramp_plot
 from airmuscle.core.plotting import MAX_VECTOR_MARKERS, new_figure, rendered, save
 from airmuscle.files import Entry
 from airmuscle.files.library import list_files

@@ -13,13 +13,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import (
-    Selection,
-    raw_hdf5,
-    raw_mat,
-    raw_mdf,
-    read_contents,
-)
+from airmuscle.bench.readers import Selection, raw_hdf5, raw_mat, raw_mdf, read_contents
 from airmuscle.bench.readers import time_base as pieces
 from airmuscle.errors import AirmuscleError, ColumnError
 

@@ -27,7 +27,7 @@ from airmuscle.bench import (
     level_record,
     support_of,
 )
-from airmuscle.bench.identify import default_split
+from airmuscle.bench.estimation import default_split
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording

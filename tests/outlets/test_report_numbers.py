@@ -26,14 +26,14 @@ from airmuscle.bench import (
     fit_hysteresis,
     fit_jointly,
 )
-from airmuscle.bench.identify import VolumePoints, fit_volume
-from airmuscle.bench.identify.campaign import ValidationRow
-from airmuscle.bench.identify.campaign.result import _validation_table
-from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
-from airmuscle.bench.identify.experiment_design import run_table
-from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter
-from airmuscle.bench.identify.prediction import prediction_chapters
-from airmuscle.bench.identify.static_fit_chapter import _rows
+from airmuscle.bench.campaign import ValidationRow
+from airmuscle.bench.campaign.result import _validation_table
+from airmuscle.bench.dynamics.dynamic_chapter import dynamic_chapters
+from airmuscle.bench.hysteresis.hysteresis_chapter import joint_friction_chapter
+from airmuscle.bench.prediction import prediction_chapters
+from airmuscle.bench.statics import VolumePoints, fit_volume
+from airmuscle.bench.statics.experiment_design import run_table
+from airmuscle.bench.statics.static_fit_chapter import _rows
 from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
 from airmuscle.design.sizing import scenario_valves
 from airmuscle.design.sizing.result import _valve_settings

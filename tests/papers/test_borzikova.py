@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from chapter_words import visible_words
 
-from airmuscle.bench.identify import LoadRange
+from airmuscle.bench.statics import LoadRange
 from airmuscle.papers import borzikova
 from airmuscle.papers.borzikova_surfaces import (
     AS_EXPONENT,

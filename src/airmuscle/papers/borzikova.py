@@ -8,7 +8,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify import (
+from ..bench.statics import (
     Chebyshev,
     LoadRange,
     SurfaceProblem,
@@ -16,7 +16,7 @@ from ..bench.identify import (
     fit_linearised,
     fit_nonlinear,
 )
-from ..bench.identify.surface.exponential import SurfaceFit
+from ..bench.statics.exponential_surface import SurfaceFit
 from ..core import STANDARD_GRAVITY, Array
 from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import Chapter

@@ -11,8 +11,8 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify import LoadRange, fit_monotone
-from ..bench.identify.statistics import CorrelationIndex, correlation_index
+from ..bench.estimation.statistics import CorrelationIndex, correlation_index
+from ..bench.statics import LoadRange, fit_monotone
 from ..core import AirmuscleWarning, Array, autodiff, bar
 from ..core.plotting import (
     BLACK,

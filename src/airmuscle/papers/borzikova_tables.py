@@ -6,14 +6,14 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify import (
+from ..bench.statics import (
     Chebyshev,
     LoadRange,
     Monomials,
     conditioning,
     find_monotonicity_violations,
 )
-from ..bench.identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
+from ..bench.statics.exponential_surface import SurfaceFit, fit_linearised, fit_nonlinear
 from ..core import bar, percent
 from ..physics.muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Table

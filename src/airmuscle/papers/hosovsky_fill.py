@@ -8,7 +8,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify.variable_projection import uncensored_rank
+from ..bench.estimation.variable_projection import uncensored_rank
 from ..core import BLACK, LINES, new_figure
 from ..physics.muscle.characteristic.contractile_surface import exponents
 from ..report.chapter import Plot

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...core import Array, IdentificationError, counted
 from ...report.chapter import BY_ROW, Chapter, Table, TableColumn
+from ..inspection import Sensor, estimate_resolution, rounding
 from ..reported import Reported
-from ..segment import Sensor, estimate_resolution, rounding
 from .episodes import HISTORY, ROWS, Episodes, Windows, long_enough, speed_of
 
 MAX_DELAY = 8

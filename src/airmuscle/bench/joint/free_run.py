@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from ...core import Array, ShortRepr, tree
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
-from ..baselines import ARX, DEPTH, PERSISTENCE, fit_arx
+from ..prediction import ARX, DEPTH, PERSISTENCE, fit_arx
 from .descent import Descent, SearchStage, with_slopes
 from .episode_inspection import without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of

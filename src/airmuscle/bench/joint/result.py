@@ -12,7 +12,7 @@ import numpy as np
 from ...core import Array, plotting, tree
 from ...physics import Plant, PressureDriven, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...report import Chapter, NamedValue, Plot, Table, TableColumn
-from ..identify.prediction import PlantUncertainty
+from ..prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
 from .episodes import ENOUGH, coverage, rms

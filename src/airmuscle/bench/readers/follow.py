@@ -26,14 +26,7 @@ from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
 from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
-from .text_format import (
-    TextFormat,
-    TextHeader,
-    has_content,
-    is_comment,
-    parse_header,
-    split_cells,
-)
+from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
 
 MAX_UNREADABLE = 100
 MAX_HEADER_LINES = 1000

@@ -25,7 +25,7 @@ from ...core import (
 )
 from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
-from ..checks.contractions import code_of
+from ..diagnosis import code_of
 from .channels import Cells, RawTable
 from .constants import file_conversion
 from .missing_values import DropMissing, Mask

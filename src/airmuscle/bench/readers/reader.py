@@ -11,8 +11,8 @@ from typing import Any
 
 from ...core import FileError, ParameterError, abridged, printable
 from ...recording.recording import Recording
-from ..checks import warn_of_suspicious_values
-from ..segment.outliers import without_outliers
+from ..diagnosis import warn_of_suspicious_values
+from ..inspection import without_outliers
 from .channels import RawTable
 from .constants import split_specimens
 from .formats import EXTENSIONS, TEXT, format_of

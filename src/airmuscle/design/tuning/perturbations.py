@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...bench.identify.prediction import PlantUncertainty
+from ...bench.prediction import PlantUncertainty
 from ...core import (
     AirmuscleError,
     ParameterError,

@@ -8,16 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.identify import LEVEL, Fit, RankedModel, standard_candidates
-from ...bench.identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
-from ...bench.identify.misfit import misfit_warning
-from ...bench.identify.specimen_errors import (
+from ...bench.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
+from ...bench.diagnosis.misfit import misfit_warning
+from ...bench.estimation import LEVEL, Fit
+from ...bench.inspection import maximum_rate
+from ...bench.statics import RankedModel, standard_candidates
+from ...bench.statics.specimen_errors import (
     SpecimenErrors,
     ranked_specimen_errors,
     resting_lengths_of,
     specimens_of,
 )
-from ...bench.segment import maximum_rate
 from ...core import (
     HintedText,
     IdentificationError,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.identify.dynamic import InitialConditions
+from ...bench.dynamics import InitialConditions
 from ...core import EquilibriumError, HintedText, ParameterError
 from ...physics import Coordinate, Plant
 from ...physics.equilibrium import nearest_equilibrium

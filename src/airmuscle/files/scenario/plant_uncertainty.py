@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from ...bench import DynamicFit, PlantUncertainty
-from ...bench.identify import (
+from ...bench.dynamics import OF_RECORD
+from ...bench.estimation import (
     LEVEL,
     NORMAL_QUANTILE,
-    OF_RECORD,
     degrees_of_freedom,
     root_mean_square,
     t_quantile,
 )
-from ...bench.segment import estimate_noise, maximum_rate
+from ...bench.inspection import estimate_noise, maximum_rate
 from ...core import Array, ParameterError, check_known, tree
 from ...physics.plant.plant import Plant
 from ..library import Location, ParameterUncertainty, custom_field, located_errors

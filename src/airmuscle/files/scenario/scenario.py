@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ...bench.identify.prediction import PlantUncertainty
+from ...bench.prediction import PlantUncertainty
 from ...core import FileError, ParameterError, Reference, ShortRepr, ambient_pressure, check_known
 from ...engine.loop import ControlLoop, InputSignal
 from ...engine.run import Integrator, Problem, solve

@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ...bench.identify.dynamic import InitialValue, ParameterPaths, RecordUnknown, StartTime
+from ...bench.dynamics import InitialValue, ParameterPaths, RecordUnknown, StartTime
 from ...bench.readers import read_csv
 from ...core import ColumnError, Input, ParameterError, abridged, check_known, tree
 from ...engine import Driver, Integrator, SampledSignal, WithDrivers

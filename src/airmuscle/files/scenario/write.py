@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...bench.identify.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage
-from ...bench.identify.dynamic import stated_ambient
-from ...bench.segment import CONTRACTION_BAND, running_median
+from ...bench.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage
+from ...bench.dynamics import stated_ambient
+from ...bench.inspection import CONTRACTION_BAND, running_median
 from ...core import AirmuscleError, Array, ParameterError, tree
 from ...engine.loop import ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
 from ...engine.loop.sampled_signal import ACCELERATION, spline_trajectory

@@ -9,14 +9,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ...bench.identify.campaign import (
-    Campaign,
-    LeftOutStage,
-    StaticStage,
-    ValidationRow,
-    identify_campaign,
-)
-from ...bench.identify.campaign.campaign_chapters import campaign_chapters, stage_data
+from ...bench.campaign import Campaign, LeftOutStage, StaticStage, ValidationRow, identify_campaign
+from ...bench.campaign.campaign_chapters import campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
 from ...core import atomic_folder, check_writable

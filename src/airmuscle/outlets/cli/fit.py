@@ -7,9 +7,9 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any
 
-from ...bench.identify import approximate as approximate_law
-from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
-from ...bench.identify.volume_fit import fit_volume, volume_points
+from ...bench.statics import approximate as approximate_law
+from ...bench.statics.approximation import GRID_POINTS, sample_on_grid
+from ...bench.statics.volume_fit import fit_volume, volume_points
 from ...core import ParameterError, PhysicsError, check_writable
 from ...files.library import (
     find_initial_law,

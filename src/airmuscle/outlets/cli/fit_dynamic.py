@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 from ...bench import DynamicFit
-from ...bench.identify.dynamic import fit_regulator
-from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters, regulator_chapters
-from ...bench.segment import inspect
+from ...bench.dynamics import fit_regulator
+from ...bench.dynamics.dynamic_chapter import dynamic_chapters, regulator_chapters
+from ...bench.inspection import inspect
 from ...core import check_writable, counted
 from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import load_dynamic_fit

@@ -7,8 +7,9 @@ from json import dumps
 from pathlib import Path
 from typing import Any
 
-from ...bench.identify import BenchLimits, RecursiveFit
+from ...bench.estimation import RecursiveFit
 from ...bench.readers import RowReader, follow_lines
+from ...bench.statics import BenchLimits
 from ...core import (
     ColumnError,
     IdentificationError,

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...bench.identify.branch_residuals import delay_notes, find_delay
-from ...bench.identify.campaign import fit_held_creep, free_of_creep
-from ...bench.identify.campaign.campaign_chapters import creep_chapter
-from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop, hysteresis_chapters
-from ...bench.identify.hysteresis.joint import select_friction
-from ...bench.identify.hysteresis.loops import CURVE_DEGREE
+from ...bench.campaign import fit_held_creep, free_of_creep
+from ...bench.campaign.campaign_chapters import creep_chapter
+from ...bench.diagnosis.branch_residuals import delay_notes, find_delay
+from ...bench.hysteresis import find_loops, fit_jointly, fit_loop, hysteresis_chapters
+from ...bench.hysteresis.joint import select_friction
+from ...bench.hysteresis.loops import CURVE_DEGREE
 from ...core import check_writable
 from ...files.library import Entry, load_law, model_class, part_toml, to_toml, without_parts
 from ...physics import Friction

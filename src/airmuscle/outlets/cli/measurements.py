@@ -11,11 +11,11 @@ import click
 
 import airmuscle as am
 
-from ...bench.checks import level_tables
+from ...bench.diagnosis import level_tables
+from ...bench.inspection import check_contents, inspect_all, inspection_chapters
 from ...bench.readers import ColumnMapping, Decimation, RecordedTime, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
-from ...bench.segment import check_contents, inspect_all, inspection_chapters
 from ...core import FileError, ParameterError
 from ...recording import Recording
 from ...recording.recording import row_notes

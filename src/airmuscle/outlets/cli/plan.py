@@ -3,9 +3,9 @@
 import dataclasses
 from pathlib import Path
 
-from ...bench.identify import BenchLimits, optimal_design
-from ...bench.identify.dynamic import rank_records
+from ...bench.dynamics import rank_records
 from ...bench.readers import write
+from ...bench.statics import BenchLimits, optimal_design
 from ...core import check_writable
 from ...files.library import is_path, load_law, read_toml
 from ...files.scenario.identification import load_dynamic_fit

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ...bench import RecordPrediction, StartTime
-from ...bench.identify.prediction import prediction_chapters
+from ...bench.prediction import prediction_chapters
 from ...core import FileError, check_writable
 from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
 from ...files.scenario.prediction import PlantModel, load_plant_model, predict_with_entry

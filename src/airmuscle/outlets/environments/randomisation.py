@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...bench.identify.prediction import PlantUncertainty
+from ...bench.prediction import PlantUncertainty
 from ...core import (
     Array,
     ParameterError,

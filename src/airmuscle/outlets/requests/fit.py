@@ -8,7 +8,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...bench.identify import (
+from ...bench.estimation import (
     BlockSplit,
     GroupSplit,
     Huber,

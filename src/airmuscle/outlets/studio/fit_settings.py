@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 import airmuscle as am
 
-from ...bench.segment.outliers import Outlier, kept_rows, leave_out
+from ...bench.inspection.outliers import Outlier, kept_rows, leave_out
 from ...core import AirmuscleError, UnitError, quantity
 from ...files.library.files import list_laws
 from ..requests import BraidRequest, FitRequest, ReadingRequest, RequestError, build, form_fields

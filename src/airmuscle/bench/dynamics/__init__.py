@@ -1,0 +1,5 @@
+"""Identification of fills, releases, tubes and regulators."""
+
+from ...core.stubs import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

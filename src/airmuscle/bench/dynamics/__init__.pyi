@@ -1,0 +1,46 @@
+from .dynamic_chapter import dynamic_chapters as dynamic_chapters
+from .experiment import CommandInstants as CommandInstants
+from .experiment import Experiment as Experiment
+from .experiment import InitialValue as InitialValue
+from .experiment import PriorValue as PriorValue
+from .experiment import StartTime as StartTime
+from .experiment import stated_ambient as stated_ambient
+from .fit import CrossPrediction as CrossPrediction
+from .fit import cross_predict as cross_predict
+from .fit import describe_cross_predictions as describe_cross_predictions
+from .fit import fit_dynamic as fit_dynamic
+from .fit import fit_tube as fit_tube
+from .initial_conditions import InitialConditions as InitialConditions
+from .problem import LevenbergMarquardt as LevenbergMarquardt
+from .problem import bounded_step as bounded_step
+from .record_model import commands_at as commands_at
+from .record_ranking import RecordRanking as RecordRanking
+from .record_ranking import rank_records as rank_records
+from .regulator_fit import RegulatorFit as RegulatorFit
+from .regulator_fit import fit_regulator as fit_regulator
+from .reliability import describe_bounds as describe_bounds
+from .reliability import describe_flatness as describe_flatness
+from .reliability import describe_optima as describe_optima
+from .reliability import distinct_optima as distinct_optima
+from .reliability import searches_at_lowest as searches_at_lowest
+from .result import DynamicFit as DynamicFit
+from .result import DynamicProfile as DynamicProfile
+from .result import SensorLocation as SensorLocation
+from .result import locate_pressure_sensor as locate_pressure_sensor
+
+# isort: split
+# For the other rooms, not in __all__
+from .dynamic_chapter import draw_residuals as draw_residuals
+from .dynamic_chapter import residual_panels as residual_panels
+from .dynamic_chapter import running_extreme as running_extreme
+from .experiment import ParameterPaths as ParameterPaths
+from .experiment import RecordUnknown as RecordUnknown
+from .experiment import Unknown as Unknown
+from .experiment import describe_ambient as describe_ambient
+from .experiment import describe_other_ambient as describe_other_ambient
+from .experiment import make_unknowns as make_unknowns
+from .fit import OF_RECORD as OF_RECORD
+from .record_model import ModelOutputs as ModelOutputs
+from .record_model import RecordModel as RecordModel
+from .record_ranking import MIN_GAIN as MIN_GAIN
+from .reliability import RECORD_CONSEQUENCE as RECORD_CONSEQUENCE

@@ -1,0 +1,5 @@
+"""Least squares, covariance, intervals, bootstrap, cross-validation and identifiability."""
+
+from ...core.stubs import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,0 +1,43 @@
+from .creep import Creep as Creep
+from .creep import CreepFit as CreepFit
+from .creep import Hold as Hold
+from .creep import creep_elements as creep_elements
+from .creep import find_holds as find_holds
+from .creep import fit_creep as fit_creep
+from .hysteresis_chapter import hysteresis_chapters as hysteresis_chapters
+from .joint import JointFit as JointFit
+from .joint import RunAgreement as RunAgreement
+from .joint import agreement_of_run as agreement_of_run
+from .joint import fit_jointly as fit_jointly
+from .joint import force_amplitude as force_amplitude
+from .joint import identified_friction as identified_friction
+from .joint import loops_not_joined as loops_not_joined
+from .loop_data import Axis as Axis
+from .loop_data import ContractionPath as ContractionPath
+from .loop_data import DataLimits as DataLimits
+from .loop_data import FixedCharacteristic as FixedCharacteristic
+from .loop_data import PolynomialCurve as PolynomialCurve
+from .loop_data import PressurePath as PressurePath
+from .loop_data import data_limits as data_limits
+from .loop_data import parameters_on_bounds as parameters_on_bounds
+from .loop_result import HysteresisLoop as HysteresisLoop
+from .loop_result import LoopFit as LoopFit
+from .loop_result import loop_path as loop_path
+from .loop_result import plot_loops as plot_loops
+from .loops import find_loops as find_loops
+from .loops import fit_hysteresis as fit_hysteresis
+from .loops import fit_loop as fit_loop
+from .loops import initial_friction_laws as initial_friction_laws
+from .result import HysteresisFit as HysteresisFit
+from .result import preferred_fit as preferred_fit
+from .search import branch_gap as branch_gap
+from .search import make_loop_series as make_loop_series
+from .search import repeat_difference as repeat_difference
+from .search import search_parameters as search_parameters
+
+# isort: split
+# For the other rooms, not in __all__
+from .creep import MIN_RATIO as MIN_RATIO
+from .hysteresis_chapter import joint_friction_chapter as joint_friction_chapter
+from .loop_result import describe_run as describe_run
+from .loops import rows_of as rows_of

@@ -1,5 +1,0 @@
-"""Dynamic identification: plant parameters from transient records (fill, discharge, release)."""
-
-from ....core.stubs import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,1 +1,0 @@
-"""Surface fits: exponential surface of Borzíková et al., monotone and shape-constrained fits."""
