@@ -19,7 +19,7 @@ def main() -> None:
         LiftRequirement(stroke="40 mm", mass="20 kg"),
         SizingConditions(supply="6 bar"),
     )
-    save(sizing_plot(choice).figure, PICTURE)
+    save(sizing_plot(choice).draw(), PICTURE)
     print(f"wrote {PICTURE}")
 
 

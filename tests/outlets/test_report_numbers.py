@@ -93,9 +93,9 @@ def test_a_choice_of_a_sizing_is_in_millimetres_bar_per_cent_and_litres():
     assert row["efficiency [%]"] == pytest.approx(100 * choice.efficiency)
     assert row["diameter [mm]"] == pytest.approx(1e3 * choice.diameter)
     assert 1.0 < row["diameter [mm]"] < 100.0
-    fill, _ = scenario_valves(choice)
-    litres_per_second_and_bar = fill.conductance * 1e3 * 1e5
-    assert float(_valve_settings(choice)[0][1].split()[0]) == pytest.approx(
+    valves = scenario_valves(choice)
+    litres_per_second_and_bar = valves[0].conductance * 1e3 * 1e5
+    assert float(_valve_settings(valves)[0][1].split()[0]) == pytest.approx(
         litres_per_second_and_bar, rel=1e-3
     )
 

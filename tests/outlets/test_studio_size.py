@@ -115,9 +115,9 @@ def test_other_joints_do_not_exist_and_requests_of_other_pages_are_refused(app):
 
 def test_a_joint_of_muscles_without_a_geometry_has_no_scenario():
     """The reason is stated, as for a lift."""
-    conditions = SizingConditions(6e5)
+    conditions = SizingConditions(4e5)
     choice = choose(
-        load("festo-tool-dmsp-40"), JointRequirement(angle=1.0, torque=5.0), conditions, 1
+        load("hunt2017-festo-10"), JointRequirement(angle=0.5, torque=1.0), conditions, 1
     )
     with pytest.raises(SolveError, match="geometry"):
         scenario_text(choice)

@@ -35,6 +35,7 @@ from .control_benchmark import standard_contenders as standard_contenders
 from .sizing import SORT_KEYS as SORT_KEYS
 from .sizing import EndPoint as EndPoint
 from .sizing import JointRequirement as JointRequirement
+from .sizing import LawOfProduct as LawOfProduct
 from .sizing import LiftRequirement as LiftRequirement
 from .sizing import MuscleChoice as MuscleChoice
 from .sizing import MuscleDesign as MuscleDesign
@@ -44,6 +45,7 @@ from .sizing import SizingResult as SizingResult
 from .sizing import StaticMuscle as StaticMuscle
 from .sizing import UnsuitableMuscle as UnsuitableMuscle
 from .sizing import by_air as by_air
+from .sizing import by_area as by_area
 from .sizing import by_count as by_count
 from .sizing import by_diameter as by_diameter
 from .sizing import by_length as by_length

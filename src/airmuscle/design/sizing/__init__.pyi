@@ -1,3 +1,4 @@
+from .laws_of_product import LawOfProduct as LawOfProduct
 from .requirement_and_choice import SORT_KEYS as SORT_KEYS
 from .requirement_and_choice import JointRequirement as JointRequirement
 from .requirement_and_choice import LiftRequirement as LiftRequirement
@@ -6,6 +7,7 @@ from .requirement_and_choice import MuscleDesign as MuscleDesign
 from .requirement_and_choice import Requirement as Requirement
 from .requirement_and_choice import SizingConditions as SizingConditions
 from .requirement_and_choice import by_air as by_air
+from .requirement_and_choice import by_area as by_area
 from .requirement_and_choice import by_count as by_count
 from .requirement_and_choice import by_diameter as by_diameter
 from .requirement_and_choice import by_length as by_length

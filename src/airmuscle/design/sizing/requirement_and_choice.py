@@ -20,7 +20,7 @@ from ...physics.pneumatics.gas import (
     Isothermal,
     absolute_pressure,
 )
-from .static_muscle import EndPoint, StaticMuscle
+from .static_muscle import EndPoint, StaticMuscle, product_of
 
 MAX_COUNT = 20
 """Maximum number of muscles in parallel that is tried (chosen)."""
@@ -233,9 +233,10 @@ class MuscleDesign(ShortRepr):
 class MuscleChoice(ShortRepr):
     """A muscle type that meets a requirement, at its shortest length.
 
-    muscle  the entry at this length and its working range
-    length  nominal length [m]
-    count   number of muscles in parallel; with a joint, on each side
+    muscle           the entry at this length and its working range
+    length           nominal length [m]
+    count            number of muscles in parallel; with a joint, on each side
+    geometry_source  where the geometry is from, which gives volume and diameter; empty without one
     """
 
     muscle: StaticMuscle
@@ -244,6 +245,7 @@ class MuscleChoice(ShortRepr):
     design: MuscleDesign
     requirement: Requirement
     conditions: SizingConditions
+    geometry_source: str = ""
 
     @property
     def entry(self) -> Entry:
@@ -256,9 +258,19 @@ class MuscleChoice(ShortRepr):
         return self.count * (2 if isinstance(self.requirement, JointRequirement) else 1)
 
     @property
+    def product(self) -> str:
+        """The product, or the name of the entry where none is stated."""
+        return product_of(self.entry)
+
+    @property
     def size(self) -> str:
-        """Number, muscle and length as text."""
-        return f"{self.total_count} x {self.entry.name}, {1e3 * self.length:.4g} mm"
+        """Number, product and length as text."""
+        return f"{self.total_count} x {self.product}, {1e3 * self.length:.4g} mm"
+
+    @property
+    def by_law(self) -> str:
+        """The law as text, where the name of the product is another."""
+        return "" if self.product == self.entry.name else f" by the law {self.entry.name}"
 
     @property
     def air(self) -> float | None:
@@ -309,9 +321,21 @@ class MuscleChoice(ShortRepr):
         """
         return self.muscle.diameter(self.design.contracted.contraction)
 
+    @property
+    def area(self) -> float | None:
+        """Mounting area [m2]: number of muscles times outer diameter at the contracted end times
+        nominal length, all muscles side by side; None without a geometry.
+        """
+        return None if self.diameter is None else self.total_count * self.diameter * self.length
+
 
 SortKey = Callable[[MuscleChoice], float | None]
 """Criterion of a ranking: the smaller the better; a choice without a value is last."""
+
+
+def by_area(choice: MuscleChoice) -> float | None:
+    """Mounting area [m2]."""
+    return choice.area
 
 
 def by_air(choice: MuscleChoice) -> float | None:
@@ -341,6 +365,7 @@ def by_reserve(choice: MuscleChoice) -> float:
 
 SORT_KEYS: Mapping[str, SortKey] = MappingProxyType(
     {
+        "area": by_area,
         "air": by_air,
         "length": by_length,
         "count": by_count,
@@ -351,22 +376,42 @@ SORT_KEYS: Mapping[str, SortKey] = MappingProxyType(
 """The criteria by their names."""
 
 
+CRITERIA: Mapping[SortKey, str] = MappingProxyType(
+    {
+        by_area: "the least mounting area, number x outer diameter x nominal length",
+        by_air: "the least air of a cycle",
+        by_length: "the shortest nominal length",
+        by_count: "the fewest muscles",
+        by_reserve: "the greatest force reserve",
+        by_diameter: "the smallest outer diameter",
+    }
+)
+"""What is said of the first choice by each criterion."""
+EQUAL = 1e-6
+"""Relative difference of a criterion up to which two choices are equal (chosen): the resolution
+of the lengths."""
+
+
 def rank(choices: list[MuscleChoice], sort: SortKey) -> tuple[MuscleChoice, ...]:
-    """The choices by a criterion, equal ones by length, then by number and name. Raises
+    """The choices by a criterion, equal ones by number of muscles, then by length and name. Raises
     ParameterError.
     """
     if not callable(sort):
         raise ParameterError(
-            f"sort is {sort!r}; it must be a function of a choice, such as by_air or by_length."
+            f"sort is {sort!r}; it must be a function of a choice, such as by_area or by_length."
         )
+    values = [sort(choice) for choice in choices]
+    levels = [math.inf if value is None else float(value) for value in values]
+    rows = sorted(range(len(choices)), key=levels.__getitem__)
+    ranks = {}
+    level = -math.inf
+    for row in rows:
+        if not math.isclose(levels[row], level, rel_tol=EQUAL):
+            level = levels[row]
+        ranks[row] = level
 
-    def order(choice: MuscleChoice) -> tuple[float, float, int, str]:
-        value = sort(choice)
-        return (
-            math.inf if value is None else value,
-            choice.length,
-            choice.count,
-            choice.entry.name,
-        )
+    def order(row: int) -> tuple[float, int, float, str]:
+        choice = choices[row]
+        return ranks[row], choice.count, choice.length, choice.entry.name
 
-    return tuple(sorted(choices, key=order))
+    return tuple(choices[row] for row in sorted(rows, key=order))

@@ -7,7 +7,7 @@ import dataclasses
 import functools
 import itertools
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ...bench.reported import Reported
@@ -15,19 +15,26 @@ from ...core import AirmuscleError, AirmuscleWarning, ParameterError, SolveError
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...files.library import Entry, list_products, load_law, products_of_laws
+from ...physics.pneumatics import Valve
 from ...report.chapter import Chapter, Table, TableColumn
-from . import JointRequirement, MuscleChoice, Requirement, SizingConditions, by_air, choose
-from .requirement_and_choice import SortKey, rank
+from . import JointRequirement, MuscleChoice, Requirement, SizingConditions, by_area, choose
+from .laws_of_product import DISAGREEMENT, LawOfProduct, coverage_of, sorted_laws
+from .requirement_and_choice import CRITERIA, SortKey, rank
 from .scenario import MOVING, SizingScenario, scenario_valves
-from .tables import air_table, end_point_table, product_of, product_table, sizing_plot, valve_table
+from .static_muscle import product_of
+from .tables import (
+    air_table,
+    end_point_table,
+    law_table,
+    product_table,
+    sizing_plot,
+    valve_table,
+)
 
 BISECTIONS = 7
 """Bisections of the fraction of a load or a stroke that can be reached, for a message (chosen)."""
 SHORT_UNSUITABLE = 3
 """Rows of the brief view (chosen)."""
-DISAGREEMENT = 2.0
-"""Ratio of the lengths by the laws of one product from which they are said to contradict one
-another (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,6 +52,11 @@ class UnsuitableMuscle:
 class SizingResult(Reported):
     """Choices of muscles for a requirement, best first, and the muscles that do not meet it, with
     reasons.
+
+    choices  one for each product and number of muscles, by the law of the product that comes first
+    entries  all entries that were tried
+    laws     all laws that were tried by product, the one that is used first; what the others give
+    sort     the criterion of the ranking
     """
 
     requirement: Requirement
@@ -52,7 +64,8 @@ class SizingResult(Reported):
     choices: tuple[MuscleChoice, ...]
     unsuitable: tuple[UnsuitableMuscle, ...]
     entries: tuple[Entry, ...]
-    """All entries that were tried."""
+    laws: tuple[LawOfProduct, ...] = ()
+    sort: SortKey = by_area
 
     @property
     def best(self) -> MuscleChoice:
@@ -84,19 +97,23 @@ class SizingResult(Reported):
                 "sizing", title, reason[0].upper() + reason[1:], tables=unsuitable, chosen=settings
             )
         best = self.best
-        simulated = None if scenario is None else scenario.choice
-        laws = (best.entry.characteristic, best.conditions.ambient, *scenario_valves(simulated))
-        tables = product_table(self.choices), end_point_table(self.choices), air_table(self.choices)
-        valves = () if simulated is None else (valve_table(simulated),)
+        is_simulated = scenario is not None and bool(scenario.text)
+        valves = scenario_valves(best) if is_simulated else ()
+        tables = [product_table(self.choices), end_point_table(self.choices)]
+        tables += [air_table(self.choices), *law_table(self.laws, best)]
+        tables += [valve_table(best)] if is_simulated else []
         return Chapter(
             "sizing",
             title,
             self._summary(),
-            tables=(*tables, *valves, *unsuitable),
+            tables=(*tables, *unsuitable),
             plots=(sizing_plot(best),),
             notes=() if scenario is None or not scenario.note else (scenario.note,),
-            references=(*best.entry.references, *cite(laws)),
-            chosen=(*settings, *_valve_settings(simulated)),
+            references=(
+                *best.entry.references,
+                *cite((best.entry.characteristic, best.conditions.ambient, *valves)),
+            ),
+            chosen=(*settings, *_valve_settings(valves), *_geometry_setting(best)),
         )
 
     def _shortfall(self) -> str:
@@ -140,24 +157,51 @@ class SizingResult(Reported):
         size = f"{best.total_count} x {best.entry.name} of {1e3 * best.length:.4g} mm"
         return f"{best.requirement.describe()} ({size})"
 
-    def _summary(self) -> str:
+    def _summary(self) -> tuple[str, ...]:
         best = self.best
-        product = product_of(self.best)
-        side = (
-            " (half of them on each side)" if isinstance(best.requirement, JointRequirement) else ""
+        is_joint = isinstance(best.requirement, JointRequirement)
+        side = " (half of them on each side)" if is_joint else ""
+        criterion = CRITERIA.get(self.sort, f"the least value of {_name_of(self.sort)}")
+        area = "" if best.area is None else f" ({1e4 * best.area:.3g} cm2)"
+        choice = (
+            f"The best choice is {best.size}{side}{best.by_law}. Of all choices it has {criterion}"
+            f"{area if self.sort is by_area else ''}; its length is the shortest with which it"
+            f" reaches both end points.{self._disagreement()}"
         )
-        others = [
-            each
-            for each in self.choices[1:]
-            if product_of(each) == product and each.count == best.count
+        return choice, self._reasons_for_the_law()
+
+    @property
+    def _laws_of_the_best(self) -> list[LawOfProduct]:
+        """The laws of the product of the best choice, the one that is used first."""
+        return [law for law in self.laws if law.product == self.best.product]
+
+    def _disagreement(self) -> str:
+        """A warning where the laws of the product of the best choice contradict each other."""
+        count = self.best.count
+        lengths = [
+            law.choices[count].length for law in self._laws_of_the_best if count in law.choices
         ]
-        by_law = "" if product == best.entry.name else f" by the law {best.entry.name}"
-        spread = _spread(best, others)
+        if len(lengths) < 2:
+            return ""
+        factor = max(lengths) / min(lengths)
+        if factor <= DISAGREEMENT:
+            return ""
         return (
-            f"The best choice is {best.total_count} x {product}{side}, nominal length"
-            f" {1e3 * best.length:.4g} mm{by_law}: the first of the ranking, at the shortest"
-            f" length with which it reaches both end points.{spread}"
+            f" The published laws of this product contradict each other by a factor of {factor:.2g}"
+            " in the length: measure a muscle at its end points before you order."
         )
+
+    def _reasons_for_the_law(self) -> str:
+        """Which law of the product of the best choice is used and why, and what the others give;
+        empty where there is one law.
+        """
+        used, *others = self._laws_of_the_best or [None]
+        if used is None or not others:
+            return ""
+        by_others = "; ".join(
+            f"{law.name} ({law.describe()}) {_given(law, self.best)}" for law in others
+        )
+        return f"The law used is {used.name}: {used.describe()}. For the same number, {by_others}."
 
     def _unsuitable(self) -> tuple[Table, ...]:
         """The muscles that do not meet the requirement, with the reason."""
@@ -202,25 +246,14 @@ class SizingResult(Reported):
         return (supply, *((*row, sources[name]) for name, row in rows.items()))
 
 
-def _spread(best: MuscleChoice, others: list[MuscleChoice]) -> str:
-    """The lengths by the other laws of a product, in words: an uncertainty where they agree
-    within DISAGREEMENT, each with its law where they do not.
-    """
-    if not others:
-        return ""
-    lengths = [each.length for each in (best, *others)]
-    if max(lengths) < DISAGREEMENT * min(lengths):
-        among = [1e3 * each.length for each in others]
-        ends = " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(among), max(among))))
-        return (
-            f" The other published laws of this product give {ends} mm: the spread is the"
-            " uncertainty of the models, not a choice between muscles."
-        )
-    each_law = ", ".join(f"{each.entry.name} {1e3 * each.length:.4g} mm" for each in others)
-    return (
-        f" The published laws of this product contradict one another: {each_law}. This is no"
-        " uncertainty of one model; measure a muscle at its end points before you order."
-    )
+def _given(law: LawOfProduct, choice: MuscleChoice) -> str:
+    """What a law gives for the product and number of a choice, in words."""
+    other = law.choices.get(choice.count)
+    return "gives none" if other is None else f"gives {1e3 * other.length:.4g} mm"
+
+
+def _name_of(sort: SortKey) -> str:
+    return getattr(sort, "__name__", type(sort).__name__)
 
 
 def catalogue() -> tuple[Entry, ...]:
@@ -245,18 +278,19 @@ def size_muscles(
     requirement: Requirement,
     conditions: SizingConditions,
     muscles: Iterable[Entry] | None = None,
-    sort: SortKey = by_air,
+    sort: SortKey = by_area,
     progress: Callable[[float], None] | None = None,
     workers: Workers = 1,
 ) -> SizingResult:
     """The muscles that meet a requirement, each at its shortest length, and the others with the
     reason.
 
-    `muscles` are library entries; by default those of `catalogue`. Each is tried with
-    `conditions.min_count` to `conditions.max_count` muscles in parallel; a number is a choice if
-    fewer muscles are longer or take more air. `sort` is the criterion of the ranking, `progress` is
-    called with the fraction done, `workers` the number of processes, as in `compare`. Raises
-    ParameterError for other arguments.
+    `muscles` are library entries; by default those of `catalogue`. Of several laws of one product
+    the first of `LawOfProduct.order` is used; the others are in `SizingResult.laws`. Each product
+    is tried with `conditions.min_count` to `conditions.max_count` muscles in parallel; a number is
+    a choice if fewer muscles are longer or take more air. `sort` is the criterion of the ranking,
+    `progress` is called with the fraction done, `workers` the number of processes, as in `compare`.
+    Raises ParameterError for other arguments.
     """
     if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
         raise ParameterError(
@@ -269,52 +303,67 @@ def size_muscles(
             "size_muscles: muscles must be one or more library entries; load them with"
             " am.load(NAME)."
         )
-    choices: list[MuscleChoice] = []
-    unsuitable: list[UnsuitableMuscle] = []
     report = progress or (lambda fraction: None)
     with process_pool(workers) as executor:
-        calls = DistributedCalls(executor, _choices_of, (requirement, conditions))
-        of_entries = calls.results(entries, lambda done: report(done / len(entries)))
-    for choices_of_entry, failed in of_entries:
-        choices += choices_of_entry
-        unsuitable += [] if choices_of_entry else [failed]
+        calls = DistributedCalls(executor, _law_of, (requirement, conditions))
+        laws = sorted_laws(calls.results(entries, lambda done: report(done / len(entries))))
+    choices: list[MuscleChoice] = []
+    unsuitable: list[UnsuitableMuscle] = []
+    products: set[str] = set()
+    for law in laws:
+        is_used = law.product not in products and law.coverage > 0.0
+        products.add(law.product)
+        choices_by_law = _worthwhile(law.choices) if is_used else []
+        choices += choices_by_law
+        if law.coverage == 0.0 or (is_used and not choices_by_law):
+            unsuitable.append(_unsuitable_muscle(law))
     unsuitable.sort(key=lambda item: item.count == 0)
     known = products_of_laws().values()
     without_law = [name for name in list_products() if name not in known] if muscles is None else []
     unsuitable += [
         UnsuitableMuscle(name, 0, "no law of this product is published") for name in without_law
     ]
-    return SizingResult(requirement, conditions, rank(choices, sort), tuple(unsuitable), entries)
+    ranked = rank(choices, sort)
+    return SizingResult(requirement, conditions, ranked, tuple(unsuitable), entries, laws, sort)
 
 
-def _choices_of(
-    sizing: tuple[Requirement, SizingConditions], entry: Entry
-) -> tuple[list[MuscleChoice], UnsuitableMuscle]:
-    """The choices of an entry, each better than those with fewer muscles, and why the greatest
-    number does not do.
-    """
+def _law_of(sizing: tuple[Requirement, SizingConditions], entry: Entry) -> LawOfProduct:
+    """A law with its choices for each number of muscles, or the reasons why there are none."""
     requirement, conditions = sizing
-    choices: list[MuscleChoice] = []
-    failed = UnsuitableMuscle(entry.name, 0, "")
+    coverage, extent = coverage_of(entry, conditions)
+    choices: dict[int, MuscleChoice] = {}
+    reasons: dict[int, str] = {}
     for count in range(conditions.min_count, conditions.max_count + 1):
         try:
-            choice = choose(entry, requirement, conditions, count)
+            choices[count] = choose(entry, requirement, conditions, count)
         except AirmuscleError as error:
             reason = str(error).removeprefix(f"{entry.name}: ").rstrip(".")
-            failed = UnsuitableMuscle(
-                entry.name, count if isinstance(error, SolveError) else 0, reason
-            )
-        else:
-            shorter = [other for other in choices if other.length <= choice.length * (1.0 + 1e-9)]
-            if all(
-                choice.air is not None and other.air is not None and other.air > choice.air
-                for other in shorter
-            ):
-                choices.append(choice)
-    return choices, failed
+            reasons[count if isinstance(error, SolveError) else 0] = reason
+    return LawOfProduct(entry, product_of(entry), coverage, extent, choices, reasons)
 
 
-def _valve_settings(simulated: MuscleChoice | None) -> tuple[tuple[str, str, str], ...]:
+def _worthwhile(choices: Mapping[int, MuscleChoice]) -> list[MuscleChoice]:
+    """The choices that are shorter, or take less air, than those with fewer muscles."""
+    worthwhile: list[MuscleChoice] = []
+    for choice in choices.values():
+        shorter = [fewer for fewer in worthwhile if fewer.length <= choice.length * (1.0 + 1e-9)]
+        if all(
+            choice.air is not None and fewer.air is not None and fewer.air > choice.air
+            for fewer in shorter
+        ):
+            worthwhile.append(choice)
+    return worthwhile
+
+
+def _unsuitable_muscle(law: LawOfProduct) -> UnsuitableMuscle:
+    """The greatest number that was tried with a law, and why it does not do."""
+    if law.coverage == 0.0:
+        return UnsuitableMuscle(law.name, 0, law.extent)
+    count = max(law.reasons)
+    return UnsuitableMuscle(law.name, count, law.reasons[count])
+
+
+def _valve_settings(valves: Sequence[Valve]) -> tuple[tuple[str, str, str], ...]:
     names = ("fill", "discharge")
     source = (
         f"ISO 6358, for {100 * MOVING:.4g} % of the cycle; this part and the critical pressure"
@@ -326,5 +375,11 @@ def _valve_settings(simulated: MuscleChoice | None) -> tuple[tuple[str, str, str
             f"{1e8 * valve.conductance:.4g} dm3/(s bar)",
             source,
         )
-        for name, valve in zip(names, scenario_valves(simulated), strict=False)
+        for name, valve in zip(names, valves, strict=False)
     )
+
+
+def _geometry_setting(choice: MuscleChoice) -> tuple[tuple[str, str, str], ...]:
+    if not choice.geometry_source:
+        return ()
+    return (("volume and outer diameter", "from a geometry", choice.geometry_source),)

@@ -4,7 +4,6 @@
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,13 +12,17 @@ from ...core import STANDARD_GRAVITY, AirmuscleError, Array, SolveError
 from ...files.library.write import scenario_toml
 from ...physics import (
     AntagonisticJoint,
+    Geometry,
     HangingMass,
     Isotonic,
     LinearDamper,
     Mechanism,
     Muscle,
     Plant,
+    Ratings,
     SpringLoad,
+    ValidityRange,
+    as_force_law,
 )
 from ...physics.pneumatics import (
     FillDischarge,
@@ -78,12 +81,7 @@ def air_path(choice: MuscleChoice) -> AirPath:
     """
     muscle = choice.muscle
     ambient = choice.conditions.ambient
-    if muscle.muscle is None:
-        raise SolveError(
-            f"{choice.entry.name}: the enclosed volume is not known, because its law has no"
-            " geometry; valves and a scenario need it. Write a muscle file with a table"
-            " [geometry]."
-        )
+    _known_geometry(choice)
     first = choice.design.extended
     last = choice.design.contracted
     fraction = np.linspace(0.0, 1.0, STATIONS)
@@ -102,6 +100,17 @@ def air_path(choice: MuscleChoice) -> AirPath:
     return AirPath(
         absolute, np.asarray(Isothermal().air_mass(absolute, volumes, ambient)), choice.conditions
     )
+
+
+def _known_geometry(choice: MuscleChoice) -> Geometry:
+    """The geometry of a choice, which gives its volume. Raises SolveError without one."""
+    if choice.entry.geometry is None:
+        raise SolveError(
+            f"{choice.entry.name}: the enclosed volume is not known, because its law has no"
+            " geometry; valves and a scenario need it. Write a muscle file with a table"
+            " [geometry]."
+        )
+    return choice.entry.geometry
 
 
 def fill_valve(choice: MuscleChoice, duration: float) -> Valve:
@@ -143,6 +152,10 @@ LAG = SecondOrderLag(20.0)
 """Lag of the set point of a regulator (chosen)."""
 BAND = 5e3
 """Proportional band of a regulator [Pa] (chosen)."""
+OVERTRAVEL = 0.03
+"""Contraction [1] beyond both end points for which the polynomial of a law holds (chosen)."""
+SURROGATE_DEGREE = 11
+"""Degree of that polynomial (chosen)."""
 JOINT_MASS_TIME = 0.1
 """Inertia of a joint without a stated one: the torque turns it over its range in this part of the
 cycle (chosen).
@@ -152,86 +165,115 @@ cycle (chosen).
 def scenario_text(choice: MuscleChoice) -> str:
     """The scenario of a choice, with the chosen values in comments at its beginning.
 
-    Raises SolveError for a choice without a geometry, or a joint with several muscles on each side.
+    Several muscles on each side of a joint are equal pairs on one axis, which move alike: the
+    scenario is one pair with its part of torque and inertia. Raises SolveError for a choice without
+    a geometry.
     """
     is_lift = isinstance(choice.requirement, LiftRequirement)
-    plant, inputs, run, is_inertia_chosen = (_lift if is_lift else _joint)(choice)
+    modelled = plant_muscle(choice)
+    build = _lift if is_lift else _joint
+    plant, inputs, run, is_inertia_chosen = build(choice, modelled.muscle)
     damper = (
         "" if choice.entry.damper is not None else f", the damper (damping ratio {DAMPING_RATIO:g})"
     )
     inertia = ", the moving mass or inertia" if is_inertia_chosen else ""
-    note = (
-        "Sized by airmuscle size; SI units.\nThe valves are sized after ISO 6358 to fill and to"
-        f" discharge in {100 * MOVING:.4g} % of the cycle.\nChosen: this part, the critical"
-        f" pressure ratio of the valves, isothermal air{damper}{inertia}.\n"
-    )
+    notes = [
+        "Sized by airmuscle size; SI units.",
+        "The valves are sized after ISO 6358 to fill and to discharge in"
+        f" {100 * MOVING:.4g} % of the cycle.",
+        "Chosen: this part, the critical pressure ratio of the valves, isothermal"
+        f" air{damper}{inertia}.",
+        f"Volume: {choice.geometry_source}.",
+    ]
+    notes += [modelled.note] if modelled.note else []
     if is_lift:
-        note += (
+        notes.append(
             "The times of the valves are for isothermal air: with the default gas, which warms"
             " while it fills, they lift 3 to 6 % of the stroke too far. Delete the gas to see it,"
             " and close a loop where that matters."
         )
     else:
-        note += (
+        notes.append(
             "Chosen: the regulators, and a pendulum that gives the torque at both ends of the"
             " range."
         )
-    return scenario_toml(
-        f"{choice.size}: {choice.requirement.describe()}", plant, inputs, run, note
+        if choice.count > 1:
+            notes.append(
+                f"The joint has {choice.count} equal pairs of muscles, which move alike. This is"
+                f" one of them, with 1/{choice.count} of torque and inertia."
+            )
+    title = f"{choice.size}{choice.by_law}: {choice.requirement.describe()}"
+    return scenario_toml(title, plant, inputs, run, "\n".join(notes))
+
+
+class PlantMuscle(NamedTuple):
+    """The muscle of a choice for a plant, and a sentence on how its law is approximated there."""
+
+    muscle: Muscle
+    note: str
+
+
+def plant_muscle(choice: MuscleChoice) -> PlantMuscle:
+    """The muscle of a choice for a plant; a law that a plant cannot evaluate, such as a table, is
+    a polynomial in the part of its range that the motion needs.
+
+    Raises SolveError for a choice without a geometry.
+    """
+    muscle = choice.muscle
+    if muscle.muscle is not None:
+        return PlantMuscle(muscle.muscle, "")
+    entry = choice.entry
+    geometry = _known_geometry(choice)
+    low, high = muscle.contraction_range
+    first = max(low, choice.design.extended.contraction - OVERTRAVEL)
+    last = min(high, choice.design.contracted.contraction + OVERTRAVEL)
+    valid = ValidityRange(*muscle.pressure_range, first, last)
+    law = as_force_law(entry.characteristic, valid, degree=SURROGATE_DEGREE)
+    ratings = entry.ratings or Ratings()
+    note = (
+        f"Law: {entry.name} as a polynomial of pressure and contraction, with an error of at most"
+        f" about {law.max_error:.2g} N."
     )
+    return PlantMuscle(Muscle(law, geometry, validity_range=valid, ratings=ratings), note)
 
 
 class SizingScenario(NamedTuple):
-    """The scenario of the first choice that can be simulated: choice, text, and a sentence on it;
-    none without.
+    """The scenario of a choice: text, and a sentence on it; the text is empty where there is
+    none.
     """
 
-    choice: MuscleChoice | None
     text: str
     note: str
 
 
-def sizing_scenario(choices: Sequence[MuscleChoice], file: str) -> SizingScenario:
-    """The scenario of the first choice that has one; the sentence names `file`, or the reason why
-    there is none.
-    """
-    reasons = []
-    for rank, choice in enumerate(choices):
-        try:
-            text = scenario_text(choice)
-        except AirmuscleError as error:
-            reasons.append(str(error))
-            continue
-        note = (
-            f"The scenario of choice {rank + 1}, {choice.size}, is {file}; run airmuscle simulate"
-            " with it."
-        )
-        return SizingScenario(choice, text, note)
-    return SizingScenario(None, "", f"No scenario is written: {reasons[0]}" if reasons else "")
+def sizing_scenario(choice: MuscleChoice, file: str) -> SizingScenario:
+    """The scenario of a choice; the sentence names `file`, or the reason why there is none."""
+    try:
+        text = scenario_text(choice)
+    except AirmuscleError as error:
+        return SizingScenario("", f"No scenario is written: {error}")
+    return SizingScenario(
+        text,
+        f"The scenario of this choice, {choice.size}, is {file}; run airmuscle simulate with it.",
+    )
 
 
-def scenario_valves(choice: MuscleChoice | None) -> tuple[Valve, ...]:
-    """Fill and discharge valve of each muscle in the scenario of a choice; none without a
-    choice.
-    """
-    if choice is None:
-        return ()
+def scenario_valves(choice: MuscleChoice) -> tuple[Valve, Valve]:
+    """Fill and discharge valve of each muscle in the scenario of a choice."""
     duration = MOVING * choice.conditions.cycle_time
     return fill_valve(choice, duration), discharge_valve(choice, duration)
 
 
-def _muscles(choice: MuscleChoice, names: tuple[str, ...], damping: float) -> tuple[Muscle, ...]:
-    muscle = choice.muscle.muscle
-    assert muscle is not None  # the valves were sized with its volume
+def _muscles(
+    choice: MuscleChoice, muscle: Muscle, names: tuple[str, ...], damping: float
+) -> tuple[Muscle, ...]:
     damper = muscle.damper if choice.entry.damper is not None else LinearDamper(damping)
     return tuple(dataclasses.replace(muscle, name=name, damper=damper) for name in names)
 
 
-def _stiffness(choice: MuscleChoice) -> float:
+def _stiffness(choice: MuscleChoice, muscle: Muscle) -> float:
     """Stiffness [N/m] of one muscle at constant pressure in the middle between its end points."""
-    muscle = choice.muscle.muscle
     first, last = (choice.design.extended, choice.design.contracted)
-    assert muscle is not None
     pressure = 0.5 * (first.pressure + last.pressure)
     contraction = 0.5 * (first.contraction + last.contraction)
     return max(float(muscle.stiffness(pressure, contraction)), 0.0) / choice.length
@@ -257,20 +299,25 @@ def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism
     return Isotonic(weight, mass) if requirement.force else HangingMass(mass), mass
 
 
-def _lift(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
+def _lift(
+    choice: MuscleChoice, muscle: Muscle
+) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
     """Plant, input signals and run of a lift, and whether its moving mass is chosen."""
     assert isinstance(choice.requirement, LiftRequirement)
     cycle = choice.conditions.cycle_time
     mechanism, mass = _load(choice, choice.requirement)
     fill, discharge = scenario_valves(choice)
     damping = (
-        2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
+        2.0
+        * DAMPING_RATIO
+        * math.sqrt(choice.count * _stiffness(choice, muscle) * mass)
+        / choice.count
     )
     names = (
         tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
     )
     several = choice.count > 1
-    muscles = _muscles(choice, names, damping)
+    muscles = _muscles(choice, muscle, names, damping)
     circuit = FillDischarge(Supply(choice.conditions.supply), fill, discharge)
     plant = Plant(
         muscles if several else muscles[0],
@@ -298,16 +345,13 @@ def _lift(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], 
     return plant, inputs, run, mass != choice.requirement.mass
 
 
-def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
-    """Plant, input signals and run of a joint, and whether its inertia is chosen."""
-    requirement = choice.requirement
+def _joint(
+    choice: MuscleChoice, muscle: Muscle
+) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
+    """Plant, input signals and run of one pair of a joint, and whether its inertia is chosen."""
+    assert isinstance(choice.requirement, JointRequirement)
+    requirement = choice.requirement.reduced(load=1.0 / choice.count)
     cycle = choice.conditions.cycle_time
-    assert isinstance(requirement, JointRequirement)
-    if choice.count > 1:
-        raise SolveError(
-            f"{choice.entry.name}: the joint of a scenario has one muscle on each side, not"
-            f" {choice.count}. Give a maximum number of 1."
-        )
     design = choice.design
     half = 0.5 * requirement.angle
     fill, discharge = scenario_valves(choice)  # raises for a choice without a geometry
@@ -316,7 +360,7 @@ def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any],
         requirement.inertia
         or requirement.torque * (JOINT_MASS_TIME * cycle) ** 2 / requirement.angle
     )
-    stiffness = 2.0 * _stiffness(choice) * design.radius**2
+    stiffness = 2.0 * _stiffness(choice, muscle) * design.radius**2
     damping = 2.0 * DAMPING_RATIO * math.sqrt(stiffness * inertia) / (2.0 * design.radius**2)
     weight = requirement.torque / math.sin(min(half, 0.5 * math.pi))
     joint = AntagonisticJoint(
@@ -331,7 +375,7 @@ def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any],
     regulator = ProportionalRegulator(
         Supply(supply), fill, discharge, LAG, BAND, max_setpoint=supply
     )
-    muscles = _muscles(choice, ("left", "right"), damping)
+    muscles = _muscles(choice, muscle, ("left", "right"), damping)
     plant = Plant(muscles, (regulator, regulator), joint, Isothermal(), choice.conditions.ambient)
     low = design.extended.pressure
     high = design.contracted.pressure

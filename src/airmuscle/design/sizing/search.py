@@ -4,11 +4,11 @@ import numpy as np
 
 from ...core import AirmuscleError, ParameterError, SolveError, check_whole
 from ...files.library import Entry, own_length
-from ...physics.muscle import ElasticSeriesElement
-from ...physics.muscle.characteristic import validity_range_of
-from . import LiftRequirement, MuscleChoice, Requirement, SizingConditions, StaticMuscle
+from . import LiftRequirement, MuscleChoice, Requirement, SizingConditions
+from .laws_of_product import with_volume
 from .lengths import JointSearch, LiftSearch
 from .static_muscle import at_length, least_sufficient, length_range
+from .working_range import static_muscle
 
 LENGTHS = 49
 """Lengths that are tried for a law that depends on its length, before the shortest is refined
@@ -23,9 +23,11 @@ def choose(
     """The shortest muscles of one type, `count` in parallel (with a joint, on each side), that meet
     a requirement.
 
-    Raises SolveError or ParameterError, with the reason, if there are none.
+    A law without a geometry has that of `with_volume`. Raises SolveError or ParameterError, with
+    the reason, if there are none.
     """
     check_whole("choose", "count", count, 1)
+    entry, source = with_volume(entry)
     kind = LiftSearch if isinstance(requirement, LiftRequirement) else JointSearch
     search: Search = kind(requirement, conditions, count)  # type: ignore[arg-type]
     length = _shortest_length(entry, search, length_range(entry, conditions.max_length))
@@ -33,7 +35,7 @@ def choose(
     design = search.design(muscle, length)
     if design is None:
         raise SolveError(f"{entry.name}: {search.shortfall(muscle, length)}.")
-    choice = MuscleChoice(muscle, length, count, design, requirement, conditions)
+    choice = MuscleChoice(muscle, length, count, design, requirement, conditions, source)
     limit = conditions.max_diameter
     diameter = choice.diameter
     if limit == SizingConditions.max_diameter:  # no limit was given
@@ -46,52 +48,6 @@ def choose(
             f" {1e3 * limit:.4g} mm is allowed"
         )
     return choice
-
-
-def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
-    """The static muscle of an entry. Raises ParameterError if it has no working range, with the
-    reason.
-    """
-    valid = validity_range_of(entry.characteristic, entry.validity_range)
-    if valid is None:
-        raise ParameterError(
-            "no validity range is stated for its law; add [validity_range] to a muscle file"
-        )
-    if isinstance(entry.series, ElasticSeriesElement):
-        raise ParameterError(
-            "it has a series spring, of which the sizing does not know the stretch"
-        )
-    limits = (
-        {row.quantity: row for row in entry.ratings.ranges()} if entry.ratings is not None else {}
-    )
-    rated_pressure = limits.get("pressure")
-    rated_contraction = limits.get("contraction")
-    if rated_pressure is not None and not conditions.supply <= rated_pressure.high * (1 + 1e-9):
-        raise ParameterError(
-            f"the supply pressure of {conditions.supply / 1e5:.4g} bar exceeds the permitted "
-            f"{rated_pressure.high / 1e5:.4g} bar; reduce it"
-        )
-    low = max(
-        valid.min_pressure,
-        conditions.min_pressure,
-        rated_pressure.low if rated_pressure else -np.inf,
-    )
-    high = min(valid.max_pressure, conditions.supply)
-    if not low < high:
-        raise ParameterError(
-            f"its law is valid from {valid.min_pressure / 1e5:.4g} to"
-            f" {valid.max_pressure / 1e5:.4g} bar; the working range is"
-            f" {conditions.min_pressure / 1e5:.4g} to {conditions.supply / 1e5:.4g} bar"
-        )
-    ranges = [valid.contraction, entry.characteristic.contraction_range]
-    ranges += [entry.geometry.contraction_range] if entry.geometry is not None else []
-    ranges += (
-        [(rated_contraction.low, rated_contraction.high)] if rated_contraction is not None else []
-    )
-    contraction = max(r[0] for r in ranges), min(r[1] for r in ranges)
-    if not contraction[0] < contraction[1]:
-        raise ParameterError("the ranges of contraction of its law and of its maker do not overlap")
-    return StaticMuscle(entry, (low, high), contraction)
 
 
 def _shortest_length(entry: Entry, search: Search, lengths: tuple[float, float]) -> float:

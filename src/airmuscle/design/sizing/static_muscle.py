@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr, SolveError
-from ...files.library import Entry, own_length, scale_entry
+from ...files.library import Entry, own_length, products_of_laws, scale_entry
 from ...physics.muscle import LENGTH_BOUNDS, Muscle
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from ...physics.muscle.characteristic.modes import formula_alone
@@ -19,15 +19,17 @@ LEAST_DIAMETERS = 3.0
 """Least nominal length over the nominal diameter (chosen). The makers state one range of lengths
 for all diameters; a muscle shorter than three diameters is its two end fittings, to which no law of
 a cylinder applies."""
-EXPANSION = 1.75
-"""Ratio of the diameter at pressure to that at rest, for a law without a geometry (chosen): that of
-a braid of 25 degrees at a contraction of 25 %."""
 OUTLINE_POINTS = 33
 """Contractions at which the diameter is evaluated; linear between them (chosen)."""
 BISECTIONS = 80
 """Bisections of the force of a law that is not solved for it; they reach rounding precision."""
 TRIAL_RATIO = 1.001
 """Ratio of lengths of the trial that finds whether a law can be scaled (chosen)."""
+
+
+def product_of(entry: Entry) -> str:
+    """The product of a law, or the name of the law."""
+    return products_of_laws().get(entry.name) or entry.name
 
 
 class EndPoint(NamedTuple):
@@ -108,9 +110,11 @@ class StaticMuscle(ShortRepr):
         return EndPoint(pressure, contraction, float(self.force(pressure, contraction)), capacity)
 
     def volume(self, pressure: float, contraction: float) -> float | None:
-        """Enclosed volume [m3]; None for a law without a geometry."""
-        if self.muscle is None:
+        """Enclosed volume [m3]; None without a geometry."""
+        if self.entry.geometry is None:
             return None
+        if self.muscle is None:
+            return float(self.entry.geometry.volume(contraction))
         return float(
             self.muscle.volume(contraction, self.muscle.steady_state(pressure, contraction))
         )
@@ -125,14 +129,11 @@ class StaticMuscle(ShortRepr):
         return 2.0 * float(np.max(radii))
 
     def outer_diameter(self, contraction: Array) -> Array:
-        """Outer diameter at pressure [m] at contractions (N,), without the wall; 0 if it is not
-        known.
-
-        That of the geometry; without one, 1.75 times the nominal diameter of the product.
+        """Outer diameter at pressure [m] at contractions (N,), without the wall; 0 without a
+        geometry.
         """
         if self.entry.geometry is None:
-            nominal = self.entry.ratings.diameter if self.entry.ratings is not None else 0.0
-            return np.full(np.shape(contraction), EXPANSION * nominal)
+            return np.zeros(np.shape(contraction))
         return np.interp(contraction, *self._outline)
 
     @functools.cached_property

@@ -3,16 +3,16 @@
 import functools
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import AirmuscleWarning, plotting
-from ...files.library import list_valves, load, products_of_laws
+from ...files.library import list_valves, load
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars, isobar_figure
 from ...report.chapter import Plot, Table, TableColumn
-from . import LiftRequirement, MuscleChoice
+from . import LawOfProduct, LiftRequirement, MuscleChoice
 from .scenario import MOVING, air_path
 
 SHORT_VALVES = 4
@@ -21,46 +21,90 @@ POINTS = 121
 """Points of the curve of the capacity."""
 
 
-def product_of(choice: MuscleChoice) -> str:
-    """The product on which the law of a choice was measured, or the name of its entry."""
-    return products_of_laws().get(choice.entry.name) or choice.entry.name
-
-
 def product_table(choices: Sequence[MuscleChoice]) -> Table:
-    """One row for each product and number of muscles: its best law, and the lengths by all its
-    laws.
-    """
-    groups: dict[tuple[str, int], list[MuscleChoice]] = {}
-    for choice in choices:
-        groups.setdefault((product_of(choice), choice.total_count), []).append(choice)
-    first = [group[0] for group in groups.values()]
+    """One row for each product and number of muscles, by the law of the product that is used."""
     cycle = choices[0].conditions.cycle_time
-    volumes = [choice.reference_volume for choice in first]
-    lengths = [sorted(choice.length for choice in group) for group in groups.values()]
-    designs = [choice.design for choice in first]
-    several = any(len(each) > 1 for each in lengths)
+    volumes = [choice.reference_volume for choice in choices]
+    designs = [choice.design for choice in choices]
     columns: dict[str, Any] = {
-        "product": [product for product, _ in groups],
-        "number": [number for _, number in groups],
-        "nominal length": TableColumn([choice.length for choice in first], "m", "mm"),
-        "length by all laws": TableColumn(
-            [(each[0], each[-1]) for each in lengths], "m", "mm", brief=several
+        "product": [choice.product for choice in choices],
+        "number": [choice.total_count for choice in choices],
+        "nominal length": TableColumn([choice.length for choice in choices], "m", "mm"),
+        "mounting area": TableColumn(
+            [choice.area for choice in choices], "m2", "cm2", 3, short="area"
         ),
-        **_radius(first, short="radius"),
+        **_radius(choices, short="radius"),
         "pressure": TableColumn(
             [(c.extended.pressure, c.contracted.pressure) for c in designs], "Pa", "bar", 3
         ),
-        "reserve": TableColumn([each.reserve for each in designs], "1", "%", 3),
+        "reserve": TableColumn([design.reserve for design in designs], "1", "%", 3),
         "air a minute": TableColumn(
             [v and 60.0 * v / cycle for v in volumes], "m3 (ANR)", "l (ANR)", 3
         ),
-        "law": TableColumn([choice.entry.name for choice in first], brief=False),
+        "law": TableColumn([choice.entry.name for choice in choices], brief=False),
     }
     note = (
-        "Each product by the law of its best choice; length by all laws: the range by its published"
-        " laws."
+        "Mounting area: number of muscles x outer diameter at the contracted end x nominal length."
+        " Reserve: force beyond the load at the maximum working pressure, as a part of the load."
     )
-    return Table("products", "Products, best first", columns, note, brief=len(first))
+    return Table("products", "Products, best first", columns, note, brief=len(choices))
+
+
+def law_table(laws: Sequence[LawOfProduct], best: MuscleChoice) -> tuple[Table, ...]:
+    """The published laws of each product with several, side by side: what they rest on, where they
+    are valid, and the length that each gives; of the best choice in the brief view.
+    """
+    products = [law.product for law in laws]
+    rows = [
+        LawRow(law, number, law is laws[products.index(law.product)] and law.coverage > 0.0)
+        for law in laws
+        if products.count(law.product) > 1
+        for number in sorted({*law.choices, *law.reasons} - {0})
+    ]
+    if not rows:
+        return ()
+    rows.sort(key=lambda row: (not row.is_of(best), products.index(row.law.product), row.number))
+    columns: dict[str, Any] = {
+        "product": [row.law.product for row in rows],
+        "number": [row.number * best.total_count // best.count for row in rows],
+        "law": [row.law.name for row in rows],
+        "used": ["yes" if row.is_used else "no" for row in rows],
+        "rests on": [row.law.strength for row in rows],
+        "covers": TableColumn([row.law.coverage for row in rows], "1", "%", 2),
+        "nominal length": TableColumn([row.length for row in rows], "m", "mm"),
+        "range, or reason": TableColumn([row.remark for row in rows], brief=False),
+    }
+    note = (
+        "The law that is used covers at least half of the working range of the product, its"
+        " pressures and contractions, and of these rests on most: the table of the maker, then a"
+        " measurement of a specimen of stated length, then of another one, then a shape without"
+        " measurements. Lengths by different laws are not averaged."
+    )
+    brief = sum(row.is_of(best) for row in rows)
+    return (Table("laws", "Published laws of each product", columns, note, brief=brief),)
+
+
+class LawRow(NamedTuple):
+    """One law of a product with a number of muscles in parallel."""
+
+    law: LawOfProduct
+    number: int
+    is_used: bool
+
+    def is_of(self, choice: MuscleChoice) -> bool:
+        """Whether the row is of the product and the number of a choice."""
+        return (self.law.product, self.number) == (choice.product, choice.count)
+
+    @property
+    def length(self) -> float | None:
+        """Length by the law [m]; None where there is none."""
+        choice = self.law.choices.get(self.number)
+        return None if choice is None else choice.length
+
+    @property
+    def remark(self) -> str:
+        """The range of the law, or the reason why it gives no length."""
+        return self.law.reasons.get(self.number) or self.law.extent
 
 
 def _radius(choices: Sequence[MuscleChoice], short: str = "") -> dict[str, TableColumn]:
@@ -87,8 +131,8 @@ def end_point_table(choices: Sequence[MuscleChoice]) -> Table:
             columns[f"{name}, {end}"] = TableColumn(values, unit, shown)
     columns["reserve"] = TableColumn([choice.design.reserve for choice in choices], "1", "%")
     note = (
-        "Long and short: the end points of each muscle. Reserve: force beyond the load at the"
-        " largest working pressure. Rows of one product are different published laws of it."
+        "Long and short: the extended and the contracted end point of each muscle. Reserve: force"
+        " beyond the load at the maximum working pressure, as a part of the load."
     )
     return Table("choices", "Choices, best first", columns, note)
 
@@ -96,7 +140,7 @@ def end_point_table(choices: Sequence[MuscleChoice]) -> Table:
 def _common(choices: Sequence[MuscleChoice]) -> dict[str, Any]:
     return {
         "muscle": [choice.entry.name for choice in choices],
-        "product": [product_of(choice) for choice in choices],
+        "product": [choice.product for choice in choices],
         "number": [choice.total_count for choice in choices],
         "nominal length": TableColumn([choice.length for choice in choices], "m", "mm"),
     }
@@ -122,10 +166,11 @@ def air_table(choices: Sequence[MuscleChoice]) -> Table:
         columns["minimum radius at 1.1 L"] = TableColumn([low for low, _ in ends], "m", "mm")
         columns["maximum radius at 1.1 L"] = TableColumn([high for _, high in ends], "m", "mm")
     note = (
-        "Air: that of all muscles, at the reference atmosphere of ISO 8778, without tubes; – where"
-        " the law has no geometry. Energy: available energy of this air at the supply pressure."
-        " Efficiency: work against the load divided by it. A minute: without pauses. Diameter: at"
-        " the contracted end, without the wall."
+        "Air consumption is the total of all muscles at the reference atmosphere of ISO 8778,"
+        " without tubes; a dash indicates that the volume is unknown. Consumption per minute"
+        " assumes continuous cycling. Energy: available energy of this air at the supply pressure."
+        " Efficiency: work against the load divided by this energy. Diameter: at the contracted"
+        " end, without the wall."
     )
     return Table("air", "Air and dimensions", columns, note)
 
@@ -169,19 +214,16 @@ def valve_table(choice: MuscleChoice) -> Table:
         " reaches the cycle time. Switching times and tubes are not contained. The smallest valve"
         " that does so is first; valves that do not, or that have the stated warning, are last."
     )
-    title = (
-        f"Valves of the library that reach the cycle time with {choice.entry.name},"
-        f" {1e3 * choice.length:.4g} mm"
-    )
+    title = f"Valves of the library that reach the cycle time with {choice.size}"
     return Table("valves", title, columns, note, brief=min(SHORT_VALVES, len(suitable)))
 
 
 def sizing_plot(choice: MuscleChoice) -> Plot:
     """The chart of one muscle of a choice, as a sizing tool draws it."""
     caption = (
-        f"Force of one {choice.entry.name} over its contraction at constant gauge pressures, with"
-        " both working points. The capacity is the force at the maximum working pressure within"
-        " the permitted force."
+        f"Force of one {choice.product}{choice.by_law} over its contraction at constant gauge"
+        " pressures, with both working points. The capacity is the force at the maximum working"
+        " pressure within the permitted force."
     )
     return Plot("working_points", caption, functools.partial(_figure, choice))
 

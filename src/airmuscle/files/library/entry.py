@@ -49,6 +49,12 @@ MISSING_GEOMETRY = (
 """Geometry that a law needs to be a muscle, and the ways to give and to measure it."""
 PATHS = ("valve", "exhaust")
 """Flow paths through a valve that a file may describe; the first is the default."""
+MAKERS_TABLE = "maker's table"
+MEASURED = "measurement"
+GEOMETRIC = "geometric model"
+EVIDENCE = (MAKERS_TABLE, MEASURED, GEOMETRIC)
+"""Words for what a law rests on, the strongest first: values that the maker of the product states,
+measured points, or a shape of the muscle without measured points."""
 CONDITIONS = {
     "pressure": ("Pa", ("contraction", "force")),
     "contraction": ("1", ("pressure", "force")),
@@ -125,6 +131,7 @@ class Entry(EntryDisplay):
     """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a
     plant.
 
+    `evidence` is what the law rests on, a word of EVIDENCE, or empty where it is not stated.
     `validity_range` is the range of the measurements or the publication, `uncertainty` the standard
     errors and correlations of fitted parameters, if the file states them, `error_band` the 95 %
     band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if
@@ -146,9 +153,12 @@ class Entry(EntryDisplay):
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
     uncertainty: ParameterUncertainty | None = None
     error_band: StatedBand | None = None
+    evidence: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.evidence:
+            check_known("evidence: there is no", self.evidence, EVIDENCE)
         permitted = None if self.ratings is None else self.ratings.max_force
         law = with_stated_range(self.characteristic, self.validity_range, permitted)
         object.__setattr__(self, "characteristic", law)

@@ -33,7 +33,7 @@ from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...report.shown import value_text
 from . import ParameterUncertainty, StatedBand, is_path, load_law, model_class, model_names
-from .entry import MISSING_GEOMETRY, Entry
+from .entry import MEASURED, MISSING_GEOMETRY, Entry
 from .scaling import entry_at_length
 
 MAX_NAMES = 3
@@ -146,6 +146,7 @@ def fitted_entry(
         name="muscle",
         title=title,
         provenance="fitted",
+        evidence=MEASURED,
         note=note,
         warning=misfit_warning(result.misfit),
         characteristic=result.model,
@@ -229,6 +230,7 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         name="muscle",
         title=title,
         provenance="fitted",
+        evidence=MEASURED,
         characteristic=law,
         geometry=campaign.geometry(length),
         damper=campaign.release.damper if isinstance(campaign.release, ReleaseStage) else None,

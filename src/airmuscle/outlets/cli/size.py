@@ -20,8 +20,8 @@ def size(
     For each muscle whose law and permitted values are known: the shortest length that reaches both
     ends of the motion within ratings, validity range and supply, alone and in parallel, with
     pressures, reserve and air of a cycle. With --out, DIR/report.html shows the force-contraction
-    chart and all choices, and DIR/scenario.toml is the best choice that `airmuscle simulate` can
-    run, with valves for the cycle time.
+    chart and all choices, and DIR/scenario.toml is the best choice for `airmuscle simulate`, with
+    valves for the cycle time.
 
     \b
     Examples:
@@ -37,7 +37,7 @@ def size(
     with execution.executor(out, alone=True) as workers, progress_bars("sizing") as show:
         result = request.evaluate(lambda fraction: show("", fraction), workers)
     scenario = sizing_scenario(
-        result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out"
+        result.best, SCENARIO_FILE if out is not None else "scenario.toml of --out"
     )
     files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
     deliver("size", [result.chapter(scenario)], json=json, out=out, title="Sizing", files=files)

@@ -117,10 +117,11 @@ class SizeRequest:
     sort: str = option(
         f"Criterion of ranking: {', '.join(SORT_KEYS)}.",
         choices=SORT_KEYS,
-        default="air",
+        default="area",
         metavar="KEY",
         label="Rank by",
         offered=(
+            ("area", "mounting area"),
             ("air", "air of a cycle"),
             ("length", "length"),
             ("count", "number of muscles"),

@@ -17,7 +17,6 @@ import airmuscle as am
 from ...bench.readers.file_kind import parse_toml
 from ...core import AirmuscleError, Array, ParameterError, is_known_unit
 from ...design.sizing.scenario import sizing_scenario
-from ...design.sizing.tables import product_of
 from ...files.library import Location, is_path, list_plants, plant_tables, read_toml
 from ...files.library.loading import build_entry, check_describes_law, load_law
 from ...physics.muscle.characteristic.validity_range import validity_range_of
@@ -163,7 +162,7 @@ def size_sheet(text: str) -> dict[str, Any]:
     stated = read_request(text)
     request = build(SizeRequest, stated, lambda name: name.replace("_", " "))
     result = request.evaluate()
-    chapter = result.chapter(sizing_scenario(result.choices, "in the page"))
+    chapter = result.chapter(sizing_scenario(result.best, "in the page"))
     sheet: dict[str, Any] = {
         "tab": "size",
         "name": "sizing",
@@ -206,7 +205,7 @@ def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
     design = choice.design
     radius = choice.design.radius
     of_radius = "" if radius is None else f", pulley radius {1e3 * radius:.4g} mm"
-    label = f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}"
+    label = f"{choice.total_count} × {choice.product}, {1e3 * choice.length:.4g} mm{of_radius}"
     curves = compute_isobars(
         entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range)
     )

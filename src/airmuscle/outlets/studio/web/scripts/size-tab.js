@@ -97,7 +97,7 @@
       table.classList.add("choices");
       this.rows = [...table.querySelectorAll("tbody tr")];
       this.summary.textContent = sheet.paragraphs.join(" ");
-      this.table.replaceChildren(chapterTable(products), element("p.small.soft", {}, products.note), element("h3", {}, "By each published law"), table);
+      this.table.replaceChildren(chapterTable(products), element("p.small.soft", {}, products.note), element("h3", {}, "End points"), table);
       this.further.replaceChildren(...Object.values(others).map((each) => element("details", {}, element("summary", {}, each.title), chapterTable(each), each.note ? element("p.small.soft", {}, each.note) : null)));
       this.unsuitable.replaceChildren(unsuitable ? chapterTable(unsuitable) : element("p.small", {}, "None."));
       this.choose(Math.min(Math.max(0, chosen), sheet.choices.length - 1));
