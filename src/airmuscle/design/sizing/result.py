@@ -195,9 +195,9 @@ class SizingResult(Reported):
         """Which law of the product of the best choice is used and why, and what the others give;
         empty where there is one law.
         """
-        used, *others = self._laws_of_the_best or [None]
-        if used is None or not others:
+        if len(self._laws_of_the_best) < 2:
             return ""
+        used, *others = self._laws_of_the_best
         by_others = "; ".join(
             f"{law.name} ({law.describe()}) {_given(law, self.best)}" for law in others
         )
