@@ -40,8 +40,7 @@ from airmuscle.design import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.design.sizing import air_path
-from airmuscle.design.sizing.working_range import static_muscle
+from airmuscle.design.sizing import air_path, static_muscle
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.files import Entry
 from airmuscle.physics import (

@@ -25,10 +25,14 @@ from airmuscle.design import (
     SizingResult,
     size_muscles,
 )
-from airmuscle.design.sizing.laws_of_product import DISAGREEMENT, LEAST_COVERAGE, STRENGTHS
-from airmuscle.design.sizing.requirement_and_choice import CRITERIA
-from airmuscle.design.sizing.scenario import sizing_scenario
-from airmuscle.report.chapter import Chapter, Table
+from airmuscle.design.sizing import (
+    CRITERIA,
+    DISAGREEMENT,
+    LEAST_COVERAGE,
+    STRENGTHS,
+    sizing_scenario,
+)
+from airmuscle.report import Chapter, Table
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 

@@ -1,4 +1,8 @@
+from .laws_of_product import DISAGREEMENT as DISAGREEMENT
+from .laws_of_product import LEAST_COVERAGE as LEAST_COVERAGE
+from .laws_of_product import STRENGTHS as STRENGTHS
 from .laws_of_product import LawOfProduct as LawOfProduct
+from .requirement_and_choice import CRITERIA as CRITERIA
 from .requirement_and_choice import SORT_KEYS as SORT_KEYS
 from .requirement_and_choice import JointRequirement as JointRequirement
 from .requirement_and_choice import LiftRequirement as LiftRequirement
@@ -23,6 +27,8 @@ from .scenario import discharge_valve as discharge_valve
 from .scenario import fill_valve as fill_valve
 from .scenario import scenario_text as scenario_text
 from .scenario import scenario_valves as scenario_valves
+from .scenario import sizing_scenario as sizing_scenario
 from .search import choose as choose
 from .static_muscle import EndPoint as EndPoint
 from .static_muscle import StaticMuscle as StaticMuscle
+from .working_range import static_muscle as static_muscle
