@@ -7,8 +7,8 @@ with the tolerance 1e-9 of both; contacts amplify this to 1e-5.
 
 from __future__ import annotations
 
-import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,14 @@ import plants
 import printed
 import pytest
 from command_line import airmuscle
+from modelica_block import ModelicaBlock
 
 from airmuscle.control import PID
 from airmuscle.engine import ControlLoop, Problem, Rodas4, Schedule, solve
 from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_modelica
+from airmuscle.physics import ValidityRange
 
 SOME = ("dmsp-20-300", "overlap", "arm")
 CONTACTS = ("stop, lagging wall", "pulley with stops", "joint with stops")
@@ -36,25 +38,6 @@ begin contracted.
 PLANTS = [
     pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES
 ]
-FUNCTIONS = {
-    "log1p": math.log1p,
-    "expm1": math.expm1,
-    "asinh": math.asinh,
-    "abs": abs,
-    "sqrt": math.sqrt,
-    "floor": math.floor,
-    "exp": math.exp,
-    "log": math.log,
-    "sin": math.sin,
-    "cos": math.cos,
-    "tan": math.tan,
-    "atan": math.atan,
-    "asin": math.asin,
-    "acos": math.acos,
-    "tanh": math.tanh,
-    "sinh": math.sinh,
-    "cosh": math.cosh,
-}
 
 
 def package(name, folder, **options):
@@ -63,79 +46,37 @@ def package(name, folder, **options):
     return plant, write_modelica(problem, folder, name="joint", **options)
 
 
-def equations_of(path):
-    """The left and right sides of the equations, in their order, as expressions of Python."""
-    text = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-    lines = text[text.index("  equation\n") : text.index("  end Plant;")].splitlines()[1:]
-    for line in lines:
-        left, _, right = line.partition("//")[0].strip().rstrip(";").partition(" = ")
-        choice = re.fullmatch(r"noEvent\(if (.*) then (.*) else (.*)\)", right)
-        if choice:
-            right = f"(({choice[2]}) if ({choice[1]}) else ({choice[3]}))"
-        yield left, right.replace("noEvent", "").replace("^", "**")
-
-
 @pytest.mark.parametrize("name", ["dmsp-20-300", "overlap", "LuGre"])
 def test_its_equations_give_rates_and_outputs_of_the_library(name, tmp_path):
-    """Read by an evaluator of this test: each equation defines one variable from those before
-    it.
-    """
+    """Read by an evaluator of the tests: each equation defines one variable from those before it."""
     plant, (path,) = package(name, tmp_path)
     ready = compile_system(plant)
-    equations = [(a, compile(b, a, "eval")) for a, b in equations_of(path)]
-    words = re.findall(
-        r"^    (input Real|Real|parameter Real) (\w+)\(",
-        path.read_text(encoding="utf-8"),
-        re.MULTILINE,
-    )
-    names = {
-        kind: [word for each, word in words if each == kind]
-        for kind in ("input Real", "Real", "parameter Real")
-    }
+    block = ModelicaBlock(path)
     states, inputs = printed.points_of(plant)
     for x, u in zip(states, inputs, strict=True):
-        values = dict(zip(names["parameter Real"], ready.parameters.tolist(), strict=True))
-        values |= dict(zip(names["Real"], x.tolist(), strict=True))
-        values |= dict(zip(names["input Real"], u.tolist(), strict=True))
-        found = {}
-        for left, right in equations:
-            found[left] = values[left] = eval(right, FUNCTIONS, values)
+        found = block.values(ready.parameters.tolist(), x.tolist(), u.tolist())
         expected = np.zeros(ready.sizes.outputs)
         ready.call("outputs", x.copy(), np.append(u, 0.0), ready.precomputed, expected)
-        rates = [found[f"der({state})"] for state in names["Real"]]
+        rates = [found[f"der({state})"] for state in block.states]
         np.testing.assert_allclose(rates, ready.rates(x, np.append(u, 0.0)), rtol=1e-11)
         outputs = [v for left, v in found.items() if not re.fullmatch(r"der\(\w+\)|v\d+", left)]
         np.testing.assert_allclose(outputs, expected, rtol=1e-11)
 
 
-@pytest.mark.tool
-@pytest.mark.parametrize("name", PLANTS)
-def test_rumoca_simulates_it_to_the_results_of_the_library(name, tmp_path):
+def check_rumoca(problem, levels, folder, bar):
+    """A run of rumoca has the columns of the library; `levels` are the constant inputs."""
     rumoca = pytest.importorskip("rumoca", reason="needs the package rumoca")
-    plant = plants.EXAMPLES[name]
-    levels = {
-        each.name: GIVEN.get(each.unit, 0.3) / (1 + i // 2 if each.unit == "1" else 1)
-        for i, each in enumerate(plant.input_variables)
-    }
-    inputs = Schedule({each: ((0.0, value),) for each, value in levels.items()})
-    state = plant.state_at(
-        pressure=1e5, **({"position": 0.02} if name in UNBOUNDED_AT_REST else {})
-    )
-    problem = Problem(plant, inputs, 0.3, state, integrator=Rodas4(1e-9), output_times=0.01)
     expected = solve(problem).raise_if_incomplete().recording
-    write_modelica(problem, tmp_path, name="joint")
+    write_modelica(problem, folder, name="joint")
     given = "".join(
-        f"  plant.{re.sub(r'[^a-zA-Z0-9]', '_', each)} = {value!r};\n"
-        for each, value in levels.items()
+        f"  plant.{re.sub(r'[^a-zA-Z0-9]', '_', name)} = {value!r};\n"
+        for name, value in levels.items()
     )
-    (tmp_path / "Run.mo").write_text(
-        f"model Run\n  joint.Plant plant;\nequation\n{given}end Run;\n"
-    )
-    model = rumoca.Session(roots=[str(tmp_path)]).load(str(tmp_path / "Run.mo"), model="Run")
-    assert len(model.states) == len(plant.states)
-    run = model.simulate(
-        0.3, dt=0.01, config=rumoca.SimConfig(rtol=1e-9, atol=1e-12, max_wall_seconds=60)
-    )
+    (folder / "Run.mo").write_text(f"model Run\n  joint.Plant plant;\nequation\n{given}end Run;\n")
+    model = rumoca.Session(roots=[str(folder)]).load(str(folder / "Run.mo"), model="Run")
+    assert len(model.states) == len(problem.system.states)
+    config = rumoca.SimConfig(rtol=1e-9, atol=1e-12, max_wall_seconds=60)
+    run = model.simulate(problem.duration, dt=0.01, config=config)
     time = np.asarray(run.time)
     last = len(expected["time"])
     np.testing.assert_allclose(time[:last], expected["time"], atol=1e-12)
@@ -144,13 +85,44 @@ def test_rumoca_simulates_it_to_the_results_of_the_library(name, tmp_path):
         for column in expected
         if column != "time" and np.abs(expected[column]).max(initial=0.0) > 0.0
     ]
-    assert {"pressure", "m0.pressure", "one.pressure"} & set(moving)
     for column in moving:
-        found = np.asarray(run[f"plant.{re.sub(r'[^a-zA-Z0-9]', '_', column)}"])[:last]
-        bar = 1e-5 if name in CONTACTS else 1e-6
-        assert np.abs(found - expected[column]).max() <= bar * np.abs(expected[column]).max(), (
-            column
-        )
+        values = np.asarray(run[f"plant.{re.sub(r'[^a-zA-Z0-9]', '_', column)}"])[:last]
+        deviation = np.abs(values - expected[column]).max()
+        assert deviation <= bar * np.abs(expected[column]).max(), column
+    return expected, moving
+
+
+@pytest.mark.tool
+@pytest.mark.parametrize("name", PLANTS)
+def test_rumoca_simulates_it_to_the_results_of_the_library(name, tmp_path):
+    plant = plants.EXAMPLES[name]
+    levels = {
+        variable.name: GIVEN.get(variable.unit, 0.3) / (1 + i // 2 if variable.unit == "1" else 1)
+        for i, variable in enumerate(plant.input_variables)
+    }
+    inputs = Schedule({name: ((0.0, value),) for name, value in levels.items()})
+    state = plant.state_at(
+        pressure=1e5, **({"position": 0.02} if name in UNBOUNDED_AT_REST else {})
+    )
+    problem = Problem(plant, inputs, 0.3, state, integrator=Rodas4(1e-9), output_times=0.01)
+    _, moving = check_rumoca(problem, levels, tmp_path, 1e-5 if name in CONTACTS else 1e-6)
+    assert {"pressure", "m0.pressure", "one.pressure"} & set(moving)
+
+
+@pytest.mark.tool
+def test_rumoca_moves_a_muscle_through_the_ends_of_its_range(tmp_path):
+    """A muscle of 200 mm that is stretched by 5 %, let go, and thrown until it is slack."""
+    plant = plants.EXAMPLES["dmsp-20-300"]
+    muscle = replace(plant.muscle, validity_range=ValidityRange(0.5e5, 6e5, 0.0, 0.1))
+    plant = replace(plant, muscle=muscle)
+    levels = dict.fromkeys(plant.inputs, 0.0)
+    inputs = Schedule(dict.fromkeys(plant.inputs, ((0.0, 0.0),)))
+    state = plant.state_at(pressure=3e5, position=-0.01)
+    problem = Problem(plant, inputs, 0.3, state, integrator=Rodas4(1e-9), output_times=0.01)
+    expected, _ = check_rumoca(problem, levels, tmp_path, 1e-6)
+    assert expected["contraction"].min() < -0.04
+    assert expected["contraction"].max() > 0.11
+    assert expected["force"].min() == 0.0
 
 
 @pytest.mark.tool

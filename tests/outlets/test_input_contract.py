@@ -605,6 +605,108 @@ def test_an_exported_loop_refuses_a_set_point_that_is_not_finite(setpoint, tmp_p
     assert printed.finished(octave, tmp_path / "m")[1] == "3 0"
 
 
+def of_python_start(folder):
+    def status(start):
+        closed = SampledSignal(dict.fromkeys(LIFT.inputs, ((0.0, 0.0),)))
+        state = dict(zip(START, start, strict=True))
+        try:
+            simulate(LIFT, closed, duration=STEP, initial_state=state)
+        except AirmuscleError:
+            return 3
+        return 0
+
+    return status
+
+
+C_START = r"""
+#include <math.h>
+#include <stdio.h>
+#include "lift.h"
+int main(void)
+{
+  lift_solver s;
+  double c[LIFT_PRECOMPUTED + 1];
+  const double still[LIFT_INPUTS + 1] = {0.0}, x[] = {@};
+  lift_prepare(lift_defaults, c);
+  lift_begin(&s, 0.0, x);
+  lift_set_segment(&s, 5e-3, still, still);
+  printf("%d", lift_step(&s, c));
+  return 0;
+}
+"""
+
+
+def of_c_start(folder):
+    write_program(problem(), folder, C99(), name="lift")
+
+    def status(start):
+        words = {math.inf: "INFINITY", -math.inf: "-INFINITY"}
+        values = ["NAN" if x != x else words.get(x, repr(x)) for x in start]
+        (folder / "main.c").write_text(C_START.replace("@", ", ".join(values)))
+        return int(printed.finished([printed.built(folder)], folder)[1])
+
+    return status
+
+
+JS_START = """
+import * as lift from "./lift.mjs";
+const initial = JSON.parse(process.argv[2]).map((text) => Number(text));
+try {
+  console.log(lift.simulate({initial}).status);
+} catch (error) {
+  if (!(error instanceof RangeError)) throw error;
+  console.log(3);
+}
+"""
+
+
+def of_javascript_start(folder):
+    write_program(problem(), folder, JavaScript(), name="lift")
+    (folder / "driver.mjs").write_text(JS_START)
+
+    def status(start):
+        words = {math.inf: "Infinity", -math.inf: "-Infinity"}
+        texts = ["NaN" if x != x else words.get(x, repr(x)) for x in start]
+        command = [printed.require("node"), "driver.mjs", json.dumps(texts)]
+        return int(printed.finished(command, folder)[1])
+
+    return status
+
+
+def of_octave_start(folder):
+    octave = printed.require("octave-cli")
+    write_program(problem(), folder, Octave(), name="lift")
+
+    def status(start):
+        words = {math.inf: "Inf", -math.inf: "-Inf"}
+        texts = ["NaN" if x != x else words.get(x, repr(x)) for x in start]
+        script = (
+            f"model = lift(); r = model.simulate(struct('initial', [{' '.join(texts)}]));"
+            " printf('%d', r.status)"
+        )
+        command = [octave, "--no-init-file", "--quiet", "--eval", script]
+        return int(printed.finished(command, folder)[1])
+
+    return status
+
+
+STARTS = {
+    "simulate": of_python_start,
+    "C": of_c_start,
+    "JavaScript": of_javascript_start,
+    "Octave": of_octave_start,
+}
+
+
+@pytest.mark.parametrize("target", STARTS)
+def test_a_run_refuses_a_start_that_is_not_finite(target, tmp_path):
+    status = STARTS[target](tmp_path)
+    usual = tuple(START.values())
+    assert status(usual) == 0
+    for k, wrong in ((0, math.nan), (2, math.nan), (2, math.inf), (3, -math.inf)):
+        assert status((*usual[:k], wrong, *usual[k + 1 :])) == 3
+
+
 @pytest.mark.tool
 @pytest.mark.parametrize(
     ("name", "control"),

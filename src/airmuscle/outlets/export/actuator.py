@@ -10,7 +10,8 @@ observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validit
 prepare(p, c)        c, what these need of the parameters
 
 A command beyond its range is limited. With a number in z or a step h that is not finite, `step`
-returns the states as they are, and `observe` gives NaN, NaN and 0.
+returns the states as they are, and `observe` gives NaN, NaN and 0, which it also gives after a
+start at a pressure or length that is not finite.
 """
 
 import dataclasses
@@ -130,7 +131,9 @@ class ActuatorModel:
             low, high = limit.bounds
             valid = nodes.logical_and(valid, value >= low) if np.isfinite(low) else valid
             valid = nodes.logical_and(valid, value <= high) if np.isfinite(high) else valid
-        shown = [nodes.where(usable, result, np.nan) for result in results]
+        # a comparison with a pressure that is NaN, after a start without a number, would be slack
+        known_pressure = nodes.logical_and(usable, _all_finite([known["pressure"]]))
+        shown = [nodes.where(known_pressure, result, np.nan) for result in results]
         return {"x": t.x, "z": z, "p": t.p}, [*shown, valid]
 
     @functools.cached_property
