@@ -24,8 +24,12 @@ from airmuscle.physics import (
     EndStop,
     ForceLaw,
     HuntCrossley,
+    LinearSpring,
+    Muscle,
+    Ratings,
     SeriesSpring,
     ValidityRange,
+    Vessel,
     as_force_law,
 )
 
@@ -55,6 +59,37 @@ def test_the_force_at_the_pressure_of_the_inverse_is_the_wanted_one(name):
     contractions = np.broadcast_to(contraction, force.shape)[:, rising]
     found = inverse.pressure(contractions, taut)
     assert np.abs(inverse.force(found, contractions) - taut).max() <= 1e-9 * np.abs(taut).max()
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_beyond_the_range_the_inverse_is_that_of_the_muscle_in_a_plant(name):
+    """Stretched and slack, by numbers and as a traced expression, as which a loop compiles it."""
+    law = LAWS[name]
+    if law.refuses_beyond:
+        pytest.skip("the law refuses what lies beyond its range")
+    muscle = Muscle(
+        law,
+        Vessel(2e-4),
+        spring=LinearSpring(500.0),
+        validity_range=ValidityRange(0.5e5, 6e5, 0.0, 0.12),
+        ratings=Ratings(max_force=1500.0),
+    )
+    inverse = StaticInverse(muscle, max_pressure=6e5)
+    traced = autodiff.value_and_derivative(inverse, "pressure", 2)
+    checked = 0
+    for contraction in (-0.2, -0.05, -0.01, 0.13, 0.16):
+        for pressure in np.linspace(0.5e5, 5.5e5, 11):
+            tension = float(muscle.tension(pressure, contraction))
+            if not 0.0 < tension < 1.5 * 1500.0 - 1e-6:
+                continue
+            solved = inverse.pressure(contraction, tension)
+            assert muscle.tension(solved, contraction) == pytest.approx(tension, rel=1e-8)
+            value, _ = traced(contraction, tension)
+            assert value == pytest.approx(solved, rel=1e-9)
+            checked += 1
+    assert checked > 15
+    # no pressure stretches the muscle beyond its limit
+    assert inverse.pressure(-0.3, 2e4) == 6e5
 
 
 def test_a_force_beyond_the_range_gives_the_nearer_limit():

@@ -21,6 +21,7 @@ from ...core import (
 )
 from ...engine.loop import ControlLaw, Measurement, Memory, Sampled, named_in
 from ...physics import ElasticSeriesElement, ForceLaw, Muscle
+from ...physics.muscle.characteristic.beyond_range import ForceRange, unlimited_force
 from ...physics.muscle.geometry.meridian import SAGA_2007
 from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
 
@@ -186,7 +187,9 @@ class StaticInverse:
     """Static inverse p(eps, F): the gauge pressure with F_0(p, eps) = F, limited to p_min to p_max.
 
     F_0 is the force law without its limits, or the static force of a muscle (contractile element,
-    parallel spring, end stop). It must increase with p. The root is found by n steps of the secant
+    parallel spring, end stop). Beyond the contractions of its range it is that of a stretched or of
+    a slack muscle, as in a plant; a law alone has its own range, a muscle that of its file. F_0
+    must increase with p. The root is found by n steps of the secant
     method of Anderson and Björck between p_min and p_max, so that the inverse is an expression that
     can be compiled. One step is exact for a law that is affine in p. For n = 10 the force at the
     returned pressure differs from F by less than 1e-9 of the force range for the laws of this
@@ -263,13 +266,12 @@ def pressure_between(
 
 
 def static_force(law: ForceLaw | Muscle, pressure: Value, contraction: Value) -> Value:
-    """Static tension [N] without lower limit at a gauge pressure [Pa] and a contraction [1]."""
+    """Static tension [N] without limits at a gauge pressure [Pa] and a contraction [1]; beyond the
+    range of the muscle, or that of a law itself, it is continued as in a plant.
+    """
     if isinstance(law, Muscle):
-        elements = law.contractile.unclamped_force(pressure, contraction)
-        length = law.geometry.resting_length
-        spring = law.spring.force(pressure, contraction, length)
-        return elements - spring - law.stop.force(contraction, 0.0, length)
-    return law.unclamped_force(pressure, contraction)
+        return law.unlimited_static_force(pressure, contraction)
+    return unlimited_force(law, ForceRange.of(law), pressure, contraction)
 
 
 def check_invertible(owner: str, law: ForceLaw | Muscle) -> None:

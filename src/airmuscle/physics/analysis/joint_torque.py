@@ -135,9 +135,7 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
         tension = nodes.as_node(
             muscle.tension(pressure, contraction)
             if limited
-            else muscle.contractile.unclamped_force(pressure, contraction)
-            - muscle.spring.force(pressure, contraction, length)
-            - muscle.stop.force(contraction, 0.0, length)
+            else muscle.unlimited_static_force(pressure, contraction)
         )
         torque = arm * tension
         stiffness = -_slope(torque, angle)

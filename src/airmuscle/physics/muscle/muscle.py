@@ -23,7 +23,7 @@ from ...core import (
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
 from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, VirtualWork
-from .characteristic.beyond_range import ForceRange, extended_force
+from .characteristic.beyond_range import ForceRange, extended_force, unlimited_force
 from .characteristic.calls import excesses, with_stated_range
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
@@ -342,6 +342,15 @@ class Muscle(QuantityMethods, NotebookDisplay):
         """
         elements = self.unclamped_tension(pressure, contraction)
         return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
+
+    def unlimited_static_force(self, pressure: Value, contraction: Value) -> Value:
+        """`static_force` before the limits of the contractile element are applied, negative where
+        the muscle is slack: what inverses and the statics of joints solve for a pressure [N].
+        """
+        length = self.geometry.resting_length
+        contractile = unlimited_force(self.contractile, self._force_range, pressure, contraction)
+        elements = contractile - self.spring.force(pressure, contraction, length)
+        return elements - self.stop.force(contraction, 0.0, length)
 
     def friction_force(self, pressure: Value, speed: Value, state: Values = RELAXED) -> Value:
         """Friction force against shortening [N] at a gauge pressure [Pa] and a speed of shortening

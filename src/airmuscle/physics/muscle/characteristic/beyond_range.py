@@ -160,36 +160,56 @@ def extended_force(law: Any, limits: ForceRange, pressure: Value, contraction: V
         return limits.limited(extended, rated, greatest)
 
 
+def unlimited_force(law: Any, limits: ForceRange, pressure: Value, contraction: Value) -> Value:
+    """Force of a law [N] before the limits of law and range are applied, in which inverses and the
+    statics of joints search: the formula, continued as in `extended_force` and by its tangent below
+    the range, so that it is affine in the pressure where the law is; negative where the muscle
+    would push. Laws that refuse what lies beyond their range are their formula.
+    """
+    with formula_alone():
+        if law.refuses_beyond:
+            return law.unclamped_force(pressure, contraction)
+        inner = ops.clip(contraction, limits.min_contraction, limits.end)
+        force = law.unclamped_force(pressure, inner)
+        if not ops.is_traced(contraction, limits.min_contraction) and np.all(inner == contraction):
+            return force
+        zero = 0.0 * contraction if ops.is_traced(contraction) else 0.0
+        rated = limits.rated_force(limits.greatest_force(law, zero))
+        slackening = rated / (limits.end - limits.min_contraction)
+        stretch = inner - contraction
+        slope = _slope_at_begin(law, limits, pressure, stretch)
+        return force + ops.where(stretch > 0.0, -slope, slackening) * stretch
+
+
 def _sleeve_force(
     law: Any, limits: ForceRange, pressure: Value, stretch: Value, force: Value
 ) -> Value:
     """Force [N] that a stretch [1] adds to that at the beginning of the range; where the law is
     slack there, after the stretch that tightens it."""
     begin = limits.min_contraction
-    stiffness = _sleeve_stiffness(law, limits, pressure, stretch)
+    # a stretch never relieves the sleeve, whatever the law does at the beginning of its range
+    stiffness = ops.maximum(-_slope_at_begin(law, limits, pressure, stretch), 0.0)
     if not law.has_limits:
         return stiffness * stretch
     slack = ops.maximum(force - law.unclamped_force(pressure, begin), 0.0)
     return ops.maximum(stiffness * stretch - slack, 0.0)
 
 
-def _sleeve_stiffness(law: Any, limits: ForceRange, pressure: Value, stretch: Value) -> Value:
-    """Stiffness -dF/deps of the law [N] at the beginning of its range, not below zero."""
+def _slope_at_begin(law: Any, limits: ForceRange, pressure: Value, stretch: Value) -> Value:
+    """Slope dF/deps of the law [N] at the beginning of its range, where a point is below it."""
     begin = limits.min_contraction
     name = "unclamped_force" if law.has_limits else "force"
     if ops.is_traced(pressure, begin, stretch):
-        return ops.maximum(-autodiff.derivative(law, name, pressure, begin, wrt=1), 0.0)
+        return autodiff.derivative(law, name, pressure, begin, wrt=1)
     if not np.any(stretch > 0.0):
         return 0.0
     if not law.traceable:
         step = _STEP * (limits.max_contraction - begin)
-        slope = (law.force(pressure, begin + step) - law.force(pressure, begin)) / step
-    else:
-        try:
-            slope = autodiff.derivative(law, name, pressure, begin, wrt=1)
-        except TraceError:  # a law that is solved for the pressure or the contraction
-            slope = law.slopes(pressure, begin).by_contraction
-    return ops.maximum(-slope, 0.0)
+        return (law.force(pressure, begin + step) - law.force(pressure, begin)) / step
+    try:
+        return autodiff.derivative(law, name, pressure, begin, wrt=1)
+    except TraceError:  # a law that is solved for the pressure or the contraction
+        return law.slopes(pressure, begin).by_contraction
 
 
 def _bounded_at_straight_fibres(
