@@ -13,7 +13,7 @@ import airmuscle.outlets.studio
 
 WEB = Path(airmuscle.outlets.studio.__file__).with_name("web")
 HOST = "127.0.0.1:8765"
-BEGINNING = ("numbers", "roots", "law")
+BEGINNING = ("numbers", "roots", "beyond-range", "law")
 """Scripts of a law that need no browser."""
 
 

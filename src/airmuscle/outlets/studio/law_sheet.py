@@ -50,7 +50,7 @@ from ...core import (
 from ...engine.compile.functions import Printer
 from ...engine.compile.text.languages import JavaScriptLanguage
 from ...files.library import Entry, to_toml
-from ...physics.muscle.characteristic.calls import recorded_force
+from ...physics.muscle.characteristic.calls import recorded_force, searched_contractions, stated_range
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 from ..export.targets import FORMS, refused_beyond
@@ -109,6 +109,7 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "functions": functions,
         "held": held_values,
         "limits": [float(limit) for limit in _limits(law)],
+        "beyond": _beyond_row(law),
         "values": [leaf.value for _, leaf in rows],
         "parameters": parameters,
         "resting_length": _place_of_resting_length([path for path, _ in rows]),
@@ -120,6 +121,23 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "toml": _toml(entry, fixed),
     }
     return with_script(sheet, text, ("prepare", *functions))
+
+
+def _beyond_row(law: Law) -> dict[str, Any] | None:
+    """The range of a law, beyond which the page continues its force and searches for solutions;
+    None for a law that refuses what lies there.
+    """
+    if law.refuses_beyond:
+        return None
+    limits = stated_range(law)
+    pressures = limits.pressure
+    return {
+        "begin": float(limits.min_contraction),
+        "end": float(limits.end),
+        "searched": [float(limit) for limit in searched_contractions(law, limits)],
+        "pressures": None if pressures is None else [float(limit) for limit in pressures],
+        "permitted": limits.stated_force,
+    }
 
 
 def _parameter_rows(rows: Sequence[tuple[str, Leaf]], entry: Entry) -> list[dict[str, Any]]:

@@ -66,6 +66,13 @@ class ForceRange:
         """Whether the force is limited inside as well, by a rating without a validity range."""
         return self.pressure is None and self.permitted_force is not None
 
+    @property
+    def stated_force(self) -> float | None:
+        """Permitted force [N] as a number; None where the maker states none."""
+        if self.permitted_force is None or self.permitted_force >= FORCE_BOUNDS[1]:
+            return None
+        return float(self.permitted_force)
+
     def contains(self, pressure: Value, contraction: Value) -> Value:
         """Whether points are inside, limits included; arrays broadcast."""
         inside = (contraction >= self.min_contraction) & (contraction <= self.max_contraction)

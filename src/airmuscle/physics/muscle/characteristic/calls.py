@@ -77,6 +77,12 @@ def stated_range(law: Any) -> ForceRange:
     return own
 
 
+def searched_contractions(law: Any, limits: ForceRange) -> tuple[float, float]:
+    """Contractions [1] between which a solution of the extended force is searched for."""
+    low, high = law.contraction_range
+    return min(low, limits.min_contraction - _SEARCH_MARGIN), high
+
+
 def recorded_force(law: Any, model: Any, pressure: Value, contraction: Value) -> Value:
     """The expression of what `law.force` answers at symbols; `model` is the law with symbols for
     its parameters. A law that refuses what lies beyond its range is its formula.
@@ -154,8 +160,7 @@ def _contraction(law: Any, method: Method, pressure: Value, force: Value) -> Val
     if not outside.any():
         return solution
     if not law.refuses_beyond:
-        low, high = law.contraction_range
-        bounds = (min(low, limits.min_contraction - _SEARCH_MARGIN), high)
+        bounds = searched_contractions(law, limits)
         message = law._no_contraction_message
         beyond = np.logical_and(outside, _needs_search(law, limits, c, force))
         found = _search(law, limits, bounds, (p, force), beyond, message, wanted="contraction")

@@ -3,6 +3,8 @@
 "use strict";
 
 (() => {
+  const STEP = 1e-6;   /* of a slope beyond the range, where the force is linear in the contraction */
+
   class Law {
     constructor(sheet) {
       this.sheet = sheet;
@@ -18,6 +20,7 @@
     /* To be called after every change of `values`. */
     prepare() {
       this.program.prepare(this.values, this.held);
+      this.limits = null;
       if (this.program.limits) this.program.limits(this.held, this.range);
       else this.range.set(this.sheet.limits);
     }
@@ -41,6 +44,27 @@
 
     force(pressure, contraction) {
       if (this.program.force) return this.printed("force", pressure, contraction);
+      return this.sheet.beyond ? airmuscle.extendedForce(this, pressure, contraction) : this.formulaForce(pressure, contraction);
+    }
+
+    contraction(pressure, force) {
+      const formula = this.formulaContraction(pressure, force), { beyond } = this.sheet;
+      if (!beyond || airmuscle.holds(this, pressure, formula, force)) return formula;
+      return airmuscle.firstRoot((c) => force - this.force(pressure, c), ...beyond.searched);
+    }
+
+    pressure(contraction, force) {
+      const formula = this.formulaPressure(contraction, force);
+      if (!this.sheet.beyond || airmuscle.holds(this, formula, contraction, force)) return formula;
+      return airmuscle.firstRoot((p) => this.force(p, contraction) - force, ...this.pressureRange);
+    }
+
+    /* The limits of the force beyond the range, with the present parameters. */
+    forceLimits() {
+      return this.limits ??= airmuscle.forceLimits(this);
+    }
+
+    formulaForce(pressure, contraction) {
       const [low, high] = this.forceRange;
       if (this.sheet.kind === "contraction") {
         return airmuscle.firstRoot((f) => contraction - this.printed("contraction", pressure, f), low, high);
@@ -48,7 +72,7 @@
       return airmuscle.firstRoot((f) => this.printed("pressure", contraction, f) - pressure, low, high);
     }
 
-    contraction(pressure, force) {
+    formulaContraction(pressure, force) {
       const [low, high] = this.contractionRange;
       if (this.program.contraction) return within(this.printed("contraction", pressure, force), low, high, this.sheet.kind === "contraction");
       if (this.sheet.kind === "pressure") {
@@ -57,7 +81,7 @@
       return airmuscle.firstRoot((c) => force - this.force(pressure, c), low, high);
     }
 
-    pressure(contraction, force) {
+    formulaPressure(contraction, force) {
       const [low, high] = this.pressureRange;
       if (this.program.pressure) return within(this.printed("pressure", contraction, force), low, high, this.sheet.kind === "pressure");
       if (this.sheet.kind === "contraction") {
@@ -76,7 +100,13 @@
     /* -dF/deps at constant pressure [N]. */
     stiffness(pressure, contraction) {
       if (this.program.force) { this.printed("force", pressure, contraction); return -this.f[2]; }
-      const force = this.force(pressure, contraction);
+      const { beyond } = this.sheet;
+      if (!beyond || (contraction >= beyond.begin && contraction <= beyond.end)) return this.formulaStiffness(pressure, contraction);
+      return (this.force(pressure, contraction - STEP) - this.force(pressure, contraction + STEP)) / (2 * STEP);
+    }
+
+    formulaStiffness(pressure, contraction) {
+      const force = this.formulaForce(pressure, contraction);
       if (Number.isNaN(force)) return NaN;
       if (this.sheet.kind === "contraction") { this.printed("contraction", pressure, force); return -1 / this.f[2]; }
       this.printed("pressure", contraction, force);

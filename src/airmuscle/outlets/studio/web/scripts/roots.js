@@ -5,13 +5,6 @@
 (() => {
   const INTERVALS = 256;
 
-  function gridOf(low, high, grid) {
-    const step = (high - low) / INTERVALS;
-    for (let i = 0; i < INTERVALS; i++) grid[i] = low + i * step;
-    grid[INTERVALS] = high;
-    return grid;
-  }
-
   /* Root of f in [a, b] with f(a) < 0 <= f(b). */
   function refine(f, a, fa, b, fb) {
     if (fb === 0) {
@@ -44,17 +37,15 @@
     return b;
   }
 
-  const points = new Float64Array(INTERVALS + 1);
-
   /* The smallest x in [low, high] at which f changes from negative to zero or positive; NaN without one. */
   function firstRoot(f, low, high) {
-    gridOf(low, high, points);
-    let before = f(points[0]);
+    const step = (high - low) / INTERVALS;
+    let left = low, before = f(low);
     if (before === 0) return low;
     for (let i = 1; i <= INTERVALS; i++) {
-      const at = f(points[i]);
-      if (before < 0 && at >= 0) return refine(f, points[i - 1], before, points[i], at);
-      before = at;
+      const right = i < INTERVALS ? low + i * step : high, at = f(right);
+      if (before < 0 && at >= 0) return refine(f, left, before, right, at);
+      left = right; before = at;
     }
     return NaN;
   }
