@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
-from airmuscle.control import StaticFeedForward, StaticInverse
+from airmuscle.control import AntagonisticInverse, StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.errors import ParameterError
 from airmuscle.files.library import LAWS as LAW_FILES
@@ -32,6 +32,7 @@ from airmuscle.physics import (
     Vessel,
     as_force_law,
 )
+from airmuscle.physics.analysis.joint_torque import torque_functions
 
 
 def force_laws():
@@ -90,6 +91,35 @@ def test_beyond_the_range_the_inverse_is_that_of_the_muscle_in_a_plant(name):
     assert checked > 15
     # no pressure stretches the muscle beyond its limit
     assert inverse.pressure(-0.3, 2e4) == 6e5
+
+
+@pytest.mark.parametrize("name", ["dmsp-20-300", "sarosi-dmsp-10", "tondu-lopez"])
+def test_the_statics_of_a_joint_have_a_muscle_beyond_its_range_as_a_plant_has_it(name):
+    """At 1.5 rad one muscle is stretched by 2 %; torque and tension are those of the plant."""
+    muscles = tuple(
+        dataclasses.replace(
+            muscle, contractile=LAWS[name], validity_range=ValidityRange(0.5e5, 6e5, 0.0, 0.16)
+        )
+        for muscle in MUSCLES
+    )
+    plant = dataclasses.replace(JOINT, muscle=muscles)
+    inverse = AntagonisticInverse(muscles, MECHANISM, 0.2e5, 5e5)
+    lengths = [muscle.geometry.resting_length for muscle in muscles]
+    contractions = MECHANISM.contractions({"angle": 1.5}, lengths)
+    assert min(contractions) < -0.01
+    pressures = (1.5e5, 1.2e5)
+    tensions = [m.tension(p, c) for m, p, c in zip(muscles, pressures, contractions, strict=True)]
+    assert min(tensions) > 0.0
+    torque = MECHANISM.generalised_forces({"angle": 1.5}, tensions, lengths)["angle"]
+    assert inverse.torque(*pressures, 1.5) == pytest.approx(torque, rel=1e-12)
+    for limited in (True, False):
+        rows = [
+            function(np.array([1.5]), np.array([pressure]), "tension")[0]
+            for function, pressure in zip(
+                torque_functions(plant, limited=limited), pressures, strict=True
+            )
+        ]
+        np.testing.assert_allclose(np.concatenate(rows), tensions, rtol=1e-12)
 
 
 def test_a_force_beyond_the_range_gives_the_nearer_limit():

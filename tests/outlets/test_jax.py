@@ -15,7 +15,7 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core import tree
-from airmuscle.errors import AirmuscleWarning, ParameterError, TraceError
+from airmuscle.errors import AirmuscleWarning, ParameterError, SolveError, TraceError
 from airmuscle.files import list_laws, load
 from airmuscle.physics import (
     CreepElements,
@@ -144,3 +144,33 @@ def test_a_direction_of_a_law_is_traced_or_refused(name: str, direction: str):
     ]
     with contextlib.suppress(TraceError):
         jax.jit(getattr(law, direction))(*arguments)
+
+
+@pytest.mark.parametrize("name", list_laws())
+def test_a_law_beyond_its_range_answers_arrays_of_jax_as_numbers(name: str):
+    """In a traced program, which can neither search nor warn, other directions are NaN where they
+    would have to search.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        law = load(name).characteristic
+    if law.refuses_beyond:
+        pytest.skip("the law refuses what lies beyond its range")
+    answers = {"force": (9e5, -0.03), "contraction": (3e5, 700.0), "pressure": (-0.02, 400.0)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        for direction, point in answers.items():
+            method = getattr(law, direction)
+            expected = np.nan
+            with contextlib.suppress(SolveError):
+                expected = method(*point)
+            found = np.nan
+            with contextlib.suppress(SolveError):
+                found = float(method(*map(jnp.asarray, point)))
+            np.testing.assert_allclose(found, expected, rtol=1e-12)
+            with contextlib.suppress(TraceError, SolveError):
+                traced = float(jax.jit(method)(*point))
+                is_searched = direction != "force" and np.isnan(traced)
+                assert is_searched or traced == pytest.approx(expected, rel=1e-12)
+        slopes = law.slopes(*map(jnp.asarray, answers["force"]))
+        np.testing.assert_allclose(slopes, law.slopes(*answers["force"]), rtol=1e-9)

@@ -50,7 +50,11 @@ from ...core import (
 from ...engine.compile.functions import Printer
 from ...engine.compile.text.languages import JavaScriptLanguage
 from ...files.library import Entry, to_toml
-from ...physics.muscle.characteristic.calls import recorded_force, searched_contractions, stated_range
+from ...physics.muscle.characteristic.calls import (
+    recorded_force,
+    searched_contractions,
+    stated_range,
+)
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 from ..export.targets import FORMS, refused_beyond

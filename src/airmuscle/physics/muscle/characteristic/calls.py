@@ -7,6 +7,7 @@ import contextvars
 import copy
 import functools
 import inspect
+import sys
 import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeVar
@@ -91,15 +92,13 @@ def recorded_force(law: Any, model: Any, pressure: Value, contraction: Value) ->
         return model.force(pressure, contraction)
     limits = stated_range(law) if _STATED in law.__dict__ else ForceRange.of(model)
     extended = extended_force(model, limits, pressure, contraction)
-    inside = ops.both(contraction >= limits.min_contraction, contraction <= limits.max_contraction)
-    for low, high in (limits.pressure,) if limits.pressure is not None else ():
-        inside = ops.both(inside, ops.both(pressure >= low, pressure <= high))
+    inside = _contains_traced(limits, pressure, contraction)
     return ops.where(inside, extended, ops.maximum(extended, 0.0))
 
 
 def in_range(name: str, method: Method) -> Method:
     """A method of a law, `force`, `contraction`, `pressure` or `slopes`, with the behaviour of this
-    module; symbols and arrays of JAX are passed on to the formula.
+    module; symbols are passed on to the formula.
     """
     answer = _ANSWERS[name]
     signature = inspect.signature(method)
@@ -108,16 +107,52 @@ def in_range(name: str, method: Method) -> Method:
     def called(self: Any, *given: Any, **named: Any) -> Any:
         if named:
             given = signature.bind(self, *given, **named).args[1:]
-        if (
-            len(given) != 2
-            or is_formula_alone()
-            or ops.is_traced(*given)
-            or str in map(type, given)
-        ):
+        if len(given) != 2 or is_formula_alone() or str in map(type, given):
+            return method(self, *given)
+        if _is_of_jax(*given):
+            return _answer_jax(name, self, method, *given)
+        if ops.is_traced(*given):
             return method(self, *given)
         return answer(self, method, *given)
 
     return called
+
+
+def _is_of_jax(*values: Any) -> bool:
+    return any(type(x).__module__.partition(".")[0] in ("jax", "jaxlib") for x in values)
+
+
+def _answer_jax(name: str, law: Any, method: Method, first: Value, second: Value) -> Any:
+    """The answer to arrays of JAX: that to their numbers; within `jit` and `grad`, which have none,
+    the recorded force, and NaN where another direction would have to be searched.
+    """
+    jax = sys.modules["jax"]
+    traced = any(isinstance(x, jax.core.Tracer) for x in (first, second))
+    if not traced:
+        numbers = (np.asarray(x, dtype=float) for x in (first, second))
+        return jax.tree.map(jax.numpy.asarray, _ANSWERS[name](law, method, *numbers))
+    if law.refuses_beyond:
+        return method(law, first, second)
+    if name == "force":
+        return recorded_force(law, law, first, second)
+    answer = method(law, first, second)
+    limits = stated_range(law)
+    if name == "slopes":
+        known = _contains_traced(limits, first, second)
+    else:
+        contraction = answer if name == "contraction" else first
+        known = ops.both(contraction >= limits.min_contraction, contraction <= limits.end)
+        known = ops.both(known, second <= _greatest_limit(law, limits))
+    return jax.tree.map(lambda value: jax.numpy.where(known, value, np.nan), answer)
+
+
+def _contains_traced(limits: ForceRange, pressure: Value, contraction: Value) -> Value:
+    """Whether points of a traced program are inside a range."""
+    inside = ops.both(contraction >= limits.min_contraction, contraction <= limits.max_contraction)
+    if limits.pressure is None:
+        return inside
+    low, high = limits.pressure
+    return ops.both(inside, ops.both(pressure >= low, pressure <= high))
 
 
 def _force(law: Any, method: Method, pressure: Value, contraction: Value) -> Value:
@@ -262,13 +297,17 @@ def _solution(law: Any, method: Method, first: Value, second: Value) -> Value:
 def _needs_search(law: Any, limits: ForceRange, contraction: Array, force: Value) -> Array:
     """Whether the solution of the formula is not that of the extended force: no contraction of the
     formula, or a force above the limit."""
-    with formula_alone():
-        greatest = limits.greatest_force(law)
-        limit = limits.limited(np.asarray(np.inf), limits.rated_force(greatest), greatest)
-    too_great = np.asarray(force, dtype=float) > limit
+    too_great = np.asarray(force, dtype=float) > _greatest_limit(law, limits)
     missed = np.logical_or(contraction < limits.min_contraction, contraction > limits.end)
     needed: Array = np.logical_or(np.logical_or(missed, too_great), np.isnan(contraction))
     return needed
+
+
+def _greatest_limit(law: Any, limits: ForceRange) -> Value:
+    """The force above which there is no solution [N], as a number."""
+    with formula_alone():
+        greatest = limits.greatest_force(law)
+        return limits.limited(np.asarray(np.inf), limits.rated_force(greatest), greatest)
 
 
 def _search(
