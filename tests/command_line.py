@@ -34,5 +34,5 @@ def airmuscle(*arguments: object, width: int = 160, **options: Any) -> Result:
     )
     if chapters and result.exit_code == 0:
         missing = undocumented(json.loads(result.stdout))
-        assert not missing, f"docs/json-keys.md lacks {missing}"
+        assert not missing, f"docs/reference/json-keys.md lacks {missing}"
     return result

@@ -1,4 +1,4 @@
-"""Keys of `--json` that docs/json-keys.md lists, and those of an answer that it lacks."""
+"""Keys of `--json` that docs/reference/json-keys.md lists, and those of an answer that it lacks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "json-keys.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "reference/json-keys.md"
 COMMON = {"title", "summary", "problems", "notes", "settings", "references", "units"}
 """Keys of every chapter."""
 OPEN = "a (?:key|column) for each"

@@ -194,10 +194,10 @@ def add(root: Path, kind: str, name: str, without: str = "") -> None:
 
 
 def write_nomenclature(root: Path, omitted: tuple[str, ...] = ()) -> None:
-    """Run docs/make_nomenclature.py in a copy; then omit the sections of some models."""
-    done = run(root, "docs/make_nomenclature.py")
+    """Run release/make_nomenclature.py in a copy; then omit the sections of some models."""
+    done = run(root, "release/make_nomenclature.py")
     assert done.returncode == 0, done.stderr
-    page = root / "docs" / "nomenclature.md"
+    page = root / "docs" / "reference/nomenclature.md"
     text = page.read_text(encoding="utf-8")
     for name in omitted:
         text = re.sub(rf"### {name}\n.*?(?=\n##)", "", text, flags=re.DOTALL)

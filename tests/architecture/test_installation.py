@@ -22,12 +22,12 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCKS = {
-    name: (ROOT / name).read_text(encoding="utf-8")
+    name: (ROOT / "locks" / name).read_text(encoding="utf-8")
     for name in ("requirements.lock", "requirements-dev.lock")
 }
 ADDED = ("docs", "tools")
 ADDED_LOCKS = {
-    f"requirements-{name}.lock": (ROOT / f"requirements-{name}.lock").read_text("utf-8")
+    f"requirements-{name}.lock": (ROOT / "locks" / f"requirements-{name}.lock").read_text("utf-8")
     for name in ADDED
 }
 every = pytest.mark.parametrize(
@@ -92,7 +92,10 @@ def pins(lock: str) -> list[tuple[str, str]]:
 def test_all_files_of_a_release_state_the_same_version():
     version = PROJECT["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))["version"] == version
+    assert (
+        json.loads((ROOT / "release" / "codemeta.json").read_text(encoding="utf-8"))["version"]
+        == version
+    )
     assert recipe()["package"]["version"] == version
 
 
@@ -135,7 +138,7 @@ def test_links_of_the_readme_hold_outside_the_repository():
     text = portable(readme, "https://forge.example/group/airmuscle/")
     assert not re.search(r"\]\((?!https?://)", text)
     assert "](https://forge.example/group/airmuscle/raw/main/docs/images/chain.png)" in text
-    assert "](https://forge.example/group/airmuscle/blob/main/docs/commands.md)" in text
+    assert "](https://forge.example/group/airmuscle/blob/main/docs/tutorials/commands.md)" in text
     assert portable("[a](https://x.org/b) ![](c.png)", "") == "[a](https://x.org/b) "
 
 
@@ -160,7 +163,9 @@ def checkout(tmp_path: Path) -> Path:
     """A copy of `run` and of the files that it reads, with an environment that appears complete."""
     folder = tmp_path / "a folder with spaces"
     (folder / ".venv" / "bin").mkdir(parents=True)
-    for name in ("run", "pyproject.toml", *ADDED_LOCKS, *LOCKS):
+    (folder / "locks").mkdir()
+    locks = [f"locks/{name}" for name in (*ADDED_LOCKS, *LOCKS)]
+    for name in ("run", "pyproject.toml", *locks):
         (folder / name).write_bytes((ROOT / name).read_bytes())
     (folder / ".venv" / "bin" / "python").symlink_to(sys.executable)
     (folder / ".venv" / "airmuscle.stamp").write_bytes(b"".join(load_run(folder).stamp()))
@@ -215,7 +220,7 @@ def test_an_unknown_command_gives_one_line(checkout: Path):
 
 
 @needs_posix
-@pytest.mark.parametrize("changed", ["pyproject.toml", *LOCKS])
+@pytest.mark.parametrize("changed", ["pyproject.toml", *(f"locks/{name}" for name in LOCKS)])
 def test_a_changed_project_or_lock_invalidates_the_stamp(checkout: Path, changed: str):
     with (checkout / changed).open("a") as file:
         file.write("\n# changed\n")
@@ -270,7 +275,7 @@ def test_an_installation_that_fails_leaves_no_stamp(
     checkout: Path, monkeypatch: pytest.MonkeyPatch
 ):
     run = load_run(checkout)
-    (checkout / "requirements.lock").write_text("")
+    (checkout / "locks" / "requirements.lock").write_text("")
     monkeypatch.setattr(subprocess, "call", lambda *args, **settings: 1)
     assert run.install() == "could not install .venv; see the messages above"
     assert not (checkout / ".venv" / "airmuscle.stamp").exists()

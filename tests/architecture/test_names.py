@@ -20,7 +20,7 @@ SOURCE = DOCS.parent / "src"
 
 def load_generator():
     spec = importlib.util.spec_from_file_location(
-        "make_nomenclature", DOCS / "make_nomenclature.py"
+        "make_nomenclature", DOCS.parent / "release" / "make_nomenclature.py"
     )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -28,16 +28,16 @@ def load_generator():
 
 
 def test_the_page_is_up_to_date():
-    written = (DOCS / "nomenclature.md").read_text(encoding="utf-8")
+    written = (DOCS / "reference/nomenclature.md").read_text(encoding="utf-8")
     generated = load_generator().page()
     missing = [
         name
         for name in model_names()
         if f"### {name}\n" in generated and f"### {name}\n" not in written
     ]
-    reports = [f"run docs/make_nomenclature.py: {name} is missing" for name in missing]
+    reports = [f"run release/make_nomenclature.py: {name} is missing" for name in missing]
     assert not missing, "\n".join(reports)
-    assert written == generated, "run docs/make_nomenclature.py"
+    assert written == generated, "run release/make_nomenclature.py"
 
 
 def public_arguments():
@@ -71,7 +71,9 @@ def test_no_public_argument_is_missing_from_the_nomenclature():
     missing = sorted(
         {f"{argument} ({where})" for where, argument in public_arguments() if argument not in known}
     )
-    assert not missing, f"add to docs/make_nomenclature.py, or use a name that is there: {missing}"
+    assert not missing, (
+        f"add to release/make_nomenclature.py, or use a name that is there: {missing}"
+    )
 
 
 def test_every_argument_of_the_nomenclature_exists():

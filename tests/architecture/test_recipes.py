@@ -54,12 +54,12 @@ MESSAGES = {
         r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py, nor in"
         r" NOT_IN_A_PLANT"
     ),
-    "nomenclature": r"run docs/make_nomenclature\.py: {name} is missing",
+    "nomenclature": r"run release/make_nomenclature\.py: {name} is missing",
 }
 
 
 def copy_of_the_project(folder: Path) -> Path:
-    for part in ("src/airmuscle", "tests", "docs", "benchmarks"):
+    for part in ("src/airmuscle", "tests", "docs", "release", "benchmarks"):
         shutil.copytree(
             ROOT / part, folder / part, ignore=shutil.ignore_patterns("__pycache__", "images")
         )
@@ -138,6 +138,6 @@ def test_each_step_is_in_the_rules(kind: str, step: str):
         "library": "`src/airmuscle/files/library/`",
         "example": "`tests/plants.py`",
         "exemption": "`NOT_IN_A_PLANT`",
-        "nomenclature": "`docs/make_nomenclature.py`",
+        "nomenclature": "`release/make_nomenclature.py`",
     }
     assert places[step] in text

@@ -321,7 +321,7 @@ def code_for_users() -> Iterator[tuple[str, str]]:
     """(file, Python code) of the examples and of the code blocks of README.md and docs/."""
     for path in sorted((ROOT / "examples").glob("*.py")):
         yield f"examples/{path.name}", path.read_text(encoding="utf-8")
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
         for block in re.findall(
             r"```python\n(.*?)```", path.read_text(encoding="utf-8"), flags=re.DOTALL
         ):

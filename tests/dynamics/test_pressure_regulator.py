@@ -1,8 +1,8 @@
 """A pressure regulator passes steps after rest, and hardly a fast sine or a quick reversal of the
 same size.
 
-The published tables are in files/library/data/smc-itv2050.toml; `docs/make_regulator_figure.py`
-measures a model as the record was measured, and docs/regulators.md states the errors that are
+The published tables are in files/library/data/smc-itv2050.toml; `release/figures/make_regulator_figure.py`
+measures a model as the record was measured, and docs/guides/regulators.md states the errors that are
 claimed here.
 """
 
@@ -58,7 +58,7 @@ commands [Pa].
 
 def figure_script():
     spec = importlib.util.spec_from_file_location(
-        "make_regulator_figure", DOCS / "make_regulator_figure.py"
+        "make_regulator_figure", DOCS.parent / "release" / "figures" / "make_regulator_figure.py"
     )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -113,7 +113,7 @@ def test_without_overlap_or_pilot_lag_a_reversal_passes(change):
 
 
 def test_the_page_states_the_errors_and_the_bounds_of_any_smooth_model(fitted):
-    page = (DOCS / "regulators.md").read_text(encoding="utf-8")
+    page = (DOCS / "guides/regulators.md").read_text(encoding="utf-8")
     row = next(line for line in page.splitlines() if line.startswith("| `PressureRegulator` |"))
     stated = [float(cell) for cell in row.split("|")[2:-1]]
     np.testing.assert_allclose(stated, list(fitted.values()), rtol=6e-3)

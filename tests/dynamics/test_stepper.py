@@ -205,7 +205,7 @@ def test_a_step_allocates_no_arrays():
 
 
 def test_the_example_of_the_page_reaches_its_angle():
-    page = Path(__file__).parents[2] / "docs" / "stepping.md"
+    page = Path(__file__).parents[2] / "docs" / "guides/stepping.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     names: dict[str, object] = {}
     exec(code, names)

@@ -1,6 +1,6 @@
 """No habit of a laboratory gives a law that is silently wrong: the law is right within 2 % of the
 greatest force, or a warning, a note or an error names the cause. What no data can show is listed
-here and in docs/identification.md.
+here and in docs/guides/identification.md.
 """
 
 from __future__ import annotations

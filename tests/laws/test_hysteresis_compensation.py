@@ -164,11 +164,11 @@ def test_paths_of_different_lengths_are_refused():
         HysteresisOperator.fitted([0.0, 1.0], [0.0], (0.0,))
 
 
-EXAMPLE = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "A12_noisy_hysteresis.py"))
+EXAMPLE = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "noisy_hysteresis.py"))
 
 
 def test_elements_keep_their_direction_where_a_switch_by_the_rate_flips():
-    """The numbers of docs/hysteresis.md; without noise both turn at the three ends of the
+    """The numbers of docs/guides/hysteresis.md; without noise both turn at the three ends of the
     triangles.
     """
     rng = np.random.default_rng(0)

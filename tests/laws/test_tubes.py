@@ -347,10 +347,11 @@ def test_a_lumped_tube_knows_no_delay_and_both_agree_once_the_waves_are_gone():
     ],
 )
 def test_the_page_states_the_error_of_lumped_tubes(length, conductance, per_cent):
-    script = Path(__file__).parents[2] / "docs" / "make_tubes_figure.py"
+    root = Path(__file__).parents[2]
+    script = root / "release" / "figures" / "make_tubes_figure.py"
     spec = importlib.util.spec_from_file_location("make_tubes_figure", script)
     drawing = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(drawing)
     assert 100 * drawing.max_error(length, 1, conductance) == pytest.approx(per_cent, abs=0.07)
-    page = script.with_name("components.md").read_text(encoding="utf-8")
+    page = (root / "docs" / "guides" / "components.md").read_text(encoding="utf-8")
     assert f"{per_cent} %" in page

@@ -156,7 +156,7 @@ def test_what_is_wrong_with_a_component_is_said_with_its_place(right, wrong, mes
 
 
 def test_the_page_of_components_names_each_with_a_line():
-    page = (Path(__file__).parents[2] / "docs" / "components.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "guides/components.md").read_text(encoding="utf-8")
     parts = ("pneumatics", "muscle")
     modules = {n: model_class(n, "").__module__.split(".") for n in model_names()}
     owned = [

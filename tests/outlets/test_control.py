@@ -2,7 +2,7 @@
 stands, its set point from rows or a data file. What does not fit is refused with file, table, key,
 value, and what is allowed.
 
-The code of docs/control.md runs, its table is read, schema, report and studies know it.
+The code of docs/guides/control.md runs, its table is read, schema, report and studies know it.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from airmuscle.files.scenario import describe_input
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
-PAGE = (ROOT / "docs" / "control.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "guides/control.md").read_text(encoding="utf-8")
 PREDICTIVE, TABLE, NESTED = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 
 VALVE = '{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }'
@@ -87,7 +87,7 @@ written = writer_of(GOOD)
 def test_the_code_of_the_page_runs():
     found: dict[str, object] = {}
     for block in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL):
-        exec(compile(block, "control.md", "exec"), found)
+        exec(compile(block, "guides/control.md", "exec"), found)
     for run in (found["run"], found["other"]):
         assert run["pressure"][-1] == pytest.approx(3e5, rel=0.05)
 
@@ -681,7 +681,7 @@ def test_a_controller_of_many_parts_is_named_by_them_and_a_single_one_with_its_g
 @pytest.mark.slow  # `./run test` runs all examples
 def test_the_program_of_the_example_runs(tmp_path: Path):
     done = subprocess.run(
-        [sys.executable, str(ROOT / "examples" / "A4_control.py")],
+        [sys.executable, str(ROOT / "examples" / "lift_controllers.py")],
         cwd=tmp_path,
         capture_output=True,
         text=True,
@@ -694,7 +694,7 @@ def test_the_program_of_the_example_runs(tmp_path: Path):
 @pytest.mark.slow
 def test_the_example_of_control_laws_tracks_learns_and_reaches_angle_and_stiffness(tmp_path):
     done = subprocess.run(
-        [sys.executable, str(ROOT / "examples" / "A6_control_laws.py")],
+        [sys.executable, str(ROOT / "examples" / "joint_control_laws.py")],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -239,7 +239,9 @@ def test_files_keep_their_declared_units(tmp_path: Path):
 
 
 def test_the_code_of_the_page_runs():
-    page = (Path(__file__).resolve().parents[2] / "docs" / "display.md").read_text(encoding="utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs" / "guides/display.md").read_text(
+        encoding="utf-8"
+    )
     names: dict[str, object] = {}
     for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
         exec(block, names)

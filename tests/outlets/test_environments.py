@@ -586,7 +586,7 @@ def test_the_package_is_imported_without_gymnasium_which_the_error_names():
 
 
 def test_the_example_of_the_page_is_an_environment():
-    page = Path(__file__).parents[2] / "docs" / "environments.md"
+    page = Path(__file__).parents[2] / "docs" / "guides/environments.md"
     (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     names: dict[str, object] = {}
     exec(code, names)

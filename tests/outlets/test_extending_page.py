@@ -14,7 +14,7 @@ import airmuscle as am
 
 DOCS = Path(__file__).parents[2] / "docs"
 BLOCKS = re.findall(
-    r"```python\n(.*?)```", (DOCS / "extending.md").read_text(encoding="utf-8"), re.DOTALL
+    r"```python\n(.*?)```", (DOCS / "guides/extending.md").read_text(encoding="utf-8"), re.DOTALL
 )
 
 
@@ -23,7 +23,7 @@ def page():
     """The names that the blocks define, run one after another."""
     found: dict[str, object] = {"__name__": "__main__"}
     for block in BLOCKS:
-        exec(compile(block, "extending.md", "exec", dont_inherit=True), found)
+        exec(compile(block, "guides/extending.md", "exec", dont_inherit=True), found)
     return found
 
 

@@ -444,7 +444,7 @@ def test_a_record_whose_time_repeats_is_refused(folder, tmp_path):
 
 
 def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
-    page = (Path(__file__).parents[2] / "docs" / "dynamic-identification.md").read_text(
+    page = (Path(__file__).parents[2] / "docs" / "guides/dynamic-identification.md").read_text(
         encoding="utf-8"
     )
     (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)

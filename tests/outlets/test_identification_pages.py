@@ -50,7 +50,7 @@ def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
             Recording({"pressure": p, "contraction": eps, "force": force}, "bench"),
             Path(f"run{seed}.csv"),
         )
-    found = run("identification.md")
+    found = run("guides/identification.md")
     assert found["fit"].model == found["found"].recommended.fit.model
     assert "Best of those compared" in capsys.readouterr().out, "which do not follow the data"
     assert len(read(".")) == 3  # the folder that the page on reading reads
@@ -73,7 +73,7 @@ def test_the_code_on_dynamic_identification_runs(capsys):
     ]
     another = Experiment(records[1], command, InitialConditions.at_rest(plant, pressure=0.0))
     found = run(
-        "dynamic-identification.md",
+        "guides/dynamic-identification.md",
         plant=plant,
         recording=records[0],
         command=command,
@@ -88,19 +88,21 @@ def test_the_code_on_dynamic_identification_runs(capsys):
 
 
 def test_the_code_on_prediction_runs(capsys):
-    run("prediction.md")
+    run("guides/prediction.md")
     assert capsys.readouterr().out == "15 N, 39.1 N in row 125\n"
 
 
 def test_the_code_on_hysteresis_runs(tmp_path, monkeypatch, capsys):
     """Also its command, on the files that the code writes."""
     monkeypatch.chdir(tmp_path)
-    found = run("hysteresis.md")
+    found = run("guides/hysteresis.md")
     assert isinstance(found["muscle"].friction, MaxwellSlip)
     assert len(found["joint"][0].agreement) == 2
     assert capsys.readouterr().out.strip().endswith("The data justify this friction.")
     (command,) = re.findall(
-        r"```sh\nairmuscle (hysteresis .*?)\n```", (DOCS / "hysteresis.md").read_text(), re.DOTALL
+        r"```sh\nairmuscle (hysteresis .*?)\n```",
+        (DOCS / "guides/hysteresis.md").read_text(),
+        re.DOTALL,
     )
     done = airmuscle(*shlex.split(command.replace("\\\n", " ")))
     assert done.exit_code == 0, done.output
@@ -114,7 +116,7 @@ def test_the_code_on_studies_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "fill_discharge.toml").write_bytes((examples / "fill_discharge.toml").read_bytes())
     text = (examples / "valve_study.toml").read_text(encoding="utf-8")
     (tmp_path / "study.toml").write_text(text.replace("count = 64", "count = 2"), encoding="utf-8")
-    found = run("study.md")
+    found = run("guides/study.md")
     assert not found["result"].failed.size
     assert (tmp_path / "out" / "tasks").exists()
     assert re.match(r"0\.\d+ ", capsys.readouterr().out)

@@ -1,5 +1,5 @@
 """One contract of all targets for an input beyond its range and for one that is not finite
-(docs/input-contract.md): it is refused, which is told and leaves the state, or it is limited to its
+(docs/reference/input-contract.md): it is refused, which is told and leaves the state, or it is limited to its
 range; never does another number take its place silently.
 
 Every target is driven by the same openings of a valve, one a step, with one that is wrong among

@@ -55,7 +55,7 @@ def test_a_key_that_is_not_listed_is_named():
 
 @pytest.mark.parametrize("name", sorted(documented()))
 def test_the_commands_of_a_chapter_exist(name: str):
-    page = (Path(__file__).resolve().parents[2] / "docs" / "json-keys.md").read_text(
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reference/json-keys.md").read_text(
         encoding="utf-8"
     )
     line = page.split(f"\n## `{name}`\n\nOf ")[1].split("\n")[0]

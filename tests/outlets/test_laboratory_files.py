@@ -687,7 +687,9 @@ def test_all_cells_with_an_ambiguous_comma_are_named(
 
 
 def test_the_file_of_the_guide_is_read_as_the_guide_says(tmp_path):
-    guide = (Path(am.__file__).parents[2] / "docs" / "reading.md").read_text(encoding="utf-8")
+    guide = (Path(am.__file__).parents[2] / "docs" / "guides/reading.md").read_text(
+        encoding="utf-8"
+    )
     block = guide.partition("    Prüfstand 3")[2].partition("\n\n")[0]
     path = text(
         tmp_path, ("Prüfstand 3" + block).replace("\n    ", "\n").split("\n"), "Messung.csv"

@@ -17,7 +17,7 @@ from airmuscle.outlets import register_environments
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 register_environments()
 SAME_STEP = gymnasium.vector.AutoresetMode.SAME_STEP
-EXAMPLE = Path(__file__).parents[2] / "examples" / "A11_learning.py"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "learned_joint.py"
 
 
 def test_with_same_step_an_episode_begins_anew_at_once_as_in_a_vector_of_gymnasium():

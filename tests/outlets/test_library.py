@@ -120,7 +120,9 @@ def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
 
 
 def test_the_page_on_muscle_files_holds_the_muscle_that_it_names(tmp_path: Path):
-    page = (Path(__file__).parents[2] / "docs" / "muscle-file.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "guides/muscle-file.md").read_text(
+        encoding="utf-8"
+    )
     (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     entry = library.load(written(tmp_path, text))
     assert entry.muscle.damper == LinearDamper(200.0)

@@ -40,14 +40,14 @@ def run(page):
 
 
 def test_the_code_on_mechanisms_runs(capsys):
-    found = run("mechanisms.md")
+    found = run("guides/mechanisms.md")
     assert found["run"]["angle"][-1] > 0.1
     assert found["pull"]["position"].max() == pytest.approx(0.03, abs=1e-9)
     assert re.fullmatch(r"0\.\d{3} rad\n\d+\.\d N\n", capsys.readouterr().out)
 
 
 def test_the_code_on_joints_runs(capsys):
-    found = run("joints.md")
+    found = run("guides/joints.md")
     assert found["points"].count.tolist() == [1, 1, 1]
     np.testing.assert_allclose(found["back"].angle, found["points"].angle, atol=1e-9)
     assert found["height"] == pytest.approx(-0.55, abs=0.05)
@@ -55,12 +55,12 @@ def test_the_code_on_joints_runs(capsys):
 
 
 def test_every_plant_of_the_library_is_on_the_page_of_joints():
-    text = (DOCS / "joints.md").read_text(encoding="utf-8")
+    text = (DOCS / "guides/joints.md").read_text(encoding="utf-8")
     assert [name for name in list_plants() if f"| `{name}` |" not in text] == []
 
 
 def test_the_code_on_linearisation_runs(capsys):
-    found = run("linearise.md")
+    found = run("guides/linearise.md")
     assert found["shut"]["position"] < found["equilibrium"]["position"]
     assert found["small"].outputs == ("position", "pressure")
     stiffnesses = re.match(r"(\d+) and (\d+) N/m\n", capsys.readouterr().out)
@@ -68,19 +68,19 @@ def test_the_code_on_linearisation_runs(capsys):
 
 
 def test_the_code_on_drivers_runs():
-    found = run("drivers.md")
+    found = run("guides/drivers.md")
     assert found["run"]["position"].max() > 0.03
     assert found["state"]["air_mass"] > 2 * found["plant"].state_at(pressure=0.0)["air_mass"]
 
 
 def test_the_code_on_batches_runs():
-    batch = run("batch.md")["batch"]
+    batch = run("guides/batch.md")["batch"]
     assert not len(batch.failed)
     assert np.all(batch.final[sensitivity("position", 0)] < 0)  # more load, less way
 
 
 def test_the_table_of_a_scenario_is_built():
-    table = tomllib.loads(blocks("mechanisms.md", "toml")[0])["plant"]["mechanism"]
+    table = tomllib.loads(blocks("guides/mechanisms.md", "toml")[0])["plant"]["mechanism"]
     found = build(table, Location("page", "", DOCS))
     assert isinstance(found, JointWithEndStops)
     assert isinstance(found.inner, AntagonisticJoint)
@@ -88,7 +88,7 @@ def test_the_table_of_a_scenario_is_built():
 
 
 def test_every_mechanism_is_on_the_page_and_may_stand_in_a_file():
-    text = (DOCS / "mechanisms.md").read_text(encoding="utf-8")
+    text = (DOCS / "guides/mechanisms.md").read_text(encoding="utf-8")
     classes = [
         c for c in vars(mechanism).values() if isinstance(c, type) and issubclass(c, Mechanism)
     ]

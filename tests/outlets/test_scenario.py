@@ -1,5 +1,5 @@
 """A scenario file becomes the plant, the command and the run it describes, in every form that
-docs/scenario.md names.
+docs/guides/scenario.md names.
 
 What is wrong with it is said with file, table, key, value and what is allowed.
 """
@@ -51,7 +51,7 @@ from airmuscle.physics import (
     WithLatch,
 )
 
-PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "guides/scenario.md").read_text(encoding="utf-8")
 WHOLE, FITTED, FROM_LIBRARY, PAIR, DRIVEN, LINE = re.findall(
     r"```toml\n(.*?)```", PAGE, flags=re.DOTALL
 )
@@ -80,7 +80,7 @@ initial_state = {{ pressure = "1 bar" }}
 written = writer_of(GOOD)
 
 
-# Every form of docs/scenario.md
+# Every form of docs/guides/scenario.md
 
 
 def test_the_page_runs(tmp_path: Path):

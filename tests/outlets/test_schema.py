@@ -180,7 +180,7 @@ def test_every_entry_passes_in_the_form_that_fit_and_save_write(name: str):
     assert judged(tomllib.loads(to_toml(load(name))), MUSCLE) == []
 
 
-@pytest.mark.parametrize("text", blocks("muscle-file.md"))
+@pytest.mark.parametrize("text", blocks("guides/muscle-file.md"))
 def test_the_muscle_of_the_page_passes(text: str):
     assert judged(tomllib.loads(text), MUSCLE) == []
 
@@ -202,7 +202,7 @@ def test_a_plant_without_a_circuit_passes_only_with_a_library_plant():
     assert judged({"plant": {"muscle": "dmsp-20-300"}, "run": run}, SCENARIO) != []
 
 
-@pytest.mark.parametrize("text", blocks("scenario.md"))
+@pytest.mark.parametrize("text", blocks("guides/scenario.md"))
 def test_every_table_of_the_page_passes(text: str):
     """Pieces of a scenario lack tables; the tables that they have must pass."""
     tables = tomllib.loads(text)
@@ -277,7 +277,7 @@ def test_a_broken_scenario_is_found_by_the_schema_and_refused_by_the_program(
 def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(
     was: str, becomes: str, fault: str
 ):
-    (text,) = blocks("muscle-file.md")
+    (text,) = blocks("guides/muscle-file.md")
     tables = tomllib.loads(text.replace(was, becomes, 1))
     found = judged(tables, MUSCLE)
     assert any(f.startswith(fault) for f in found), found

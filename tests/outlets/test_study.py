@@ -649,7 +649,7 @@ def test_the_example_runs(tmp_path: Path):
 
 
 def test_the_study_in_the_documentation_is_valid(tmp_path: Path):
-    page = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "guides/study.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     shutil.copy(ROOT / "examples" / "fill_discharge.toml", tmp_path)
     (tmp_path / "study.toml").write_text(blocks[0], encoding="utf-8")

@@ -31,7 +31,10 @@ def check(run: PageRun) -> None:
         )
 
 
-@pytest.mark.parametrize("page", ["air-mass.md", "stiffness.md", "where-papers-err.md"])
+@pytest.mark.parametrize(
+    "page",
+    ["explanation/air-mass.md", "explanation/stiffness.md", "explanation/where-papers-err.md"],
+)
 def test_an_explanation_shows_the_numbers_that_its_code_prints(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -41,7 +44,7 @@ def test_an_explanation_shows_the_numbers_that_its_code_prints(
 
 def test_the_first_muscle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    run = run_page("tutorial-first-muscle.md", tmp_path)
+    run = run_page("tutorials/first-muscle.md", tmp_path)
     check(run)
     assert (tmp_path / "chart" / "isobars.png").stat().st_size > 0
 
@@ -49,14 +52,14 @@ def test_the_first_muscle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.slow
 def test_from_bench_to_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    check(run_page("tutorial-bench-to-report.md", tmp_path))
+    check(run_page("tutorials/bench-to-report.md", tmp_path))
     assert (tmp_path / "fit" / "report.html").stat().st_size > 0
     assert (tmp_path / "lift" / "recording.csv").stat().st_size > 0
 
 
 def test_the_first_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    run = run_page("tutorial-joint.md", tmp_path)
+    run = run_page("tutorials/joint.md", tmp_path)
     check(run)
     assert abs(run.names["controlled"]["angle"][-1] - 0.3) < 0.01
 
@@ -64,11 +67,11 @@ def test_the_first_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.slow
 def test_the_controller_on_a_microcontroller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    run_page("tutorial-microcontroller.md", tmp_path)
+    run_page("tutorials/microcontroller.md", tmp_path)
     assert (tmp_path / "controller" / "pressure.h").stat().st_size > 0
 
 
 @pytest.mark.slow
 def test_from_episodes_to_a_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
-    check(run_page("tutorial-episodes.md", tmp_path))
+    check(run_page("tutorials/episodes.md", tmp_path))

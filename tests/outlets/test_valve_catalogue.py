@@ -141,9 +141,9 @@ def test_a_file_of_the_user_is_read_in_si(tmp_path: Path):
 
 
 def test_the_page_on_valves_is_true(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    page = (Path(__file__).parents[2] / "docs" / "valves.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "guides/valves.md").read_text(encoding="utf-8")
     (code,) = re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)
-    exec(compile(code, "valves.md", "exec"), {})
+    exec(compile(code, "guides/valves.md", "exec"), {})
     assert capsys.readouterr().out.count("Valve(") == 2
     _, own = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     entry = load_valve(written(tmp_path, own))

@@ -1,4 +1,4 @@
-"""Parameter paths: the numbers of a scenario that a study may vary; docs/study.md.
+"""Parameter paths: the numbers of a scenario that a study may vary; docs/guides/study.md.
 
 The unit of a field of designs, distributions and metrics is that of the varied parameter, or of the
 evaluated column: such a field is declared with `custom_field` and one of the readers, which receive

@@ -1,5 +1,5 @@
 """Study files: a scenario, its varied parameters, the design of experiments and the metrics;
-docs/study.md.
+docs/guides/study.md.
 """
 
 import dataclasses

@@ -1,8 +1,8 @@
 """Entries of the library: muscles and laws, valves, products and plants, with sources, provenance
 and verified checks.
 
-The fields of an entry are the keys of its file, see build.py, docs/muscle-file.md and
-docs/valves.md.
+The fields of an entry are the keys of its file, see build.py, docs/guides/muscle-file.md and
+docs/guides/valves.md.
 """
 
 import dataclasses

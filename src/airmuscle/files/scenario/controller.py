@@ -1,5 +1,5 @@
 """Table [input.controller] of a scenario: controller, sample time and set point of a closed loop;
-docs/control.md.
+docs/guides/control.md.
 
 Laws inside laws, sensors and models of the plant are tables at any depth. Numbers are SI or texts
 with a unit that fits the signals of the law in whose table they are. Muscles and mechanism of a

@@ -1,5 +1,5 @@
 """Dynamic fit as a TOML file: plant, records as experiments, and unknown parameters;
-docs/dynamic-identification.md.
+docs/guides/dynamic-identification.md.
 """
 
 import dataclasses

@@ -2,7 +2,7 @@
 parameters.
 
 It is written by airmuscle fit-dynamic, fit-joint and campaign, and read by predict;
-docs/prediction.md has its keys.
+docs/guides/prediction.md has its keys.
 """
 
 import dataclasses

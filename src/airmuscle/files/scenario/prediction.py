@@ -1,5 +1,5 @@
-"""Prediction of records by an identified plant or the muscle of an entry; docs/prediction.md has
-their file.
+"""Prediction of records by an identified plant or the muscle of an entry; docs/guides/prediction.md
+has their file.
 """
 
 import dataclasses

@@ -1,5 +1,5 @@
 """Scenario: a simulation as a TOML file with the tables [plant], [input], [run] and [output];
-docs/scenario.md.
+docs/guides/scenario.md.
 
 Components are tables with `model` and their parameters; new components need no new grammar. Beside
 these tables are [observed] and [uncertainty], which fit-dynamic writes and predict reads, see

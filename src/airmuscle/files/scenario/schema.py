@@ -49,7 +49,7 @@ _CHOICES = {(Check, "quantity"): tuple(CONDITIONS), (StatedBand, "quantity"): PR
 
 
 def scenario_schema() -> Schema:
-    """Schema of a scenario file; see docs/scenario.md."""
+    """Schema of a scenario file; see docs/guides/scenario.md."""
     models = _ModelSchemas()
     tables = models.table(scenario.ScenarioTables, model_needed=None)
     tables["properties"] |= {"plant": _plant(models), "input": _input(models)}
@@ -58,7 +58,7 @@ def scenario_schema() -> Schema:
 
 def muscle_schema() -> Schema:
     """Schema of a muscle file, the form of all muscles and laws of the library; see
-    docs/muscle-file.md.
+    docs/guides/muscle-file.md.
     """
     models = _ModelSchemas()
     tables = models.table(Entry, model_needed=None)
