@@ -55,7 +55,8 @@ class Function:
             groups = LaneGroups(LlvmType(lanes=lanes), processor().register)
             printer = Printer(groups)
             printer.add("function", inputs, outputs)
-            text = vector_math.definitions(printer.needed, groups.number) + printer.module()
+            module = printer.module()
+            text = vector_math.definitions(printer.needed, groups.number) + module
         self._module = Module(text)
         self.address = self._module.address("function")
 

@@ -120,8 +120,9 @@ def lanes_module(
     step = _Step(t, code, precomputed, groups)
     text = step.printed(a, b)
     printer.add("outputs", point, {"o": t.o})
+    module = printer.module()
     parts = vector_math.definitions({**printer.needed, **step.needed}, groups.number)
-    return "\n".join([parts, text, printer.module()]), printer.held
+    return "\n".join([parts, text, module]), printer.held
 
 
 CACHE = 32_768

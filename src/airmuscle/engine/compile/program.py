@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, SensitivitySystem, System, tree
+from ...core import Array, SensitivitySystem, System, nodes, tree
 from . import functions, sensitivities, sensitivities_explicit
 from .cache.kernel import address_of
 from .cache.store import load_module
@@ -121,14 +121,15 @@ class Program:
         self._system = system
         self._form: TracedSystem | sensitivities.TangentSystem
         rows = 1
-        if isinstance(system, SensitivitySystem):
-            self._form = sensitivities.tangent_system(system)
-            text, self.sizes = sensitivities.implicit_module(self._form)
-        else:
-            self._form = functions.trace_system(system)
-            rows = rows_at_once(self._form)
-            extend = row_outputs(self._form) if rows > 1 else None
-            text, self.sizes = functions.system_module(self._form, extend=extend)
+        with nodes.recording():
+            if isinstance(system, SensitivitySystem):
+                self._form = sensitivities.tangent_system(system)
+                text, self.sizes = sensitivities.implicit_module(self._form)
+            else:
+                self._form = functions.trace_system(system)
+                rows = rows_at_once(self._form)
+                extend = row_outputs(self._form) if rows > 1 else None
+                text, self.sizes = functions.system_module(self._form, extend=extend)
         self.output_names = self._form.output_names
         self._module = Module(text, self.sizes.held)
         self.address = {name: self._module.address(name) for name in _FUNCTIONS}

@@ -4,7 +4,7 @@ around blocks.
 
 import abc
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -229,10 +229,18 @@ def with_gates(
     redundant in blocks.
     """
 
+    return skipping(code, levels_of_inputs(inputs, precomputed), early)
+
+
+def levels_of_inputs(
+    inputs: Sequence[str], precomputed: Collection[Operand]
+) -> Callable[[Operand], int]:
+    """What an operand that no instruction computes depends on."""
+
     def level(operand: Operand) -> int:
         return STEADY if operand in precomputed else LEVEL.get(inputs[operand[1]], VARYING)
 
-    return skipping(code, level, early)
+    return level
 
 
 class Emission:

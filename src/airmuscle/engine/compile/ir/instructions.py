@@ -56,21 +56,20 @@ def recorded(inputs: Sequence[Sequence[Node]], outputs: Sequence[Sequence[Node]]
         for i, vector in enumerate(inputs)
         for k, symbol in enumerate(vector)
     }
-
-    def operand_of(node: Node) -> Operand:
-        return ("c", node.value) if node.operation == nodes.CONSTANT else operands[id(node)]
-
+    constant = nodes.CONSTANT
     roots = [node for vector in outputs for node in vector]
     body: list[Instruction] = []
     for node in nodes.in_order(roots, operands):
-        arguments = tuple(map(operand_of, node.arguments))
+        arguments = tuple(
+            [("c", x.value) if x.operation == constant else operands[id(x)] for x in node.arguments]
+        )
         result = operands[id(node)] = ("t", len(body))
         body.append(Instruction(node.operation, result, arguments))
-    results = [
-        (i, k, operand_of(node))
-        for i, vector in enumerate(outputs)
-        for k, node in enumerate(vector)
-    ]
+    results = []
+    for i, vector in enumerate(outputs):
+        for k, node in enumerate(vector):
+            is_number = node.operation == constant
+            results.append((i, k, ("c", node.value) if is_number else operands[id(node)]))
     return Code(tuple(body), tuple(results))
 
 
@@ -82,10 +81,13 @@ def finished(code: Code) -> Code:
     by_result = {line.result: line for line in body}
     chosen: list[Instruction] = []
     for line in body:
-        if line.operation == Operation.MASK:
+        operation = line.operation
+        if operation == Operation.MASK:
             chosen += _extreme_of_zero(line, by_result)
+        elif operation == Operation.SELECT:
+            chosen.append(_extreme(line, by_result))
         else:
-            chosen.append(_extreme(line, by_result) if line.operation == Operation.SELECT else line)
+            chosen.append(line)
     return _without_unused(chosen, code.outputs)
 
 
@@ -93,33 +95,29 @@ def _selects(body: Sequence[Instruction]) -> list[Instruction]:
     """The instructions with each sum of a mask and its complementary mask as one
     Operation.SELECT.
     """
-    by_result = {line.result: line for line in body}
-
-    def mask(operand: Operand) -> Instruction | None:
-        line = by_result.get(operand)
-        return line if line is not None and line.operation == Operation.MASK else None
-
-    def negated(operand: Operand) -> Operand | None:
-        line = by_result.get(operand)
-        return line.arguments[0] if line is not None and line.operation == Operation.NOT else None
-
+    masks = {line.result: line for line in body if line.operation == Operation.MASK}
+    opposites = {line.result: line.arguments[0] for line in body if line.operation == Operation.NOT}
     chosen = []
     for line in body:
-        masks = [
-            masked
-            for a in line.arguments
-            if line.operation == Operation.ADD and (masked := mask(a))
-        ]
-        for mask_line, complement in (masks, masks[::-1]) if len(masks) == 2 else ():
-            if (
-                line.operation == Operation.ADD
-                and negated(complement.arguments[0]) == mask_line.arguments[0]
-            ):
-                line = Instruction(
-                    Operation.SELECT, line.result, (*mask_line.arguments, complement.arguments[1])
-                )
+        if line.operation == Operation.ADD and masks.keys() >= set(line.arguments):
+            first, second = line.arguments
+            line = _select(line, masks[first], masks[second], opposites)
         chosen.append(line)
     return chosen
+
+
+def _select(
+    total: Instruction,
+    first: Instruction,
+    second: Instruction,
+    opposites: Mapping[Operand, Operand],
+) -> Instruction:
+    """The sum of two masks as one selection, if one masks where the other does not."""
+    for mask, complement in ((first, second), (second, first)):
+        if opposites.get(complement.arguments[0]) == mask.arguments[0]:
+            arguments = (*mask.arguments, complement.arguments[1])
+            total = Instruction(Operation.SELECT, total.result, arguments)
+    return total
 
 
 def _extreme_of_zero(
@@ -188,30 +186,28 @@ def hoisted(
     The results are the operands that the remaining code uses, in order. A division by such an
     operand becomes a product with its precomputed inverse.
     """
-    varies: dict[Operand, bool] = {}
+    varying: set[Operand] = set()
+    inverses: set[Operand] = set()
 
     def depends(operand: Operand) -> bool:
-        if operand[0] == "t":
-            return varies[operand]
-        return bool(operand[0] == "in" and operand[1] != parameter_input)
+        return operand in varying or (operand[0] == "in" and operand[1] != parameter_input)
 
     once: list[Instruction] = []
     always: list[Instruction] = []
     for line in code.body:
-        if (
-            line.operation == Operation.DIVIDE
-            and depends(line.arguments[0])
-            and not depends(line.arguments[1])
-        ):
+        if not any(depends(a) for a in line.arguments):
+            once.append(line)
+            continue
+        if line.operation == Operation.DIVIDE and not depends(line.arguments[1]):
             inverse = Instruction(
                 Operation.INVERSE, ("t", "inverse of", line.arguments[1]), line.arguments[1:]
             )
-            if inverse.result not in varies:
+            if inverse.result not in inverses:
                 once.append(inverse)
-                varies[inverse.result] = False
+                inverses.add(inverse.result)
             line = Instruction(Operation.MULTIPLY, line.result, (line.arguments[0], inverse.result))
-        varies[line.result] = any(depends(a) for a in line.arguments)
-        (always if varies[line.result] else once).append(line)
+        varying.add(line.result)
+        always.append(line)
     used = [a for line in always for a in line.arguments] + [
         operand for _, _, operand in code.outputs
     ]

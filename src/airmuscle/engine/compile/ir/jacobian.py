@@ -8,6 +8,7 @@ than the forward or reverse mode.
 Reference: Griewank, A., Walther, A., Evaluating Derivatives, 2nd ed., SIAM 2008, chapters 9 and 10.
 """
 
+import copy
 import heapq
 from collections.abc import Sequence
 
@@ -23,7 +24,8 @@ def nonzeros(results: Sequence[Node], inputs: Sequence[Node]) -> dict[Place, Nod
     Vertices of equal cost are eliminated in the order of the nodes or in reverse order, whichever
     requires fewer operations. Raises TraceError for an operation without a differentiation rule.
     """
-    candidates = [_eliminated(results, inputs, sign) for sign in (1, -1)]
+    graph = _Graph(results, inputs)
+    candidates = [_eliminated(graph.copy(), sign) for sign in (1, -1)]
     forward, backward = (
         len(nodes.in_order([*results, *candidate.values()])) for candidate in candidates
     )
@@ -72,6 +74,13 @@ class _Graph:
         for source in row:
             self.successors[source].add(vertex)
 
+    def copy(self) -> "_Graph":
+        """A graph whose vertices can be eliminated, while those of this one remain."""
+        copied = copy.copy(self)
+        copied.slopes_into = {vertex: row.copy() for vertex, row in self.slopes_into.items()}
+        copied.successors = [targets.copy() for targets in self.successors]
+        return copied
+
     def cost(self, vertex: int) -> int:
         """How many products the elimination of a vertex requires."""
         return len(self.slopes_into[vertex]) * len(self.successors[vertex])
@@ -92,8 +101,7 @@ class _Graph:
         return {*row, *targets}
 
 
-def _eliminated(results: Sequence[Node], inputs: Sequence[Node], sign: int) -> dict[Place, Node]:
-    graph = _Graph(results, inputs)
+def _eliminated(graph: _Graph, sign: int) -> dict[Place, Node]:
     between = range(graph.inputs, graph.results.start)
     queue = [(graph.cost(vertex), sign * vertex, vertex) for vertex in between]
     heapq.heapify(queue)

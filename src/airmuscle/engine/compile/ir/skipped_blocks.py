@@ -86,26 +86,35 @@ def skipping(
     return in_order(code, search.apart, early)
 
 
+def levels_of(body: Sequence[Instruction], level: Callable[[Operand], int]) -> dict[Operand, int]:
+    """What the result of each instruction depends on; `level` states it for the inputs."""
+    levels: dict[Operand, int] = {}
+    for line in body:
+        greatest = STEADY
+        for operand in line.arguments:
+            if operand in levels:
+                greatest = max(greatest, levels[operand])
+            elif operand[0] != "c":
+                greatest = max(greatest, level(operand))
+        levels[line.result] = greatest
+    return levels
+
+
 def _cases(
     body: Sequence[Instruction], comparisons: "_Comparisons", level: Callable[[Operand], int]
 ) -> Iterable[_Case]:
     """The candidate gates: commands first, then clamps and conditions."""
-    levels: dict[Operand, int] = {}
+    levels = levels_of(body, level)
 
     def of(operand: Operand) -> int:
-        return (
-            levels[operand]
-            if operand in levels
-            else STEADY
-            if operand[0] == "c"
-            else level(operand)
-        )
+        if operand in levels:
+            return levels[operand]
+        return STEADY if operand[0] == "c" else level(operand)
 
     commands: dict[Operand, None] = {}
     clamps: list[_Case] = []
     conditions: dict[Operand, None] = {}
     for line in body:
-        levels[line.result] = max(of(a) for a in line.arguments)
         if line.operation == Operation.MULTIPLY:
             commands.update((a, None) for a in line.arguments if of(a) == COMMANDED)
         if levels[line.result] < VARYING:

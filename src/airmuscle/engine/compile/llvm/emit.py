@@ -16,6 +16,9 @@ FLAGS = "nsz arcp contract reassoc afn"
 infinity.
 """
 
+RARE = "noinline optnone"
+"""Attributes of a function that runs once for a set of parameters, so that it is not worth the time
+that optimising it would take."""
 STEADY_POWER = "steadypow"
 """Name of the power with an exponent that depends on parameters alone, in lanes."""
 
@@ -147,6 +150,31 @@ class FunctionBody(FunctionBlock):
         self.lines.append(
             f"  store {self.number.text} {value}, ptr {place}, align {self.number.alignment}"
         )
+
+    @property
+    def calls_parts(self) -> bool:
+        """Whether repeated parts are functions that are called: of one number, whose arrays are
+        plain."""
+        return self.number == DOUBLE
+
+    def address(self, array: str, index: int) -> str:
+        """The address of an array element."""
+        return self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
+
+    def call_part(
+        self, name: str, addresses: Sequence[str], values: Sequence[str], count: int
+    ) -> list[str]:
+        """Call a function of `function_of_part`; the names of the `count` values that it
+        returns."""
+        kind = self.number.text
+        arguments = [f"ptr {a}" for a in addresses] + [f"{kind} {value}" for value in values]
+        call = f"call fastcc {_returned(kind, count)} @{name}({', '.join(arguments)})"
+        if not count:
+            self.lines.append(f"  {call}")
+            return []
+        result = self.put(call)
+        kinds = _returned(kind, count)
+        return [self.put(f"extractvalue {kinds} {result}, {k}") for k in range(count)]
 
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
         number = self.number
@@ -293,10 +321,7 @@ class LlvmLanguage(TargetLanguage):
     def preparation(
         self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock
     ) -> str:
-        """`prepare` runs once for a set of parameters, so it is not worth the time that optimising
-        it would take.
-        """
-        return function(name, [*inputs, *outputs], body, "nounwind noinline optnone")
+        return function(name, [*inputs, *outputs], body, f"nounwind {RARE}")
 
 
 ALIGNED = (  # else the time of spilled vectors depends on the depth of the stack at the call
@@ -316,6 +341,35 @@ def function(
         + "\n".join(block.lines)
         + "\n  ret void\n}\n"
     )
+
+
+def _returned(kind: str, count: int) -> str:
+    """The type of a function's result of so many values."""
+    return f"{{ {', '.join([kind] * count)} }}" if count else "void"
+
+
+def function_of_part(
+    name: str,
+    arguments: Sequence[str],
+    block: FunctionBody,
+    values: Sequence[str],
+    attributes: str = "noinline",
+) -> str:
+    """The LLVM text of a function that functions of the same module call, which returns values; its
+    arrays do not overlap."""
+    kind = block.number.text
+    signature = ", ".join(
+        f"{kind} %{a}" if a in block.scalars else f"ptr noalias nocapture %{a}" for a in arguments
+    )
+    kinds = _returned(kind, len(values))
+    lines = list(block.lines)
+    result = "poison"
+    for k, value in enumerate(values):
+        lines.append(f"  %result{k} = insertvalue {kinds} {result}, {kind} {value}, {k}")
+        result = f"%result{k}"
+    lines.append(f"  ret {kinds} {result}" if values else "  ret void")
+    head = f"define hidden fastcc {kinds} @{name}({signature}) nounwind {attributes}"
+    return f"{head} {{\n" + "\n".join(lines) + "\n}\n"
 
 
 def function_of_values(
