@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pickle
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,12 @@ CANDIDATES = (
     Candidate("surface of degree 5", ContractileSurface.blank(5)),
     Candidate("surface of degree 6", ContractileSurface.blank(6)),
 )
+
+
+def test_a_comparison_does_not_warn_of_its_own_evaluations_beyond_a_range():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compare(am.load_data("dmsp-20-300"))
 
 
 def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():

@@ -17,6 +17,7 @@ from ...physics.muscle.characteristic import (
     PooledLengthLaw,
 )
 from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw
+from ...physics.muscle.characteristic.calls import silent_beyond_range
 from ...physics.muscle.characteristic.validity_range import DataScales
 from ...recording import Recording
 
@@ -34,7 +35,7 @@ def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: flo
     the same rows. `max_force` [N] limits the force of laws that give contraction or pressure. Where
     such a law needs a higher pressure at zero load than is applied, the muscle is slack and the
     force is 0."""
-    with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"), silent_beyond_range():
         if isinstance(law, ForceLaw):
             force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(
                 pressure.size
