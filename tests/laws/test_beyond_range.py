@@ -27,10 +27,12 @@ from airmuscle.physics import (
     HangingMass,
     Isothermal,
     LinearDamper,
+    LinearSpring,
     Muscle,
     Plant,
     Ratings,
     ValidityRange,
+    Vessel,
     find_equilibrium,
 )
 from airmuscle.physics.muscle.characteristic import calls, modes
@@ -351,6 +353,38 @@ def test_an_equilibrium_outside_the_range_is_reported():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         find_equilibrium(hanging(40.0), pressure=5e5)
+
+
+PRODUCTS = [
+    name
+    for name in EXTENDED
+    if name not in OWN and isinstance(law_of(name), ForceLaw) and stated_of(name).min_pressure > 0.0
+]
+
+
+@pytest.mark.parametrize("name", PRODUCTS)
+def test_a_muscle_without_pressure_is_usual_and_one_that_is_overstretched_is_reported(name):
+    """Most ranges begin at some pressure; every muscle begins without, stretched by its load."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        muscle = Muscle(
+            law_of(name),
+            Vessel(2e-4),
+            LinearSpring(3e3),  # the sleeve of a law without force at rest
+            validity_range=stated_of(name),
+            ratings=entry(name).ratings,
+        )
+    plant = Plant(muscle, ClosedChamber(), HangingMass(1.0), Isothermal())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        state = find_equilibrium(plant, pressure=0.0)
+        assert abs(state["position"]) < 0.02
+        assert not muscle.excess_at_rest(-0.02)
+    low = 0.5 * stated_of(name).min_pressure
+    with pytest.warns(AirmuscleWarning, match="kPa outside the range"):
+        find_equilibrium(plant, pressure=low)
+    assert "outside the range -" in muscle.excess_at_rest(-0.09)
+    assert "outside the range -" in muscle.excess_at_rest(0.5)
 
 
 def test_a_run_that_stretches_the_muscle_passes_its_end_and_is_noted():

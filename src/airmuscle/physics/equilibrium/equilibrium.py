@@ -54,6 +54,8 @@ def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[
     return {name: float(stated.get(name, 0.0)) for name in system.inputs}
 
 
+UNPRESSURISED = 1.0
+"""Gauge pressure [Pa] below which a muscle is without pressure (chosen)."""
 TABLE_SIZE = 500_000
 """Size of a table of states of several plants; a greater one takes memory and saves little time
 (measured).
@@ -127,7 +129,9 @@ def find_equilibrium(
     `find_equilibria`.
 
     Nearest to full length is the smallest sum of squared contractions. An AirmuscleWarning names
-    the muscles whose law is outside its range there. Raises EquilibriumError, with the muscles and
+    the muscles whose law is outside its range there. Without pressure, at 0 bar gauge, where every
+    muscle begins, neither the least pressure of the range nor the pretension that the maker permits
+    is a reason. Raises EquilibriumError, with the muscles and
     their forces, if no stable equilibrium is found.
     """
     statics = _statics(plant, pressure, air_mass, inputs)
@@ -169,7 +173,10 @@ def _range_excesses(plant: StaticPlant, statics: Statics, state: Mapping[str, fl
         if statics.shut:
             pressure = float(shut_air_pressure(plant, muscle, air, np.array(contraction)))
         inner = muscle.inner_contraction(contraction, select_prefix(prefix, state))
-        excess = muscle.range_excess(float(pressure), float(inner))
+        if abs(pressure) < UNPRESSURISED:
+            excess = muscle.excess_at_rest(float(inner))
+        else:
+            excess = muscle.range_excess(float(pressure), float(inner))
         if excess:
             texts.append(f"{muscle.name}: {excess}.")
     return texts

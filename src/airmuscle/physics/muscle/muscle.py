@@ -2,6 +2,7 @@
 volume.
 """
 
+import dataclasses
 import functools
 import textwrap
 import warnings
@@ -50,6 +51,9 @@ INNER_CONTRACTION = "inner_contraction"
 """Name of the state of a muscle with a series spring: the contraction of its contractile
 element.
 """
+USUAL_PRESTRETCH = 0.03
+"""Elongation of a muscle without pressure [1] that is usual where its maker states none: the least
+of Festo's DMSP muscles (catalogue, as in `festo-dmsp-10`)."""
 LENGTH_TOLERANCE = 1e-6
 """Difference of two resting lengths [m] up to which they are the same (chosen)."""
 
@@ -335,6 +339,19 @@ class Muscle(QuantityMethods, NotebookDisplay):
         """Text on how far a gauge pressure [Pa] and a contraction of the contractile element are
         outside its range; empty inside."""
         return "; ".join(excesses(self._force_range, pressure, contraction))
+
+    def excess_at_rest(self, contraction: float) -> str:
+        """Text on how far a contraction of the contractile element without pressure is outside its
+        range, below which the pretension that the maker permits is usual; empty inside."""
+        prestretch: Value = USUAL_PRESTRETCH
+        if self.ratings is not None and "max_prestretch" in self.ratings.stated:
+            prestretch = self.ratings.max_prestretch
+        limits = dataclasses.replace(
+            self._force_range,
+            min_contraction=min(self._force_range.min_contraction, -prestretch),
+            pressure=None,
+        )
+        return "; ".join(excesses(limits, 0.0, contraction))
 
     def static_force(self, pressure: Value, contraction: Value) -> Value:
         """Sum of the forces of all elements and the end stop [N] at zero speed, friction and creep
