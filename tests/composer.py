@@ -20,7 +20,7 @@ from airmuscle.core import parameters
 from airmuscle.core.annotation import conforms, type_hints
 from airmuscle.engine import SampledSignal, Schedule
 from airmuscle.engine.loop.inputs import CombinedSignal
-from airmuscle.errors import AirmuscleError
+from airmuscle.errors import AirmuscleError, ParameterError
 from airmuscle.files.library import model_names
 from airmuscle.physics import (
     AirSource,
@@ -91,6 +91,8 @@ class Composer:
             dataclasses.replace(self.component(Muscle), name=f"muscle{k}") for k in range(count)
         )
         circuit = self._circuits(count)
+        if mechanism.needs_held_pressures:
+            circuit = tuple(self._attempted(self._regulator) for _ in range(count))
         return Plant(
             muscles if count > 1 else muscles[0],
             circuit,
@@ -108,6 +110,14 @@ class Composer:
             if circuit.port_count == 1 and self.chance(0.5):
                 break
         return tuple(self._with_one_port() for _ in range(count))
+
+    def _regulator(self):
+        """A circuit of one muscle that holds its pressure."""
+        classes = [c for c in STOCK if issubclass(c, Circuit) and STOCK[c][0].holds_pressure]
+        circuit = self.varied(self.one_of(STOCK[self.one_of(classes)]))
+        if circuit.port_count != 1 or not circuit.holds_pressure:
+            raise ParameterError("another attempt: a regulator of one muscle is needed")
+        return circuit
 
     def _with_one_port(self):
         return next(

@@ -54,6 +54,7 @@ from airmuscle.physics import (
     PooledLengthLaw,
     PrescribedMotion,
     PressureDamper,
+    ProportionalRegulator,
     Pulley,
     Reynolds2003Damper,
     Reynolds2003Spring,
@@ -107,10 +108,10 @@ def fed(by, count=1, gas=EnergyBalance(0.5)):
     return Plant(muscles if count > 1 else muscles[0], by, HangingMass(10.0 * count), gas)
 
 
-def pulled(mechanism, count=1):
-    """A mechanism that one muscle or several pull at, each with two valves."""
+def pulled(mechanism, count=1, circuit=None):
+    """A mechanism that one muscle or several pull at, each with two valves or another circuit."""
     muscles = tuple(replace(chosen_muscle(), name=f"m{i}") for i in range(count))
-    return Plant(muscles, (TWO_VALVES,) * count, mechanism, Isothermal())
+    return Plant(muscles, (circuit or TWO_VALVES,) * count, mechanism, Isothermal())
 
 
 def listed(name):
@@ -286,6 +287,7 @@ EXAMPLES = {
             ),
         ),
         2,
+        ProportionalRegulator(Supply(5e5), VALVE, OTHER, SPOOL),
     ),
     "muscles in series": pulled(MusclesInSeries(HangingMass(5.0), (0.5,), 1.0), 2),
 }

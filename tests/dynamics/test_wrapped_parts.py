@@ -313,6 +313,11 @@ def answers(mechanism):
             *mechanism.acceleration(q, v, forces, inputs).values(),
             *mechanism.inner_rates(q, v, forces).values(),
             mechanism.dissipated_power(q, v, forces, inputs),
+            *(
+                x
+                for store in mechanism.energy_accounts(q, v, forces, inputs).values()
+                for x in store
+            ),
             mechanism.potential_energy(q),
             mechanism.kinetic_energy(q, v),
         ],

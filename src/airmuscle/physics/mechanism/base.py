@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core import STANDARD_GRAVITY, Input, StateVariable, Value, Values, autodiff, parameter
 from ...core.declaration import forwarded
@@ -63,6 +63,19 @@ class Coordinate:
         )
 
 
+class EnergyAccount(NamedTuple):
+    """A store of energy in a mechanism whose law depends on a further quantity, such as a load or
+    a pressure: the energy in it [J], the power of the motion into it and the power that becomes
+    heat [W].
+
+    What the energy grows by beyond the powers, nothing pays: the further quantity has changed.
+    """
+
+    stored: Value
+    received: Value
+    dissipated: Value
+
+
 class Mechanism(abc.ABC):
     """Mechanical load of one or more muscles (interface).
 
@@ -94,6 +107,24 @@ class Mechanism(abc.ABC):
     def inner_rates(self, q: Values, v: Values, forces: Values) -> Mapping[str, Value]:
         """Time derivatives of `inner_states`, which are found in q by their names."""
         return {}
+
+    @property
+    def account_names(self) -> tuple[str, ...]:
+        """Names of the stores of `energy_accounts`."""
+        return ()
+
+    def energy_accounts(
+        self, q: Values, v: Values, forces: Values, inputs: Values
+    ) -> Mapping[str, EnergyAccount]:
+        """Stores of energy whose law depends on loads or pressures, by their names."""
+        return {}
+
+    @property
+    def needs_held_pressures(self) -> bool:
+        """Whether its torques depend on pressures without a volume that pays for it, so that
+        circuits must hold the pressures.
+        """
+        return False
 
     @abc.abstractmethod
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:

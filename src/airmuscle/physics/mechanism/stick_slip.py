@@ -2,13 +2,17 @@
 muscles.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import cast
 
 from ...core import ParameterError, StateVariable, Value, Values, model, ops, parameter
-from .base import Coordinate, Mechanism
+from .base import Coordinate, EnergyAccount, Mechanism
 from .serial_arm import SerialArm
 from .wrapper import ForceWrapper
+
+BRISTLE = "bristle"
+RESIDUAL = "residual"
+"""Names of the stores of energy of a WithStickSlip."""
 
 
 @model
@@ -26,12 +30,13 @@ class StickSlip:
     They are computed at the accelerations of the other joints without this share of friction, and
     at none of the joint's own: what holds at rest is exact, and so is a link balanced about its
     axis. Above w_1 the torque follows the sign of the speed itself, so that the rate of z is
-    bounded by 1/tau and a step of that length is stable. For constant load and s = 0 the energy
-    T theta_s z^2/2 of the bristle never grows by more than the work done on it. A load that rises
-    while the bristle is bent stiffens it, and nothing pays for that: per cycle below the sliding
-    range the joint may gain up to the integral of theta_s z^2/2 over the rising T. The energy meter
-    of a plant books it as a negative `mechanism_loss`. The normalised form
-    of Dahl's model (Dahl 1968) with these additions, which are chosen.
+    bounded by 1/tau and a step of that length is stable. At constant T the energy T theta_s z^2/2
+    of the bristle never grows by more than the work done on it. A load that rises while the bristle
+    is bent stiffens it, and nothing pays for that: the energy grows by the integral of theta_s
+    z^2/2 over T. Apart from it the friction takes energy in every motion, as the meters of a plant
+    book: `bristle_work` is `bristle_heat`, which never falls, plus the growth of `bristle_energy`,
+    minus `bristle_energy_unpaid`. The normalised form of Dahl's model (Dahl 1968) with these
+    additions, which are chosen.
     """
 
     coulomb_torque: float = parameter(
@@ -87,6 +92,15 @@ class StickSlip:
         share = (bristle + fast * speed) / (1.0 + fast * ops.absolute_value(speed))
         return 0.0 - self.level(load, speed) * share
 
+    def energy_account(self, bristle: Value, load: Value, speed: Value) -> EnergyAccount:
+        """The energy of the bristle, the power of the joint into the friction, and its heat, 0 or
+        more.
+        """
+        stiffness = self.level(load, speed) * self.presliding_angle
+        received = 0.0 - self.torque(bristle, load, speed) * speed
+        growth = stiffness * bristle * self.bristle_rate(bristle, speed)
+        return EnergyAccount(0.5 * stiffness * bristle**2, received, received - growth)
+
     def bristle_rate(self, bristle: Value, speed: Value) -> Value:
         """Time derivative of the relative deflection of the bristle [1/s]."""
         magnitude = ops.absolute_value(speed)
@@ -107,11 +121,14 @@ class GaussianResidual:
     `m0.pressure`), d their number. Passive at constant pressures: V is then a bounded
     potential of the angles, whose torques give no energy in a closed cycle, and the friction,
     multiplied by a positive factor, takes some. Where the pressures follow the angles, as those of
-    shut air do, a closed cycle gives the integral of dV/dp dp, of either sign, for which no air
-    pays: use it where valves hold the pressures. The energy meter of a plant books this energy as a
-    negative `mechanism_loss`. Far from all centres tau is 0 and f is 1: the physics alone. A caller
-    who gives angles without pressures has the residual at the mean of its centres. The form is
-    chosen.
+    shut air do, a closed cycle gives the integral of dV/dp dp, of either sign. The air would pay
+    for it if it had the further volume -dV/dp_i in muscle i (Maxwell relation: dtau_j/dp_i is then
+    the slope of that volume by theta_j). Pressure would follow from an equation that has no
+    explicit solution, so that a Plant does not have this volume and refuses the residual unless its
+    circuits hold the pressures (`Circuit.holds_pressure`). The meters of a plant book what the
+    changes of the pressures give: `residual_energy_unpaid`. Far from all centres tau is 0 and f is
+    1: the physics alone. A caller who gives angles without pressures has the residual at the mean
+    of its centres. The form is chosen.
     """
 
     pressures: tuple[str, ...]
@@ -153,25 +170,43 @@ class GaussianResidual:
         """Torque [N m] on every joint and the factor of its friction, at its angles [rad] and the
         pressures in q.
         """
-        size = len(self.angle_scales) + len(self.pressures)
         joints = len(angles)
-        own = [angle / scale for angle, scale in zip(angles, self.angle_scales, strict=True)]
-        means = [sum(self.centres[i::size]) / len(self.energies) for i in range(joints, size)]
-        own += [
+        torques: list[Value] = [0.0] * joints
+        logs: list[Value] = [0.0] * joints
+        for k, (energy, (level, away)) in enumerate(
+            zip(self.energies, self._levels(angles, q), strict=True)
+        ):
+            for j, scale in enumerate(self.angle_scales):
+                torques[j] = torques[j] + energy * level * away[j] / (self._size * scale)
+                logs[j] = logs[j] + self.friction_logs[j * len(self.energies) + k] * level
+        return torques, [ops.exp(log) for log in logs]
+
+    def potential(self, angles: Sequence[Value], q: Values) -> Value:
+        """Potential V [J] at the angles [rad] and the pressures in q."""
+        levels = self._levels(angles, q)
+        return sum(energy * level for energy, (level, _) in zip(self.energies, levels, strict=True))
+
+    @property
+    def _size(self) -> int:
+        return len(self.angle_scales) + len(self.pressures)
+
+    def _levels(self, angles: Sequence[Value], q: Values) -> list[tuple[Value, list[Value]]]:
+        """Value phi_k of each Gaussian function, and the distances from its centre relative to the
+        scales.
+        """
+        size = self._size
+        place = [angle / scale for angle, scale in zip(angles, self.angle_scales, strict=True)]
+        means = [sum(self.centres[i::size]) / len(self.energies) for i in range(len(angles), size)]
+        place += [
             q[name] / scale if name in q else mean
             for name, scale, mean in zip(self.pressures, self.pressure_scales, means, strict=True)
         ]
-        torques: list[Value] = [0.0] * joints
-        logs: list[Value] = [0.0] * joints
-        for k, energy in enumerate(self.energies):
-            away = [
-                x - c for x, c in zip(own, self.centres[size * k : size * (k + 1)], strict=True)
-            ]
-            level = ops.exp(-sum(a * a for a in away) / (2.0 * size))
-            for j, scale in enumerate(self.angle_scales):
-                torques[j] = torques[j] + energy * level * away[j] / (size * scale)
-                logs[j] = logs[j] + self.friction_logs[j * len(self.energies) + k] * level
-        return torques, [ops.exp(log) for log in logs]
+        levels: list[tuple[Value, list[Value]]] = []
+        for k in range(len(self.energies)):
+            centre = self.centres[size * k : size * (k + 1)]
+            away = [x - c for x, c in zip(place, centre, strict=True)]
+            levels.append((ops.exp(-sum(a * a for a in away) / (2.0 * size)), away))
+        return levels
 
 
 @model
@@ -306,6 +341,37 @@ class WithStickSlip(ForceWrapper):
             )
             for c, element in zip(self._angles, self.elements, strict=True)
         ]
+
+    @property
+    def needs_held_pressures(self) -> bool:
+        return self.residual is not None or self.inner.needs_held_pressures
+
+    @property
+    def account_names(self) -> tuple[str, ...]:
+        residual = () if self.residual is None else (RESIDUAL,)
+        return (BRISTLE, *residual, *self.inner.account_names)
+
+    def energy_accounts(
+        self, q: Values, v: Values, forces: Values, inputs: Values
+    ) -> Mapping[str, EnergyAccount]:
+        """The bristles of all joints, the residual, and the stores of the inner mechanism."""
+        loaded = self._with_bearings(q, v, forces, inputs)
+        bristles = [
+            element.energy_account(
+                q.get(_bristle(c), 0.0), loaded.get(friction_load(c), 0.0), v[c.speed]
+            )
+            for c, element in zip(self._angles, self.elements, strict=True)
+        ]
+        accounts = {BRISTLE: EnergyAccount(*map(sum, zip(*bristles, strict=True)))}
+        if self.residual is not None:
+            angles = [q[c.name] for c in self._angles]
+            torques, _ = self.residual.evaluate(angles, q)
+            given = sum(
+                torque * v[c.speed] for c, torque in zip(self._angles, torques, strict=True)
+            )
+            accounts[RESIDUAL] = EnergyAccount(self.residual.potential(angles, q), -given, 0.0)
+        on_inner = self._with_friction(q, v, loaded)
+        return {**self.inner.energy_accounts(q, v, on_inner, inputs), **accounts}
 
     def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         """Power [W] that friction takes, less that of the torques of the residual."""

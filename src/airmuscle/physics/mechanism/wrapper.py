@@ -2,12 +2,12 @@
 
 import abc
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from ...core import Input, ParameterError, Value, Values, model, ops, parameter
 from ...core.declaration import forwarded
-from .base import Coordinate, Mechanism, gravity_parameter
+from .base import Coordinate, EnergyAccount, Mechanism, gravity_parameter
 
 
 class MechanismWrapper(Mechanism):
@@ -29,6 +29,9 @@ class MechanismWrapper(Mechanism):
     dissipated_power = forwarded("inner.dissipated_power")
     potential_energy = forwarded("inner.potential_energy")
     kinetic_energy = forwarded("inner.kinetic_energy")
+    account_names = forwarded("inner.account_names")
+    energy_accounts = forwarded("inner.energy_accounts")
+    needs_held_pressures = forwarded("inner.needs_held_pressures")
 
 
 @model
@@ -95,6 +98,12 @@ class ForceWrapper(MechanismWrapper):
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return self.inner.acceleration(q, v, self.with_own_forces(q, v, forces, inputs), inputs)
+
+    def energy_accounts(
+        self, q: Values, v: Values, forces: Values, inputs: Values
+    ) -> Mapping[str, EnergyAccount]:
+        on_inner = self.with_own_forces(q, v, forces, inputs)
+        return self.inner.energy_accounts(q, v, on_inner, inputs)
 
     def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         inner = self.inner.dissipated_power(

@@ -44,6 +44,14 @@ _FRICTION = StateVariable(
 )
 
 
+def _account_meters(name: str) -> tuple[StateVariable, StateVariable]:
+    """The meters of a store of energy of the mechanism."""
+    return (
+        StateVariable(f"{name}_work", "J", 1.0, f"work of the motion on the store '{name}'"),
+        StateVariable(f"{name}_heat", "J", 1.0, f"heat from the store '{name}'"),
+    )
+
+
 @model
 class WithEnergyMeters(System):
     """A plant with energy and mass meters as further states, and its energies and its air mass as
@@ -53,6 +61,10 @@ class WithEnergyMeters(System):
     which includes the contact force of an end stop, minus `mechanism_loss`, provided that a latch
     is operated at rest only; the energies of an ExternalLoad are outside the plant, and the work on
     it is part of `mechanism_loss`, from which the work of the torques of a residual is subtracted.
+    A store of the mechanism (`energy_accounts`: bristles, a residual) has the meters `NAME_work`
+    and `NAME_heat` and the outputs `NAME_energy` and `NAME_energy_unpaid`, by which the energy has
+    grown beyond work minus heat: a load or a pressure on which the store depends has changed, and
+    nothing pays for that.
     Muscle: `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` +
     `friction_work` (with friction), provided that no muscle is slack. Air: `air_energy`, of the air
     in the muscles, increases by `energy_of_flow` + `heat_to_air` minus `work_of_air`. Mass:
@@ -67,7 +79,13 @@ class WithEnergyMeters(System):
     def meters(self) -> tuple[StateVariable, ...]:
         """All meters."""
         frictionless = all(isinstance(muscle.friction, NoFriction) for muscle in self.plant.muscles)
-        return _METERS if frictionless else (*_METERS, _FRICTION)
+        stores = [meter for name in self.stores for meter in _account_meters(name)]
+        return (*_METERS, *(() if frictionless else (_FRICTION,)), *stores)
+
+    @property
+    def stores(self) -> tuple[str, ...]:
+        """Names of the stores of energy of the mechanism."""
+        return self.plant.mechanism.account_names
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -87,7 +105,9 @@ class WithEnergyMeters(System):
     @property
     def output_units(self) -> Mapping[str, str]:
         """The units of the plant's outputs, of energies [J] and of the air mass [kg]."""
-        energies = dict.fromkeys(("kinetic_energy", "potential_energy", "air_energy"), "J")
+        names = ["kinetic_energy", "potential_energy", "air_energy"]
+        names += [f"{name}_energy{end}" for name in self.stores for end in ("", "_unpaid")]
+        energies = dict.fromkeys(names, "J")
         return {**self.plant.output_units, **energies, "air_total": "kg"}
 
     @property
@@ -129,9 +149,17 @@ class WithEnergyMeters(System):
             powers["heat_to_air"] += plant.gas.heat_flow(muscle.states, muscle.air, plant.ambient)
             for name, power in _muscle_powers(part, muscle).items():
                 powers[name] += power
+        place = {
+            **state,
+            **{f"{p}pressure": m.pressure for p, m in zip(plant.prefixes, at.muscles, strict=True)},
+        }
         powers["mechanism_loss"] += plant.mechanism.dissipated_power(
-            state, state, at.forces, inputs
+            place, state, at.forces, inputs
         )
+        stores = plant.mechanism.energy_accounts(place, state, at.forces, inputs)
+        for name, store in stores.items():
+            powers[f"{name}_work"] += store.received
+            powers[f"{name}_heat"] += store.dissipated
         for circuit in at.circuits:
             powers["air_supplied"] += circuit.drawn.mass
             powers["air_exhausted"] += circuit.exhausted.mass
@@ -143,6 +171,10 @@ class WithEnergyMeters(System):
             ),
             "air_total": total_air({s.name: state[s.name] for s in plant.states}),
         }
+        for name, store in stores.items():
+            paid = state[f"{name}_work"] - state[f"{name}_heat"]
+            energies[f"{name}_energy"] = store.stored
+            energies[f"{name}_energy_unpaid"] = store.stored - paid
         return {**plant.rates_of(at, state), **powers}, {**plant.outputs_of(at), **energies}
 
 

@@ -51,6 +51,7 @@ def check_parts(plant: Any) -> None:
     _check_limits_of_laws(plant.muscles)
     check_structure((tuple(plant.muscles), tuple(plant.circuits), plant.mechanism))
     _check_counts(plant.muscles, plant.circuits, plant.mechanism)
+    _check_held_pressures(plant.circuits, plant.mechanism)
     if isinstance(plant.circuit, tuple) and any(c.port_count != 1 for c in plant.circuits):
         raise ParameterError(
             "Plant: give a circuit that feeds several muscles alone, not in a tuple."
@@ -113,6 +114,23 @@ def _check_counts(
         )
     if len(set(names)) < len(names):
         raise ParameterError(f"Plant: muscles need different names; they are {names}.")
+
+
+def _check_held_pressures(circuits: Sequence[Circuit], mechanism: Mechanism) -> None:
+    """Raise ParameterError for a residual that depends on pressures which the circuits do not
+    hold.
+    """
+    if not mechanism.needs_held_pressures:
+        return
+    for circuit in circuits:
+        if not circuit.holds_pressure:
+            raise ParameterError(
+                "Plant: its mechanism has a GaussianResidual, which depends on pressures and holds"
+                f" only where they are controlled; {type(circuit).__name__} can shut the air in,"
+                " and a closed cycle would then give energy that no air pays for. Give each muscle"
+                " a ProportionalRegulator or a PressureRegulator, or remove the residual"
+                " (residual=None)."
+            )
 
 
 def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:

@@ -53,6 +53,11 @@ class Circuit(abc.ABC):
     supply: AirSource
 
     @property
+    def holds_pressure(self) -> bool:
+        """Whether it controls the pressure of its muscles, so that their air is never shut in."""
+        return False
+
+    @property
     def port_count(self) -> int:
         """Number of muscles that the circuit feeds."""
         return 1
@@ -118,6 +123,7 @@ class CircuitWrapper(Circuit, abc.ABC):
 
     supply = forwarded("circuit.supply")
     port_count = forwarded("circuit.port_count")
+    holds_pressure = forwarded("circuit.holds_pressure")
     inputs = forwarded("circuit.inputs")
     own_states = forwarded("circuit.own_states")
     own_steady_state = forwarded("circuit.own_steady_state")
@@ -248,6 +254,10 @@ class Manifold(Circuit):
                     f"Manifold: the supply of branch '{name}' is {type(branch.supply).__name__}; it"
                     " must be SharedSupply(), because the manifold feeds all branches."
                 )
+
+    @property
+    def holds_pressure(self) -> bool:
+        return all(branch.holds_pressure for branch in self.branches)
 
     def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
         return zip((f"{name}." for name in self.names), self.branches, strict=True)

@@ -112,6 +112,8 @@ class ProportionalRegulator(ValvePair):
         "Pa", "u_max", "maximum set point", bounds=(1e3, 5e6), fitted=False, default=1e6
     )
 
+    holds_pressure = True
+
     @property
     def inputs(self) -> tuple[Input, ...]:
         return (Input("setpoint", "Pa", 0.0, self.max_setpoint, "set gauge pressure"),)
@@ -209,6 +211,8 @@ class PressureRegulator(ValvePair):
     max_setpoint: float = parameter(
         "Pa", "u_max", "maximum set point", bounds=(1e3, 5e6), fitted=False, default=1e6
     )
+
+    holds_pressure = True
 
     @property
     def inputs(self) -> tuple[Input, ...]:
