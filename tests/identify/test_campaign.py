@@ -30,14 +30,12 @@ from airmuscle.bench import (
 from airmuscle.bench.campaign import (
     VolumeChange,
     count_pulses,
-    creep_stretches,
     fit_creep_stage,
     fit_static_stage,
-    friction_along,
-    held_steady,
     relate_volumes,
 )
 from airmuscle.bench.campaign.campaign import _levels
+from airmuscle.bench.prediction import creep_stretches, friction_along, held_steady
 from airmuscle.bench.statics import PlannedRun
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import BoucWen, Braid, CreepElements, NoFriction

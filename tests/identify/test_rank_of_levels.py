@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 import airmuscle as am
 from airmuscle.bench import fit
-from airmuscle.bench.estimation import count_levels
-from airmuscle.bench.statics import fit_points
+from airmuscle.bench.statics import count_levels, fit_points
 from airmuscle.errors import IdentificationError
 from airmuscle.files import load
 from airmuscle.physics import ContractileSurface

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import UNCENSORED, confidence_band, fit, weakly_determined
-from airmuscle.bench.estimation import fitted_quantity_of
+from airmuscle.bench.statics import fitted_quantity_of
 from airmuscle.core import tree
 from airmuscle.errors import AirmuscleWarning, IdentificationError
 from airmuscle.files import library

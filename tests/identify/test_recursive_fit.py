@@ -7,7 +7,7 @@ import pytest
 from widths import widened
 
 from airmuscle.bench import UNCENSORED, BenchLimits, RecursiveFit, fit
-from airmuscle.bench.estimation import NextPoint
+from airmuscle.bench.statics import NextPoint
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import ContractileSurface, ValidityRange
 from airmuscle.recording import Recording

@@ -20,14 +20,18 @@ from airmuscle.bench.estimation import (
     GroupRefits,
     KnownMinima,
     LeastSquaresSolution,
-    bootstrapping,
     find_initial_values,
-    fitted_quantity_of,
     solve_iteratively,
     solve_least_squares,
 )
 from airmuscle.bench.estimation.least_squares_descent import gauss_newton
-from airmuscle.bench.statics import FitPoints, blank_surface, refit
+from airmuscle.bench.statics import (
+    FitPoints,
+    blank_surface,
+    bootstrapping,
+    fitted_quantity_of,
+    refit,
+)
 from airmuscle.core import autodiff, tree
 from airmuscle.physics import (
     Braid,

@@ -29,11 +29,10 @@ from airmuscle.bench.estimation import (
     find_initial_values,
     is_linear_parameter,
     label_folds,
-    make_problem,
     shortened_step,
     solve_censored_least_squares,
 )
-from airmuscle.bench.statics import blank_surface
+from airmuscle.bench.statics import blank_surface, make_problem
 from airmuscle.core import leaves
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import (

@@ -18,8 +18,8 @@ from scipy.linalg import sqrtm
 from scipy.stats import t as student
 
 from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write
-from airmuscle.bench.estimation import NORMAL_QUANTILE, RELIABLE_GROUPS, Uncertainty
-from airmuscle.bench.statics import blank_surface
+from airmuscle.bench.estimation import NORMAL_QUANTILE
+from airmuscle.bench.statics import RELIABLE_GROUPS, Uncertainty, blank_surface
 from airmuscle.physics import Braid, TonduLopez2000
 from airmuscle.recording import Recording
 

@@ -27,8 +27,8 @@ from airmuscle.bench import (
     profile,
     weakly_determined,
 )
-from airmuscle.bench.estimation.bootstrapping import _refit_iteratively
 from airmuscle.bench.statics import blank_surface
+from airmuscle.bench.statics.bootstrapping import _refit_iteratively
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000
 from airmuscle.recording import Recording

@@ -27,8 +27,8 @@ from airmuscle.bench import (
     read,
     write,
 )
-from airmuscle.bench.campaign import creep_force
 from airmuscle.bench.hysteresis import hysteresis_chapters, plot_loops
+from airmuscle.bench.prediction import creep_force
 from airmuscle.files import load, load_scenario, save
 from airmuscle.files.library import PLANT_READER, Location
 from airmuscle.physics import CreepElements, MaxwellSlip, Muscle

@@ -20,10 +20,10 @@ import pytest
 
 import airmuscle as am
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, RecordedTime, read
+from airmuscle.bench.diagnosis import check_bench
 from airmuscle.bench.readers import (
     Selection,
     call_in_separate_process,
-    check_bench,
     mapping_of_tables,
     raw_csv,
     read_mapping,

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import ColumnMapping, UniformTime, read, read_csv
-from airmuscle.bench.readers import check_bench, parse_unit_row
+from airmuscle.bench.diagnosis import check_bench
+from airmuscle.bench.readers import parse_unit_row
 from airmuscle.errors import AirmuscleWarning, ColumnError, UnitError
 from airmuscle.recording import Recording
 

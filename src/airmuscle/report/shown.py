@@ -31,6 +31,8 @@ UNIT = "unit"
 MEANING = "meaning"
 SYMBOL = "symbol"
 """Names of columns with a special form."""
+BRIEF_ROWS = 12
+"""Maximum number of rows of estimates in the brief view (chosen)."""
 _ANR = " (ANR)"
 """End of the unit of a volume of air at the reference atmosphere of ISO 8778."""
 

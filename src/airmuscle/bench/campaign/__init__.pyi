@@ -10,12 +10,9 @@ from .fill_stage import fit_fill_stage as fit_fill_stage
 from .fill_stage import relate_volumes as relate_volumes
 from .friction_and_release import FrictionStage as FrictionStage
 from .friction_and_release import ReleaseStage as ReleaseStage
-from .friction_and_release import creep_force as creep_force
-from .friction_and_release import creep_stretches as creep_stretches
 from .friction_and_release import fit_friction_stage as fit_friction_stage
 from .friction_and_release import fit_release_stage as fit_release_stage
 from .friction_and_release import free_of_creep as free_of_creep
-from .friction_and_release import friction_along as friction_along
 from .record import CampaignRecord as CampaignRecord
 from .record import RecordKind as RecordKind
 from .record import check_one_rig as check_one_rig
@@ -35,10 +32,8 @@ from .transient import LeftOutStage as LeftOutStage
 from .transient import count_pulses as count_pulses
 from .transient import find_motion as find_motion
 from .transient import find_pressure_steps as find_pressure_steps
-from .transient import held_steady as held_steady
 from .transient import with_force as with_force
 
 # isort: split
 # For the other rooms, not in __all__
-from .friction_and_release import predicted_force as predicted_force
 from .transient import is_held as is_held

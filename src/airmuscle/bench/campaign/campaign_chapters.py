@@ -15,6 +15,7 @@ from ..diagnosis import level_tables, level_text
 from ..dynamics import draw_residuals, dynamic_chapters, residual_panels, running_extreme
 from ..hysteresis import hysteresis_chapters, joint_friction_chapter, loops_not_joined
 from ..inspection import level_intervals
+from ..prediction import thinned_rows
 from ..statics import MuscleDescription, compare_chapter, fit_chapter
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
@@ -22,7 +23,7 @@ from .friction_and_release import FrictionStage, ReleaseStage
 from .record import CampaignRecord, RecordKind
 from .result import Campaign
 from .static_stage import StaticStage
-from .transient import LeftOutStage, thinned_rows
+from .transient import LeftOutStage
 
 
 def campaign_chapters(campaign: Campaign, entry: MuscleDescription | None) -> list[Chapter]:

@@ -13,9 +13,9 @@ from ...physics import CreepElements, ForceLaw
 from ...recording import Recording
 from ..hysteresis import MIN_RATIO, CreepFit, Hold, creep_elements, find_holds, fit_creep
 from ..inspection import CONTRACTION_BAND, EDGE
-from .friction_and_release import creep_stretches, has_path
+from ..prediction import creep_stretches, displacement, has_path, thinned_rows
 from .record import CampaignRecord
-from .transient import LeftOutStage, displacement, find_motion, thinned_rows
+from .transient import LeftOutStage, find_motion
 
 NAME = "creep"
 FIT_ROWS = 400

@@ -5,11 +5,10 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from typing import Any
 
 import numpy as np
 
-from ...core import STANDARD_GRAVITY, AirmuscleError, Array, ShortRepr
+from ...core import STANDARD_GRAVITY, AirmuscleError, ShortRepr
 from ...engine.distribution import DistributedCalls
 from ...engine.loop.inputs import Schedule
 from ...physics import (
@@ -33,17 +32,12 @@ from ..dynamics import (
     fit_dynamic,
     stated_ambient,
 )
-from ..inspection import estimate_noise
-from ..statics import evaluate_force
+from ..prediction import creep_force, displacement, has_path, path_rows, thinned_rows
 from .record import CampaignRecord, RecordKind
 from .transient import (
     LeftOutStage,
-    displacement,
     find_motion,
-    held_steady,
-    path_rows,
     thin,
-    thinned_rows,
     with_force,
 )
 
@@ -174,9 +168,7 @@ def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experime
 
 
 MAX_LOOPS = 6
-PREDICTED_ROWS = 3000
-"""Maximum number of loops that are fitted, of more those at evenly spaced pressures, and of rows of
-a record for which the friction is computed (chosen)."""
+"""Maximum number of loops that are fitted, of more those at evenly spaced pressures (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -286,58 +278,6 @@ def _find_loops(
     ], failed
 
 
-def friction_along(friction: Friction, recording: Recording) -> Array:
-    """Friction force against contraction [N] along the motion of a recording, relaxed at its start;
-    shape (N,). It is computed at rows whose steps are beyond the noise of the displacement, and
-    interpolated between them. The motion is that outside a dead band of the noise, so that a held
-    length keeps its friction."""
-    if isinstance(friction, NoFriction):
-        return np.zeros(len(recording))
-    rows = path_rows(recording, PREDICTED_ROWS)
-    time = recording.columns.get("time")
-    path = displacement(recording)
-    path = held_steady(path[rows], estimate_noise(path))
-    force = np.asarray(friction.force_along(path, None if time is None else time[rows]))
-    factor = np.asarray(friction.pressure_factor(recording["pressure"][rows]))
-    return np.asarray(np.interp(np.arange(len(recording)), rows, factor * force))
-
-
-def creep_stretches(time: Array, path: Array, relaxation_times: Array) -> Array:
-    """Stretch z [m] of each Maxwell element along a path x [m], z' = x' - z/tau, exact for linear
-    motion; (N, E).
-    """
-    steps = np.diff(path, prepend=path[:1])
-    durations = np.diff(time, prepend=time[:1])
-    decay = np.exp(-durations[:, None] / relaxation_times)
-    ratio = durations[:, None] / relaxation_times
-    gain = (
-        np.where(ratio > 1e-9, -np.expm1(-ratio) / np.maximum(ratio, 1e-300), 1.0) * steps[:, None]
-    )
-    stretches = np.zeros((time.size, relaxation_times.size))
-    for i in range(1, time.size):
-        stretches[i] = stretches[i - 1] * decay[i] + gain[i]
-    return stretches
-
-
-def creep_force(elements: CreepElements, recording: Recording) -> Array:
-    """Force of the elements against contraction [N] along the motion of a recording, relaxed at its
-    start; (N,).
-    """
-    if not elements.stiffnesses or "time" not in recording:
-        return np.zeros(len(recording))
-    stretches = creep_stretches(
-        recording["time"], displacement(recording), np.array(elements.relaxation_times)
-    )
-    return np.asarray(stretches @ np.array(elements.stiffnesses))
-
-
-def has_path(recording: Recording) -> bool:
-    """Whether a recording has the displacement over time."""
-    return "time" in recording and isinstance(
-        recording.constants.get("resting_length"), float | int
-    )
-
-
 def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings with the force of the creep elements along their motion added to the measured
     force.
@@ -350,16 +290,3 @@ def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> l
         )
         for recording in recordings
     ]
-
-
-def predicted_force(
-    law: Any, recording: Recording, friction: Friction, creep: CreepElements, max_force: float
-) -> Array:
-    """The force [N] along the pressure and the motion of a recording, negative where the muscle is
-    slack; shape (N,). Friction and creep, relaxed at the first row, are left out without the
-    constant `resting_length`. `max_force` [N] limits the force of laws that give contraction or
-    pressure. Raises ColumnError."""
-    force = evaluate_force(law, recording["pressure"], recording["contraction"], max_force)
-    if recording.constants.get("resting_length") is None:
-        return force
-    return force - friction_along(friction, recording) - creep_force(creep, recording)

@@ -12,10 +12,11 @@ from ...core import AirmuscleError, Array, PhysicsError, ShortRepr, counted
 from ...physics import ChebyshevGeometry, CreepElements, ForceLaw, Friction
 from ...recording import Recording
 from ..diagnosis import check_data, support_of
-from ..estimation import Fit
+from ..prediction import creep_force, friction_along
 from ..statics import (
     FORCE_MARGIN,
     Comparison,
+    Fit,
     FitPoints,
     compare,
     force_residuals,
@@ -24,7 +25,6 @@ from ..statics import (
     ranked_specimen_errors,
     refit,
 )
-from .friction_and_release import creep_force, friction_along
 from .record import CampaignRecord, RecordKind, slow_rows, static_levels
 from .transient import LeftOutStage, is_held, thin, with_force
 

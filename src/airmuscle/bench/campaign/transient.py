@@ -19,6 +19,10 @@ from ..inspection import (
     quasi_static_rows,
     running_median,
 )
+from ..prediction import thinned_rows
+
+NOISE_RANGE = 8.0
+"""Range of the noise of a held contraction, in standard deviations of the noise (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,20 +39,6 @@ class LeftOutStage:
         return f"Not identified: {self.reason.rstrip('.')}."
 
 
-MAX_ROWS = 1000
-"""Maximum number of rows of a record for a fit of friction (chosen)."""
-NOISE_STEPS = 4.0
-NOISE_RANGE = 8.0
-DEAD_BAND = 4.0
-"""Mean step of the displacement between two rows, range of the noise of a held contraction, and
-half width of the dead band of a motion, in standard deviations of the noise (chosen)."""
-
-
-def thinned_rows(size: int, count: int) -> Array:
-    """The numbers of at most `count` rows of `size`, evenly spaced."""
-    return np.unique(np.linspace(0, size - 1, min(count, size)).round().astype(int))
-
-
 def thin(recording: Recording, count: int) -> Recording:
     """The recording reduced to at most `count` rows, evenly spaced by number."""
     return (
@@ -56,41 +46,6 @@ def thin(recording: Recording, count: int) -> Recording:
         if len(recording) <= count
         else recording.rows(thinned_rows(len(recording), count))
     )
-
-
-def displacement(recording: Recording) -> Array:
-    """Displacement eps L0 [m] at every row, shape (N,)."""
-    return np.asarray(recording["contraction"] * float(recording.constants["resting_length"]))
-
-
-def path_rows(recording: Recording, max_rows: int = MAX_ROWS) -> Array:
-    """The numbers of at most `max_rows` rows that follow the motion without that of the noise."""
-    path = displacement(recording)
-    noise = estimate_noise(path)
-    span = float(np.ptp(path))
-    count = (
-        max_rows
-        if noise == 0.0
-        else int(min(max_rows, max(2.0 * span / (NOISE_STEPS * noise), 20)))
-    )
-    return thinned_rows(len(recording), count)
-
-
-def held_steady(path: Array, noise: float) -> Array:
-    """The motion without its noise: the output of a play operator, which rests while the path [m]
-    stays within a dead band of `DEAD_BAND` standard deviations of the noise [m]; shape (N,). The
-    noise of a held length would otherwise unload the friction: cycles within the presliding
-    distance relax the force of most friction laws towards zero.
-    """
-    if noise == 0.0:
-        return path
-    half = DEAD_BAND * noise
-    output = np.empty(path.size)
-    current = float(path[0])
-    for i, value in enumerate(path.tolist()):
-        current = min(max(current, value - half), value + half)
-        output[i] = current
-    return output
 
 
 def is_held(recording: Recording) -> bool:

@@ -3,6 +3,8 @@ from .branch_residuals import EITHER as EITHER
 from .branch_residuals import FILTER as FILTER
 from .branch_residuals import delay_notes as delay_notes
 from .branch_residuals import find_delay as find_delay
+from .checked_reading import check_bench as check_bench
+from .checked_reading import read as read
 from .data_checks import Scatter as Scatter
 from .level_records import LevelRecord as LevelRecord
 from .level_records import level_record as level_record
@@ -21,7 +23,6 @@ from .suspicious_values import warn_of_suspicious_values as warn_of_suspicious_v
 from .branch_residuals import branch_distance as branch_distance
 from .branch_residuals import branch_notes as branch_notes
 from .contractions import MAX_CONTRACTION as MAX_CONTRACTION
-from .contractions import code_of as code_of
 from .contradictions import RepeatedRows as RepeatedRows
 from .contradictions import find_repeated_rows as find_repeated_rows
 from .data_checks import HELD as HELD

@@ -2,7 +2,6 @@
 percent and limit.
 """
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -11,8 +10,7 @@ from ...core import Array, ColumnError, Hint, HintedText, counted
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from ..inspection import estimate_noise
-from ..readers.constants import file_conversion
-from ..readers.missing_values import DropMissing
+from ..readers import CODES, DropMissing, file_conversion
 from .bench_rows import BenchRows, bench_rows, file_list, limits, recordings_with
 from .pressures import REVERSED
 
@@ -172,43 +170,11 @@ def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:
         )
 
 
-CODES = (
-    99.0,
-    999.0,
-    999.9,
-    9999.0,
-    9999.9,
-    99999.0,
-    999999.0,
-    32767.0,
-    32768.0,
-    1e30,
-    1e31,
-    1e36,
-    1e37,
-    1e38,
-)
-"""Magnitudes that loggers write for a missing value (chosen: the usual ones)."""
-MIN_CODE = 500.0
-"""Minimum magnitude of a code that is recognised in another power of ten of the unit (chosen)."""
 MIN_DISTANCE = 0.2
 MAX_SHARE = 0.5
 """Minimum distance of a code from other readings, as a fraction of their range; maximum share of
 its rows (chosen).
 """
-
-
-def code_of(value: float) -> float | None:
-    """The code for a missing value that a number [SI] is, in some power of ten of its unit; None if
-    it is none.
-    """
-    if value == 0.0 or not math.isfinite(value):
-        return None
-    ratios = ((code, abs(value) / code) for code in CODES if code > MIN_CODE)
-    exact = (
-        code for code, ratio in ratios if abs(math.log10(ratio) - round(math.log10(ratio))) < 1e-7
-    )
-    return math.copysign(code, value) if (code := next(exact, None)) is not None else None
 
 
 def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]:

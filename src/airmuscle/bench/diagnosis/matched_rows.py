@@ -18,8 +18,8 @@ import numpy.typing as npt
 from ...core import Array
 from ...recording import Recording
 from ...recording.columns import quantity_of
-from ..estimation import POINT_COLUMNS, specimen_name
-from ..inspection import branch_directions, find_branches, find_runs, merged_readings
+from ..estimation import specimen_name
+from ..inspection import POINT_COLUMNS, branch_directions, find_branches, find_runs, merged_readings
 
 PRESSURE_REACH = 0.015
 CONTRACTION_REACH = 0.004

@@ -12,7 +12,7 @@ import numpy as np
 from ...core import BLACK, BLUE, RED, Array, cite, legend_below, new_figure
 from ...recording.columns import display_scale, displayed
 from ...report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
-from ..estimation import MAX_ROWS
+from ...report.shown import BRIEF_ROWS
 from ..reported import unit_column
 from .fit import CrossPrediction, describe_cross_predictions
 from .regulator_fit import RegulatorFit
@@ -107,7 +107,7 @@ def _cross_table(cross: Sequence[CrossPrediction]) -> Table:
         "unit": unit_column([name for _, name in pairs]),
     }
     title = "Each record predicted by the parameters of the others"
-    return Table("cross", title, columns, brief=MAX_ROWS, key="cross-predictions")
+    return Table("cross", title, columns, brief=BRIEF_ROWS, key="cross-predictions")
 
 
 def _optima_table(fit: DynamicFit) -> Table:
@@ -148,7 +148,7 @@ def _profiles(profiles: Sequence[DynamicProfile]) -> Chapter:
         " not limit the parameter there."
     )
     tables = (
-        Table("profiles", "95 % intervals", columns, brief=MAX_ROWS),
+        Table("profiles", "95 % intervals", columns, brief=BRIEF_ROWS),
         Table(
             "profile-courses",
             "Increase of the sum of squares [residual variances]",

@@ -13,8 +13,8 @@ from ...engine.compile import System
 from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ...report.shown import estimate_table
-from ..estimation import MAX_ROWS, Estimate, Identifiability
+from ...report.shown import BRIEF_ROWS, estimate_table
+from ..estimation import Estimate, Identifiability
 from ..reported import Reported, unit_column
 from .experiment import Unknown
 from .problem import DynamicFitProblem
@@ -264,9 +264,9 @@ class DynamicFit(Reported):
             "rms residual": TableColumn([self.rms(name, i) for i, _, name in rows], BY_ROW),
             "unit": unit_column([name for _, _, name in rows]),
         }
-        residuals = Table("rms", "Residuals by record", columns, brief=MAX_ROWS)
+        residuals = Table("rms", "Residuals by record", columns, brief=BRIEF_ROWS)
         tables = (
-            estimate_table(self.estimates, "estimates", "Estimates", brief=MAX_ROWS),
+            estimate_table(self.estimates, "estimates", "Estimates", brief=BRIEF_ROWS),
             residuals,
         )
         plots = (Plot("record", "First record, measured and modelled.", self.plot),)

@@ -25,8 +25,7 @@ import numpy.typing as npt
 from ...core import Array
 from . import least_squares_descent as steps
 from .model_evidence import student_quantile
-from .problem import FitProblem, LeastSquaresSolution
-from .solver import is_linear
+from .problem import LeastSquaresProblem, LeastSquaresSolution
 from .variable_projection import RANK_TOLERANCE
 
 LEVEL = 0.95
@@ -102,7 +101,9 @@ class KnownMinima:
     far apart along a valley.
     """
 
-    def __init__(self, problem: FitProblem, values: Array, group: RowIndices, count: int) -> None:
+    def __init__(
+        self, problem: LeastSquaresProblem, values: Array, group: RowIndices, count: int
+    ) -> None:
         self._problem = problem
         self._group = group
         self._count = count
@@ -131,12 +132,16 @@ class GroupRefits:
     each row, from 0 to `count` - 1."""
 
     def __init__(
-        self, problem: FitProblem, solution: LeastSquaresSolution, group: RowIndices, count: int
+        self,
+        problem: LeastSquaresProblem,
+        solution: LeastSquaresSolution,
+        group: RowIndices,
+        count: int,
     ) -> None:
         self._problem = problem
         self._solution = solution
         self._group = group
-        self._linear = is_linear(problem)
+        self._linear = problem.is_linear
         self._active = problem.active_rows(solution.modelled)
         weighted = problem.weights[:, None] * solution.jacobian
         residuals = problem.residuals(solution.modelled)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .problem import FitProblem, LeastSquaresSolution
+from .problem import LeastSquaresProblem, LeastSquaresSolution
 
 BoolArray = npt.NDArray[np.bool_]
 RELATIVE_STEP = 1e-9
@@ -72,7 +72,7 @@ class _Linearisation(NamedTuple):
 
 
 def gauss_newton(
-    problem: FitProblem,
+    problem: LeastSquaresProblem,
     start: Array,
     known: FirstStep | None = None,
     relative_step: float = RELATIVE_STEP,
@@ -121,7 +121,7 @@ def gauss_newton(
     return None
 
 
-def _evaluate(problem: FitProblem, values: Array) -> _Point:
+def _evaluate(problem: LeastSquaresProblem, values: Array) -> _Point:
     """The point within the bounds that is closest to these parameters."""
     inside = np.clip(values, *problem.bounds)
     modelled = problem.predict(inside)
@@ -129,7 +129,7 @@ def _evaluate(problem: FitProblem, values: Array) -> _Point:
 
 
 def _linearise(
-    problem: FitProblem, point: _Point, jacobian: Array, basis: StepBasis | None
+    problem: LeastSquaresProblem, point: _Point, jacobian: Array, basis: StepBasis | None
 ) -> _Linearisation | None:
     """The normal equations of the parameters that are not held on a bound; None for redundant
     parameters. A parameter on a bound is held where the gradient or the step of all free parameters
@@ -165,7 +165,7 @@ def _in_basis(
 
 
 def _curved_step(
-    problem: FitProblem, point: _Point, linear: _Linearisation, fraction: float
+    problem: LeastSquaresProblem, point: _Point, linear: _Linearisation, fraction: float
 ) -> tuple[_Point, float] | None:
     """The point after at most this fraction of a Gauss-Newton step with geodesic acceleration, and
     the fraction made. The acceleration follows the curved valley of correlated parameters; the
@@ -216,7 +216,7 @@ def _bounded_step(
     return bounded, projection
 
 
-def held_on_bounds(problem: FitProblem, values: Array, gradient: Array) -> BoolArray:
+def held_on_bounds(problem: LeastSquaresProblem, values: Array, gradient: Array) -> BoolArray:
     """Mask (P,) of the parameters on a bound that steps against the gradient would leave
     outwards.
     """

@@ -1,137 +1,37 @@
-"""FitProblem: law, free parameters, data points and the quantity in which residuals are taken."""
+"""LeastSquaresProblem: rows with measured values or bounds, and the named, bounded parameters of
+what is fitted to them.
+"""
 
-import dataclasses
-import functools
-from collections.abc import Collection, Iterator, Sequence
-from typing import Any, NamedTuple
+import abc
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import (
-    Array,
-    Hint,
-    IdentificationError,
-    ParameterError,
-    alternatives,
-    as_slice,
-    autodiff,
-    parts_of,
-    tree,
-)
-from ...physics.muscle.characteristic import (
-    Characteristic,
-    ContractionLaw,
-    ForceLaw,
-    PooledLengthLaw,
-    PressureLaw,
-)
-from ...physics.muscle.characteristic.modes import formula_alone
-from ...recording import Recording
-from ...recording.columns import QUANTITIES
-from .weighting import UNCENSORED, Censoring
+from ...core import Array, Hint, IdentificationError
 
 BOUND_MARGIN = 1e-6
 """Relative distance from a bound within which a parameter is on it (chosen)."""
-POINT_COLUMNS = ("pressure", "contraction", "force")
-RESTING_LENGTH = "resting_length"
-"""Column with the resting length [m] of every row, in data of several specimens."""
-SPECIMEN = "specimen"
-"""Column with the index of the specimen of every row, in data of a PooledLengthLaw."""
+MAX_NAMES = 3
+"""Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
+_RELATIVE_STEP = float(np.cbrt(np.finfo(float).eps))
+"""Step of a central difference, relative to the parameter."""
 
 
-@dataclasses.dataclass(frozen=True)
-class FittedQuantity:
-    """The quantity that a law gives as a function of the other two: the method that computes it and
-    its arguments.
+class FreeParameter(NamedTuple):
+    """A parameter that is fitted: its path, a short label, its initial value, bounds and unit
+    [SI].
     """
 
-    method: str
-    arguments: tuple[str, str]
     name: str
-
-    @property
-    def unit(self) -> str:
-        """SI unit of the quantity."""
-        return QUANTITIES[self.name].unit
-
-
-FORCE = FittedQuantity("unclamped_force", ("pressure", "contraction"), "force")
-CONTRACTION = FittedQuantity("contraction", ("pressure", "force"), "contraction")
-PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
-
-
-def rows_by_length(law: Any, data: Recording) -> list[tuple[float | None, npt.NDArray[np.intp]]]:
-    """Each resting length in the data with the indices of its rows; once None, without rows or an
-    effect of length.
-    """
-    if (
-        RESTING_LENGTH not in data.columns
-        or not hasattr(law, "with_resting_length")
-        or not len(data)
-    ):
-        return [(None, np.arange(len(data)))]
-    lengths = data[RESTING_LENGTH]
-    return [(float(length), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
-
-
-def with_length(law: Any, length: Any) -> Any:
-    """The law of a muscle with this resting length [m], if it is known and the law depends on
-    it.
-    """
-    return (
-        law.with_resting_length(float(length))
-        if length is not None and hasattr(law, "with_resting_length")
-        else law
-    )
-
-
-def of_length(law: Any, length: float | None) -> Any:
-    """As `law.with_resting_length`, but without validation, because a search may pass through
-    invalid parameters.
-    """
-    if length is None:
-        return law
-    return tree.unflatten(
-        law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in tree.leaves(law)]
-    )
-
-
-def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
-    """The values of `law.method(*arguments)` at every row, with the law of its specimen or resting
-    length; (N,). They are those of the formula, also beyond the range of a law.
-    """
-    laws: list[tuple[Any, slice | npt.NDArray[np.intp]]]
-    if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
-        member = data[SPECIMEN].astype(int)
-        laws = [
-            (law.for_specimen(law.specimens[i]), np.flatnonzero(member == i))
-            for i in np.unique(member).tolist()
-        ]
-    else:
-        laws = [
-            (of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)
-        ]
-    values = np.zeros(len(data))
-    with formula_alone():
-        for single, rows in laws:
-            values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
-    return values
-
-
-def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
-    """The quantity that a law gives, in which residuals are taken. Raises IdentificationError."""
-    for kind, quantity in (
-        (ForceLaw, FORCE),
-        (ContractionLaw, CONTRACTION),
-        (PressureLaw, PRESSURE),
-    ):
-        if isinstance(law, kind):
-            return quantity
-    raise IdentificationError(
-        f"{type(law).__name__} cannot be fitted, because it gives neither force nor contraction nor"
-        " pressure."
-    )
+    label: str
+    initial: float
+    bounds: tuple[float, float]
+    unit: str
+    meaning: str
+    is_linear: bool = False
+    """Whether the fitted quantity is linear in it."""
 
 
 class LeastSquaresSolution(NamedTuple):
@@ -144,44 +44,138 @@ class LeastSquaresSolution(NamedTuple):
     jacobian: Array
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FitProblem:
-    """N data points and the P free parameters of a law."""
+class RankDeficiency(NamedTuple):
+    """Parameters that the rows do not separate: the labels of those with a share in the null space,
+    the index of the one with the greatest share, and the rank and number of all parameters."""
 
-    law: Any
-    fitted_quantity: FittedQuantity
-    data: Recording
+    labels: list[str]
+    greatest: int
+    rank: int
+    parameters: int
+
+    @property
+    def listed(self) -> str:
+        """The first of the labels, and the number of the others."""
+        first = ", ".join(self.labels[:MAX_NAMES])
+        further = len(self.labels) - MAX_NAMES
+        return f"{first} and {further} other parameters" if further > 0 else first
+
+    @property
+    def cause(self) -> str:
+        """The phrase that completes "the data"."""
+        if len(self.labels) == 1:
+            return f"do not depend on {self.labels[0]}"
+        if len(self.labels) <= MAX_NAMES:
+            return f"cannot separate {' and '.join(self.labels)}"
+        return f"cannot separate {self.labels[0]} and {len(self.labels) - 1} other parameters"
+
+    @property
+    def statement(self) -> str:
+        """The same with more of the labels."""
+        return self.cause if len(self.labels) == 1 else f"cannot separate {self.listed}"
+
+
+class LeastSquaresProblem(abc.ABC):
+    """N rows and P free parameters. A kind of fit brings its parameters, the fitted quantity at
+    every row with its Jacobian, and the selection of rows; solvers, covariance, intervals and
+    refits know no more of it.
+    """
+
     target: Array
     """Measured value, or the bound of a censored row, in the fitted quantity [SI]; shape (N,)."""
     censoring: Array
-    """0 uncensored, 1 the law may lie below the target, -1 the law may lie above it; shape (N,)."""
+    """0 uncensored, 1 the model may lie below the target, -1 it may lie above; shape (N,)."""
     weights: Array
     """Factors of the residuals, with a root mean square of 1; shape (N,)."""
-    leaves: tuple[tree.Leaf, ...]
-    free: tuple[int, ...]
-    """Indices of the leaves that are fitted."""
 
     @property
-    def arguments(self) -> tuple[Array, Array]:
-        """The arguments of the law at every row [SI]; shape (N,) each."""
-        first, second = self.fitted_quantity.arguments
-        return self.data[first], self.data[second]
+    @abc.abstractmethod
+    def name(self) -> str:
+        """What is fitted, for messages."""
 
     @property
-    def free_leaves(self) -> list[tree.Leaf]:
-        """The leaves that are fitted."""
-        return [self.leaves[i] for i in self.free]
+    @abc.abstractmethod
+    def origin(self) -> str:
+        """The origin of the rows, for messages."""
+
+    @property
+    @abc.abstractmethod
+    def quantity(self) -> str:
+        """The name of the fitted quantity."""
+
+    @property
+    @abc.abstractmethod
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        """The parameters that are fitted."""
+
+    @abc.abstractmethod
+    def predict(self, values: Array) -> Array:
+        """The fitted quantity at every row with these parameters [SI]; shape (N,). It need not be
+        finite.
+        """
+
+    @abc.abstractmethod
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N,
+        P).
+        """
+
+    @abc.abstractmethod
+    def rows(self, selection: npt.NDArray[Any]) -> Self:
+        """The problem of these rows, a mask or indices."""
+
+    @abc.abstractmethod
+    def weighted(self, factors: Array) -> Self:
+        """The problem with the weights multiplied by these factors (N,)."""
+
+    @abc.abstractmethod
+    def with_known(self, index: int, value: float) -> Self:
+        """The problem in which the parameter of this index is not free but has a value."""
+
+    def describe_row(self, row: int) -> str:
+        """Where a row was measured, for messages."""
+        return f"row {row + 1}"
+
+    def rank_error(self, deficiency: RankDeficiency) -> IdentificationError:
+        """The error for parameters that the rows do not separate."""
+        ranks = f"rank {deficiency.rank} of {deficiency.parameters}"
+        return IdentificationError(
+            f"{self.origin}: the data {deficiency.statement} of {self.name} ({ranks} parameters)."
+            " Give further data, or fit fewer parameters.",
+            hint=Hint("To fix one parameter", "fixed", (self.names[deficiency.greatest],)),
+            cause=f"the data {deficiency.cause} ({ranks})",
+        )
+
+    @property
+    def names(self) -> list[str]:
+        """The paths of the free parameters."""
+        return [parameter.name for parameter in self.parameters]
 
     @property
     def initial_values(self) -> Array:
-        """The free parameters as the law has them; shape (P,)."""
-        return np.array([leaf.value for leaf in self.free_leaves], dtype=float)
+        """The free parameters at the start; shape (P,)."""
+        return np.array([parameter.initial for parameter in self.parameters], dtype=float)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the free parameters; shape (P,) each."""
-        pairs = np.array([leaf.declared.bounds for leaf in self.free_leaves], dtype=float)
-        return pairs[:, 0], pairs[:, 1]
+        pairs = np.array([parameter.bounds for parameter in self.parameters], dtype=float)
+        low, high = pairs.reshape(-1, 2).T
+        return low, high
+
+    @property
+    def is_linear_parameter(self) -> npt.NDArray[np.bool_]:
+        """Mask of the free parameters in which the fitted quantity is linear, shape (P,)."""
+        return np.array([parameter.is_linear for parameter in self.parameters], dtype=bool)
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the fitted quantity is linear in all free parameters, and none of them is
+        bounded.
+        """
+        low, high = self.bounds
+        is_unbounded = bool(np.isneginf(low).all() and np.isposinf(high).all())
+        return is_unbounded and bool(self.is_linear_parameter.all())
 
     def bounds_reached(self, values: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
         """Masks (P,) of the parameters on their lower and on their upper bound, within a margin,
@@ -190,86 +184,21 @@ class FitProblem:
         margin = BOUND_MARGIN * np.maximum(np.abs(values), np.abs(self.initial_values))
         return values - low <= margin, high - values <= margin
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """A short label for each free parameter: its term in a polynomial, else its symbol, else
-        its path.
-        """
-        terms = getattr(self.law, "term_labels", ())
-        fields = getattr(self.law, "linear_in", ())
-        texts = {f"{field}[{i}]": f"a({term})" for field in fields for i, term in enumerate(terms)}
-        symbols = [leaf.declared.symbol for leaf in self.free_leaves]
-        paths = [leaf.path for leaf in self.free_leaves]
-        names = (
-            s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True)
-        )
-        return tuple(texts.get(path, name) for path, name in zip(paths, names, strict=True))
-
-    def leaf_values(self, values: Sequence[float] | Array) -> list[float]:
-        """All leaves of the law with these values of the free parameters."""
-        leaf_values = [leaf.value for leaf in self.leaves]
-        for i, value in zip(self.free, values, strict=True):
-            leaf_values[i] = float(value)
-        return leaf_values
-
-    def rows(self, selection: npt.NDArray[Any]) -> "FitProblem":
-        """The problem of these rows, a mask or indices."""
-        chosen: dict[str, Any] = {
-            name: getattr(self, name)[selection] for name in ("target", "censoring", "weights")
-        }
-        return dataclasses.replace(self, data=self.data.rows(selection), **chosen)
-
-    def repeated(self, counts: Array) -> "FitProblem":
+    def repeated(self, counts: Array) -> Self:
         """The problem in which each row counts this many times (N,)."""
         drawn = counts > 0
-        problem = self.rows(drawn)
-        return dataclasses.replace(problem, weights=problem.weights * np.sqrt(counts[drawn]))
-
-    def predict(self, values: Array) -> Array:
-        """The fitted quantity at every row with these parameters [SI]; shape (N,). It is that of
-        the formula: the range of a law follows from its fit.
-        """
-        method = self.fitted_quantity.method
-        # Non-finite values raise an error at the start; later the search backtracks.
-        with np.errstate(all="ignore"), formula_alone():
-            return self._join([getattr(law, method)(*x) for law, x in self._laws(values)])
-
-    def _laws(self, values: Array) -> Iterator[tuple[Any, tuple[Array, ...]]]:
-        """The law of each resting length with these parameters, not validated, and the arguments of
-        its rows.
-        """
-        leaf_values = self.leaf_values(values)
-        which = [i for i, leaf in enumerate(self.leaves) if leaf.path == RESTING_LENGTH]
-        for length, _, arguments in self._points:
-            if length is not None:
-                for i in which:
-                    leaf_values[i] = length
-            yield tree.unflatten(self.law, leaf_values), arguments
-
-    @functools.cached_property
-    def _points(self) -> list[tuple[float | None, slice | npt.NDArray[np.intp], tuple[Array, ...]]]:
-        """Each resting length with its rows and their arguments."""
-        groups = [(length, as_slice(rows)) for length, rows in rows_by_length(self.law, self.data)]
-        return [(length, rows, tuple(x[rows] for x in self.arguments)) for length, rows in groups]
-
-    def _join(self, parts: Sequence[Any]) -> Array:
-        """Values by resting length in the order of the rows, shape (N, ...)."""
-        first = np.asarray(parts[0])
-        values = np.empty((len(self.data), *first.shape[1:]))
-        for (_, rows, _), part in zip(self._points, parts, strict=True):
-            values[rows] = part
-        return values
+        return self.rows(drawn).weighted(np.sqrt(counts[drawn]))
 
     def residuals(self, modelled: Array) -> Array:
-        """Weighted residuals; that of a censored row is 0 unless the law violates its bound; shape
-        (N,).
+        """Weighted residuals; that of a censored row is 0 unless the model violates its bound;
+        shape (N,).
         """
         difference = modelled - self.target
         return self.weights * np.where(self.censoring * difference < 0, 0.0, difference)
 
     def active_rows(self, modelled: Array) -> npt.NDArray[np.bool_]:
-        """Mask of the uncensored rows and of the censored rows whose bound the law violates; shape
-        (N,).
+        """Mask of the uncensored rows and of the censored rows whose bound the model violates;
+        shape (N,).
         """
         return np.asarray((self.censoring == 0) | (self.censoring * (modelled - self.target) > 0))
 
@@ -277,89 +206,27 @@ class FitProblem:
         """The solution with these free parameters (P,)."""
         return LeastSquaresSolution(values, self.predict(values), self.jacobian(values))
 
-    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
-        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N,
-        P). Exact if the law is traceable, otherwise by central differences."""
-        which = range(len(self.free)) if which is None else which
-        if all(autodiff.is_traceable(type(part)) for _, part in parts_of(self.law)):
-            leaves = [self.free[i] for i in which]
-            method = self.fitted_quantity.method
-            return self._join(
-                [
-                    autodiff.parameter_derivatives(law, method, x, leaves)
-                    for law, x in self._laws(values)
-                ]
-            )
+    def design_matrix(self) -> tuple[Array, Array]:
+        """Design matrix (N, P) and constant part (N,) of a problem that is linear in its free
+        parameters.
+        """
+        initial = self.initial_values
+        matrix = self.jacobian(initial)
+        return matrix, self.predict(initial) - matrix @ initial
+
+    def central_differences(self, values: Array, which: Sequence[int]) -> Array:
+        """The Jacobian (N, P) by these parameters from differences of `predict` within the
+        bounds.
+        """
         low, high = self.bounds
+        initial = self.initial_values
         columns = []
         for i in which:
-            value = values[i]
-            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
-            up = values.copy()
-            down = values.copy()
-            up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
-            columns.append((self.predict(up) - self.predict(down)) / (up[i] - down[i]))
+            step = _RELATIVE_STEP * max(abs(values[i]), abs(initial[i]), 1e-8)
+            above = values.copy()
+            below = values.copy()
+            above[i] = min(values[i] + step, high[i])
+            below[i] = max(values[i] - step, low[i])
+            difference = self.predict(above) - self.predict(below)
+            columns.append(difference / (above[i] - below[i]))
         return np.column_stack(columns)
-
-
-def make_problem(
-    law: Characteristic,
-    data: Recording,
-    censoring: Censoring,
-    weights: Array,
-    fixed: Collection[str],
-) -> FitProblem:
-    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted.
-    Raises IdentificationError where there are too few rows, ParameterError for an unknown name."""
-    quantity = fitted_quantity_of(law)
-    signs = censoring.signs(data["force"])
-    target = data[quantity.name]
-    if quantity == FORCE:
-        target = np.where(
-            signs > 0, censoring.min_force, np.where(signs < 0, censoring.max_force, target)
-        )
-    elif quantity == PRESSURE:
-        # a smaller force at the same pressure means that the stated force needs a higher pressure
-        signs = -signs
-    leaves = tuple(tree.leaves(law))
-    fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
-    for name in fixed:
-        if name not in fields and name not in (leaf.path for leaf in leaves):
-            raise ParameterError(
-                f"{type(law).__name__} has no parameter '{name}' to be fixed"
-                f"{alternatives(name, fields, 'its parameters are')}"
-            )
-    kept = {
-        leaf.path
-        for leaf in leaves
-        if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)
-    }
-    free = tuple(
-        i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept
-    )
-    _check_row_count(law, data, len(free), int(np.count_nonzero(signs == 0)))
-    return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
-
-
-def _check_row_count(law: Characteristic, data: Recording, free: int, measured: int) -> None:
-    name = f"{data.origin}: {type(law).__name__}"
-    if free == 0:
-        raise IdentificationError(f"{name} has no free parameter. Fix fewer parameters.")
-    censored = len(data) - measured
-    if len(data) and not measured:
-        raise IdentificationError(
-            f"{name}: all {censored} rows are censored (at zero force, or at the limit of the force"
-            " range), so there is no measured value. Give rows with a positive force.",
-            hint=Hint(
-                "To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"
-            ),
-        )
-    if measured < free:
-        also = f" ({censored} further rows are censored and give bounds only)" if censored else ""
-        raise IdentificationError(
-            f"{name} has {free} free parameters, but only {measured} rows are measured"
-            f" values{also}. Measure more points, or choose a law with fewer parameters or a lower"
-            " degree.",
-            hint=Hint("To fix parameters", "fixed"),
-            cause=f"{free} parameters, but {measured} measured values",
-        )

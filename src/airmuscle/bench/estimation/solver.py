@@ -1,16 +1,14 @@
 """Least-squares solvers: direct for laws linear in their parameters, iterative otherwise."""
 
-import dataclasses
 from typing import Any
 
 import numpy as np
 
 from ...core import Array, Hint, IdentificationError
 from .least_squares_descent import gauss_newton
-from .problem import FitProblem, LeastSquaresSolution
+from .problem import LeastSquaresProblem, LeastSquaresSolution
 from .variable_projection import (
     find_initial_values,
-    is_linear_parameter,
     solve_censored_least_squares,
     uncensored_rank,
 )
@@ -30,12 +28,12 @@ _SINGULAR_TOLERANCE = 1e-8
 
 
 def solve_least_squares(
-    problem: FitProblem, loss: Loss, start: Array | None = None
+    problem: LeastSquaresProblem, loss: Loss, start: Array | None = None
 ) -> LeastSquaresSolution:
     """The free parameters that minimise the loss. Raises IdentificationError where the search does
     not converge. The search starts at `start`, if possible by Gauss-Newton steps; by default at the
     initial values found by variable projection."""
-    if not is_linear(problem):
+    if not problem.is_linear:
         near = (
             gauss_newton(problem, start)
             if start is not None and isinstance(loss, LeastSquares)
@@ -58,35 +56,18 @@ def solve_least_squares(
     # The search stops as soon as no bound is violated; parameters that only bounds determine are
     # then arbitrary. Least squares with every square weighted by rho' have the same solution.
     derivative = loss.rho((problem.residuals(robust.modelled) / loss.scale) ** 2)[1]
-    return _solve_linear(
-        dataclasses.replace(problem, weights=problem.weights * np.sqrt(derivative))
-    )
+    return _solve_linear(problem.weighted(np.sqrt(derivative)))
 
 
-def is_linear(problem: FitProblem) -> bool:
-    """Whether the law is linear in all free parameters, and none of them is bounded."""
-    unbounded = all(leaf.declared.bounds == (-np.inf, np.inf) for leaf in problem.free_leaves)
-    return unbounded and bool(is_linear_parameter(problem).all())
-
-
-def design_matrix(problem: FitProblem) -> tuple[Array, Array]:
-    """Design matrix (N, P) and constant part (N,) of a law that is linear in its free
-    parameters.
-    """
-    basis = getattr(problem.law, "basis", None)
-    if basis is not None and len(problem.free) == len(problem.law.term_labels):
-        return np.array(basis(*problem.arguments)).T, np.zeros(len(problem.data))
-    matrix = problem.jacobian(problem.initial_values)
-    return matrix, problem.predict(problem.initial_values) - matrix @ problem.initial_values
-
-
-def _solve_linear(problem: FitProblem) -> LeastSquaresSolution:
-    matrix, constant = design_matrix(problem)
+def _solve_linear(problem: LeastSquaresProblem) -> LeastSquaresSolution:
+    matrix, constant = problem.design_matrix()
     values = solve_censored_least_squares(problem, matrix, constant)
     return LeastSquaresSolution(values, matrix @ values + constant, matrix)
 
 
-def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSquaresSolution:
+def solve_iteratively(
+    problem: LeastSquaresProblem, loss: Loss, start: Array
+) -> LeastSquaresSolution:
     """Trust-region least squares within bounds, with parameters and residuals scaled to the order
     of one.
     """
@@ -130,8 +111,8 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
     else:
         evaluations = sum(count for _, count in SEARCH_STAGES)
         raise IdentificationError(
-            f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in"
-            f" {evaluations} evaluations. Give initial values closer to those of the muscle, or"
+            f"{problem.origin}: the fit of {problem.name} did not converge in {evaluations}"
+            " evaluations. Give initial values closer to those of the muscle, or"
             " choose a law with fewer parameters.",
             hint=Hint("To fix parameters", "fixed"),
             cause="the fit does not converge",
@@ -156,17 +137,14 @@ def _is_converged(result: Any) -> bool:
     )
 
 
-def _check_finite(problem: FitProblem, start: Array) -> None:
+def _check_finite(problem: LeastSquaresProblem, start: Array) -> None:
     values = problem.predict(start)
     bad = ~np.isfinite(values)
     if bad.any():
-        row = int(np.argmax(bad))
-        first, second = problem.fitted_quantity.arguments
-        a, b = (x[row] for x in problem.arguments)
         raise IdentificationError(
-            f"{problem.data.origin}: with its initial values {type(problem.law).__name__} gives no"
-            f" finite {problem.fitted_quantity.name} at {np.count_nonzero(bad)} of {len(values)}"
-            f" points, the first at {first} {a:.4g} and {second} {b:.4g} (SI). Give other initial"
-            " values, or remove points outside the range of the law.",
-            cause=f"it gives no finite {problem.fitted_quantity.name} with its initial values",
+            f"{problem.origin}: with its initial values {problem.name} gives no finite"
+            f" {problem.quantity} at {np.count_nonzero(bad)} of {len(values)} points, the first at"
+            f" {problem.describe_row(int(np.argmax(bad)))}. Give other initial values, or remove"
+            " points outside the range of the law.",
+            cause=f"it gives no finite {problem.quantity} with its initial values",
         )

@@ -1,6 +1,4 @@
-"""Statistics of a static fit: errors of rows, correlation index, rank, condition number and
-standard errors.
-"""
+"""Statistics of a fit: correlation index, rank, condition number and standard errors."""
 
 import dataclasses
 import itertools
@@ -10,13 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Hint, IdentificationError
-from ...physics.muscle.characteristic import ContractileSurface
-from ...recording import Recording
-from ..inspection import RELATIVE_BAND, level_intervals, rounding
+from ...core import Array, IdentificationError
 from .identifiability import singular_vectors
 from .parameter_covariance import Runs, estimate_covariance
-from .problem import POINT_COLUMNS, FitProblem, LeastSquaresSolution
+from .problem import LeastSquaresProblem, LeastSquaresSolution, RankDeficiency
 from .ties import first_greatest
 from .variable_projection import RANK_TOLERANCE
 from .weighting import LeastSquares, Loss
@@ -70,43 +65,9 @@ def correlation_index(measured: npt.ArrayLike, modelled: npt.ArrayLike) -> Corre
     return CorrelationIndex(1.0 - float(np.sum((k - y) ** 2)) / total)
 
 
-@dataclasses.dataclass(frozen=True)
-class WorstPoint:
-    """The residual (model - measured) of maximum magnitude and the point where it occurs, all
-    SI.
-    """
-
-    error: float
-    pressure: float
-    contraction: float
-    force: float
-
-
-def goodness_of_fit(problem: FitProblem, modelled: Array, data: Recording) -> dict[str, Any]:
-    """The rms error, maximum error and correlation index of a law, as fields of a `Fit`. The error
-    at a row is model - measured, with the model (N,) clamped; at a censored row it is the violation
-    of its bound, because its reading is not a measured value. The squares of violations are added
-    to those of measured rows."""
-    measured = problem.censoring == 0
-    target = data[problem.fitted_quantity.name]
-    errors = problem.residuals(modelled) / problem.weights
-    worst = int(np.argmax(np.abs(errors)))
-    varies = float(np.ptp(target[measured])) > rounding("", target[measured])
-    return {
-        "rmse": float(np.sqrt(errors @ errors / max(int(np.count_nonzero(measured)), 1))),
-        "max_error": WorstPoint(
-            float(errors[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)
-        ),
-        "correlation_index": (
-            correlation_index(target[measured], modelled[measured]) if varies else None
-        ),
-    }
-
-
-_MAX_NAMES = 3
-"""Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
+_NULL_SHARE = 1e-3
+"""Minimum share of a parameter in the null space, relative to the greatest one (chosen)."""
 Mask = npt.NDArray[np.bool_]
-DEGREE_REMEDY = "For the greatest degree that the levels determine"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,7 +97,7 @@ class Estimate:
 
 
 def fit_statistics(
-    problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs
+    problem: LeastSquaresProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs
 ) -> dict[str, Any]:
     """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`.
     Raises IdentificationError where the design matrix is rank-deficient."""
@@ -164,11 +125,15 @@ def fit_statistics(
     columns = (each.tolist() for each in (solution.values, standard_errors, on_bound))
     estimates = tuple(
         Estimate(
-            leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, is_on_bound
+            parameter.name,
+            parameter.label,
+            value,
+            stderr,
+            parameter.unit,
+            parameter.meaning,
+            is_on_bound,
         )
-        for leaf, label, value, stderr, is_on_bound in zip(
-            problem.free_leaves, problem.labels, *columns, strict=True
-        )
+        for parameter, value, stderr, is_on_bound in zip(problem.parameters, *columns, strict=True)
     )
     return {
         "estimates": estimates,
@@ -180,7 +145,7 @@ def fit_statistics(
     }
 
 
-def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_Design":
+def check_determined(problem: LeastSquaresProblem, solution: LeastSquaresSolution) -> "_Design":
     """The design of the parameters that are not on a bound. Raises IdentificationError where it is
     rank-deficient.
     """
@@ -190,20 +155,6 @@ def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_D
         shares = np.sqrt(np.sum(design.right_singular_vectors[design.null] ** 2, axis=0))
         raise _rank_deficiency(problem, design.columns, shares, int(np.count_nonzero(~design.null)))
     return design
-
-
-def check_determined_by_levels(
-    problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording
-) -> None:
-    """Raise IdentificationError where only the noise or ripple of a constant quantity determines
-    the parameters. `at_levels` are the data of the problem with the constant quantity of each run
-    at its level."""
-    data = problem.data
-    arguments = problem.fitted_quantity.arguments
-    if at_levels is data or all(np.array_equal(at_levels[name], data[name]) for name in arguments):
-        return
-    levelled = dataclasses.replace(problem, data=at_levels)
-    check_determined(levelled, solution._replace(jacobian=levelled.jacobian(solution.values)))
 
 
 class _Design(NamedTuple):
@@ -217,7 +168,9 @@ class _Design(NamedTuple):
     right_singular_vectors: Array
 
     @classmethod
-    def of(cls, problem: FitProblem, solution: LeastSquaresSolution, columns: Mask) -> "_Design":
+    def of(
+        cls, problem: LeastSquaresProblem, solution: LeastSquaresSolution, columns: Mask
+    ) -> "_Design":
         """The singular values at a solution."""
         active = problem.active_rows(solution.modelled)
         whole = bool(active.all() and columns.all())
@@ -261,50 +214,13 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float,
 
 
 def _rank_deficiency(
-    problem: FitProblem, free: Mask, shares: Array, rank: int
+    problem: LeastSquaresProblem, free: Mask, shares: Array, rank: int
 ) -> IdentificationError:
-    """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms
-    in it.
+    """The error for the parameters with a share in the null space; `shares` (P,) are their norms in
+    it.
     """
-    labels = list(itertools.compress(problem.labels, free))
-    names = [
-        label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()
-    ]
-    quantities = problem.fitted_quantity.arguments
-    levels = [count_levels(values) for values in problem.arguments]
-    counts = [f"{count} of {name}" for count, name in zip(levels, quantities, strict=True)]
-    path = problem.free_leaves[int(np.flatnonzero(free)[first_greatest(shares)])].path
-    law = type(problem.law).__name__
-    ranks = f"(rank {rank} of {len(labels)} parameters)"
-    listed = ", ".join(names[:_MAX_NAMES])
-    more = f" and {len(names) - _MAX_NAMES} other parameters" if len(names) > _MAX_NAMES else ""
-    few = [names[0], f"{len(names) - 1} other parameters"] if more else names
-    what = f"cannot separate {listed}{more}"
-    cause = f"cannot separate {' and '.join(few)}"
-    if len(names) == 1:
-        what = cause = f"do not depend on {names[0]}"
-    text = ""
-    hint = Hint("To fix one parameter", "fixed", (path,))
-    if isinstance(problem.law, ContractileSurface):
-        text = (
-            "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the"
-            " pressure, each scaled to -1..1; powers up to n need n + 1 levels. "
-        )
-        degree = min(levels) - 1  # the greatest for the pure powers of each quantity
-        if 0 < degree < problem.law.degree:
-            hint = Hint(DEGREE_REMEDY, "degree", degree, "characteristic.ContractileSurface.blank")
-    return IdentificationError(
-        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels:"
-        f" {', '.join(counts)}. {text}Measure at more levels, or choose a lower degree or a law"
-        " with fewer parameters.",
-        hint=hint,
-        cause=f"the data {cause} (rank {rank} of {len(labels)})",
-    )
-
-
-def count_levels(values: Array) -> int:
-    """The number of levels: of groups of values that differ by at most the band of a constant
-    quantity.
-    """
-    band = RELATIVE_BAND * float(np.max(np.abs(values), initial=0.0))
-    return sum(1 for _ in level_intervals(np.sort(values), band))
+    labels = [parameter.label for parameter in itertools.compress(problem.parameters, free)]
+    least = _NULL_SHARE * shares.max()
+    inseparable = [label for label, share in zip(labels, shares, strict=True) if share > least]
+    greatest = int(np.flatnonzero(free)[first_greatest(shares)])
+    return problem.rank_error(RankDeficiency(inseparable, greatest, rank, len(labels)))

@@ -9,13 +9,12 @@ Journal on Numerical Analysis 10:413 (1973); Kaufman, BIT Numerical Mathematics 
 """
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .problem import FitProblem
+from .problem import LeastSquaresProblem
 
 RANK_TOLERANCE = 1e-10
 """Relative tolerance below which a singular value of the scaled design matrix counts as zero
@@ -32,7 +31,7 @@ _RCOND = 1e-13
 
 
 def solve_censored_least_squares(
-    problem: FitProblem,
+    problem: LeastSquaresProblem,
     jacobian: Array,
     constant: Array,
     active: npt.NDArray[np.bool_] | None = None,
@@ -91,7 +90,7 @@ def shortened_step(
     return next((part for part in parts if sum_of_squares(x + part) <= limit), 0.0 * step)
 
 
-def uncensored_rank(problem: FitProblem, jacobian: Array) -> int:
+def uncensored_rank(problem: LeastSquaresProblem, jacobian: Array) -> int:
     """Rank of the weighted design matrix of the uncensored rows."""
     matrix = (problem.weights[:, None] * jacobian)[problem.censoring == 0]
     norms = np.linalg.norm(matrix, axis=0)
@@ -118,29 +117,15 @@ follows.
 """
 
 
-def linear_fields(law: Any) -> tuple[str, ...]:
-    """The paths of the fields in which a law declares itself linear."""
-    declared = getattr(law, "linear_in", ())
-    return (declared,) if isinstance(declared, str) else tuple(declared)
-
-
-def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
-    """Mask of the free parameters in which the law is linear, shape (P,)."""
-    fields = linear_fields(problem.law)
-    return np.array(
-        [leaf.path.partition("[")[0] in fields for leaf in problem.free_leaves], dtype=bool
-    )
-
-
-def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
+def find_initial_values(problem: LeastSquaresProblem, multi_start: bool = True) -> Array:
     """The best free parameters by variable projection, shape (P,); the given ones where none are
     better. Without `multi_start` there is one search, from the given parameters."""
-    linear = is_linear_parameter(problem)
+    linear = problem.is_linear_parameter
     if linear.all() or not linear.any():
         return problem.initial_values
     projection = _Projection(problem, linear)
     thinned = problem
-    count = len(problem.data)
+    count = problem.target.size
     if count > _MAX_ROWS:  # drawn, as a regular choice could miss levels
         thinned = problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
     best = problem.initial_values[~linear]
@@ -172,7 +157,7 @@ def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
 class _Projection:
     """The residuals of a problem as a function of its nonlinear parameters alone."""
 
-    def __init__(self, problem: FitProblem, linear: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, problem: LeastSquaresProblem, linear: npt.NDArray[np.bool_]) -> None:
         self._problem = problem
         self._linear = linear
         self._linear_indices = np.flatnonzero(linear).tolist()

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ColumnError, ParameterError, check_field_types
-from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
 from ..inspection import estimate_sensors, remembered
 
@@ -106,16 +105,6 @@ class Censoring:
 
 UNCENSORED = Censoring(-math.inf, math.inf)
 """No censoring: every row is a measured value."""
-
-
-def default_censoring(law: Characteristic) -> Censoring:
-    """The range of force to which a force law is clamped, from zero if it has no clamp. Laws that
-    give contraction or pressure are measured with suspended loads, of which zero is an ordinary
-    value: no row is censored.
-    """
-    if not isinstance(law, ForceLaw):
-        return UNCENSORED
-    return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
 
 
 @remembered

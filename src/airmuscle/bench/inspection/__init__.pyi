@@ -39,6 +39,7 @@ from .sensor import estimate_sensors as estimate_sensors
 from .branches import branch_name as branch_name
 from .inspection_result import inspection_chapters as inspection_chapters
 from .interval import EDGE as EDGE
+from .interval import POINT_COLUMNS as POINT_COLUMNS
 from .interval import Mask as Mask
 from .interval import level_intervals as level_intervals
 from .interval import remembered as remembered

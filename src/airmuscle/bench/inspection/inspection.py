@@ -10,7 +10,7 @@ from ...core import counted
 from ...core.errors import ColumnError, Hint, HintedText
 from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
-from ..readers.time_base import UNIFORM, WITHOUT_TIME
+from ..readers import UNIFORM, WITHOUT_TIME
 from .branches import branch_column_agreement, find_branches
 from .inspection_result import Finding, Inspection
 from .interval import find_static_points

@@ -24,7 +24,7 @@ from ...core import (
 from ...recording import Recording
 from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ..readers.constants import CONSTANT_QUANTITIES
+from ..readers import CONSTANT_QUANTITIES
 from ..reported import Reported, unit_column
 from .branches import Branch
 from .interval import StaticPoints

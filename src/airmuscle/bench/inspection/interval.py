@@ -60,6 +60,8 @@ def remembered(analyse: Analysis) -> Analysis:
 
 Mask = npt.NDArray[np.bool_]
 
+POINT_COLUMNS = ("pressure", "contraction", "force")
+"""Columns of a static point."""
 _MAX_WINDOW_VALUES = 1_000_000
 """Maximum number of values of the windows that are sorted at once, for the memory (chosen)."""
 

@@ -34,8 +34,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, ColumnError, FileError, alternatives, check_known, counted, quantity
-from ..readers.arrays import Arrays
-from ..readers.file_kind import read_toml
+from ..readers import Arrays, read_toml
 from .episode_formats import find_episode_files, read_arrays
 from .episodes import Episode, Episodes, join, speed_of
 

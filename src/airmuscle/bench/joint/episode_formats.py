@@ -14,9 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Array, ColumnError, FileError
-from ..readers.arrays import Arrays, arrays_of_table
-from ..readers.formats import EPISODE_EXTENSIONS, TEXT, format_of
-from ..readers.selection import Selection
+from ..readers import EPISODE_EXTENSIONS, TEXT, Arrays, Selection, arrays_of_table, format_of
 from .episode_inspection import TURN
 
 METADATA = "metadata.yaml"

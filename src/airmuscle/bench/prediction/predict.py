@@ -23,11 +23,11 @@ from ...physics import Characteristic, CreepElements, ForceLaw, Friction, NoFric
 from ...recording import Recording
 from ...recording.columns import displayed
 from .. import dynamics
-from ..campaign import predicted_force
 from ..diagnosis import DataUse, LawMisfit, Scatter, branch_distance, force_noise, support_of
-from ..estimation import FORCE, NORMAL_QUANTILE, evaluate, fitted_quantity_of
+from ..estimation import NORMAL_QUANTILE
 from ..inspection import Mask, rate_of_change
-from ..statics import FORCE_MARGIN, find_lagging_rows
+from ..statics import FORCE, FORCE_MARGIN, evaluate, find_lagging_rows, fitted_quantity_of
+from .force_along_motion import predicted_force
 from .result import QuantityPrediction, RecordPrediction, with_band_notes
 
 COLUMNS = ("pressure", "contraction", "force")

@@ -16,8 +16,6 @@ from .missing_values import InterpolateMissing as InterpolateMissing
 from .missing_values import MissingValues as MissingValues
 from .missing_values import RefuseMissing as RefuseMissing
 from .raw_mat import read_mat_tables as read_mat_tables
-from .reader import check_bench as check_bench
-from .reader import read as read
 from .reader import read_csv as read_csv
 from .selection import Selection as Selection
 from .separate_process import call_in_separate_process as call_in_separate_process
@@ -32,3 +30,26 @@ from .time_base import seconds_from_clock as seconds_from_clock
 from .writer import from_pandas as from_pandas
 from .writer import to_xarray as to_xarray
 from .writer import write as write
+
+# isort: split
+# For the other rooms, not in __all__
+from .arrays import Arrays as Arrays
+from .arrays import arrays_of_table as arrays_of_table
+from .constants import CONSTANT_QUANTITIES as CONSTANT_QUANTITIES
+from .constants import file_conversion as file_conversion
+from .file_kind import read_toml as read_toml
+from .formats import EPISODE_EXTENSIONS as EPISODE_EXTENSIONS
+from .formats import TEXT as TEXT
+from .formats import format_of as format_of
+from .missing_codes import CODES as CODES
+from .missing_codes import code_of as code_of
+from .plausibility import check_unit_consistency as check_unit_consistency
+from .plausibility import warn_of_rates_without_time as warn_of_rates_without_time
+from .raw_csv import Progress as Progress
+from .reader import Source as Source
+from .reader import as_mapping as as_mapping
+from .reader import find_files as find_files
+from .reader import read_file as read_file
+from .time_base import UNIFORM as UNIFORM
+from .time_base import WITHOUT_TIME as WITHOUT_TIME
+from .time_base import Downsampling as Downsampling

@@ -25,9 +25,9 @@ from ...core import (
 )
 from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
-from ..diagnosis import code_of
 from .channels import Cells, RawTable
 from .constants import file_conversion
+from .missing_codes import code_of
 from .missing_values import DropMissing, Mask
 from .time_base import AS_RECORDED, MAP_TIME, UNIFORM, WITHOUT_TIME
 

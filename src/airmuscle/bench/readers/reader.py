@@ -5,60 +5,24 @@ gives the format.
 import dataclasses
 import glob
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ...core import FileError, ParameterError, abridged, printable
 from ...recording.recording import Recording
-from ..diagnosis import warn_of_suspicious_values
-from ..inspection import without_outliers
 from .channels import RawTable
 from .constants import split_specimens
 from .formats import EXTENSIONS, TEXT, format_of
 from .interpret import interpret
 from .mapping import ColumnMapping, apply_mapping, read_mapping
-from .plausibility import check_unit_consistency, warn_of_rates_without_time
 from .raw_csv import Progress, read_csv_table, read_text_stream, read_text_tables
-from .time_base import Decimation, Downsampling, NoTime, downsample
+from .time_base import Decimation, Downsampling, downsample
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
 STANDARD_INPUT = Path("-")
-
-
-def read(
-    source: Source,
-    mapping: str | Path | ColumnMapping = ColumnMapping(),
-    *,
-    downsampling: Downsampling = Decimation(),
-    progress: Progress | None = None,
-    **fields: Any,
-) -> tuple[Recording, ...]:
-    """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in
-    SI units; `-` is a table of text on the standard input, which may be a pipe.
-
-    mapping       what the files do not state: a ColumnMapping, `ColumnMapping(resting_length="300
-                  mm")`, or a TOML file
-    downsampling  reduction of very long files, which a note reports
-    progress      called with the name of a file and the fraction that has been read
-    fields        fields of the mapping, `resting_length="300 mm"`, in place of those of `mapping`
-
-    The extension gives the format: text (CSV), LVM, Excel, OpenDocument, MAT, TDMS, MDF, Parquet or
-    HDF5. A load in kg becomes a force with standard gravity. Files whose units contradict each
-    other are rejected.
-
-    Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value
-    and remedy.
-    """
-    mapping = _as_mapping(mapping, fields)
-    recordings = [
-        recording
-        for path in find_files(source)
-        for recording in read_file(path, mapping, downsampling, progress)
-    ]
-    return tuple(complete_bench(recordings, mapping))
 
 
 def read_csv(
@@ -76,12 +40,13 @@ def read_csv(
     Raises FileError, ColumnError, UnitError or ParameterError; the message names file, line, value
     and remedy.
     """
-    mapping = _as_mapping(mapping, fields)
+    mapping = as_mapping(mapping, fields)
     table = apply_mapping(read_csv_table(path, mapping.text_format), mapping)
     return interpret(table, mapping, mapping.constants_of(Path(path)))
 
 
-def _as_mapping(mapping: str | Path | ColumnMapping, fields: Mapping[str, Any]) -> ColumnMapping:
+def as_mapping(mapping: str | Path | ColumnMapping, fields: Mapping[str, Any]) -> ColumnMapping:
+    """The mapping, of a file if a path is given, with these fields. Raises ParameterError."""
     if not isinstance(mapping, str | Path | ColumnMapping):
         raise ParameterError(
             f"mapping is {abridged(mapping)}; it must be a ColumnMapping or the path of a mapping"
@@ -109,25 +74,6 @@ def read_file(
             apply_mapping(dataclasses.replace(table, origin=printable(table.origin)), mapping)
         )
     ]
-
-
-def complete_bench(recordings: Sequence[Recording], mapping: ColumnMapping) -> list[Recording]:
-    """The recordings of one bench, without outliers if the mapping says so, checked as by
-    `check_bench`.
-    """
-    complete = list(without_outliers(recordings) if mapping.drop_outliers else recordings)
-    check_bench(complete)
-    if not isinstance(mapping.time, NoTime):
-        warn_of_rates_without_time(complete)
-    return complete
-
-
-def check_bench(recordings: list[Recording]) -> None:
-    """Check the recordings of one bench together: units (UnitError), and suspicious values
-    (AirmuscleWarning).
-    """
-    check_unit_consistency(recordings)
-    warn_of_suspicious_values(recordings)
 
 
 def find_files(source: Source) -> list[Path]:

@@ -1,5 +1,6 @@
 from .approximation import ModelApproximation as ModelApproximation
 from .approximation import approximate as approximate
+from .bootstrapping import bootstrap as bootstrap
 from .candidate_scores import FoldScore as FoldScore
 from .candidates import Candidate as Candidate
 from .candidates import blank_surface as blank_surface
@@ -20,6 +21,14 @@ from .exponential_surface import conditioning as conditioning
 from .exponential_surface import fit_linearised as fit_linearised
 from .exponential_surface import fit_nonlinear as fit_nonlinear
 from .fit_points import FitPoints as FitPoints
+from .fit_problem import count_levels as count_levels
+from .fit_problem import fitted_quantity_of as fitted_quantity_of
+from .fit_problem import make_problem as make_problem
+from .intervals import Band as Band
+from .intervals import ProfileLikelihood as ProfileLikelihood
+from .intervals import confidence_band as confidence_band
+from .intervals import profile as profile
+from .intervals import weakly_determined as weakly_determined
 from .lagging_rows import find_lagging_rows as find_lagging_rows
 from .length_errors import LengthError as LengthError
 from .length_errors import corrected_length as corrected_length
@@ -30,6 +39,8 @@ from .model_selection import compare as compare
 from .model_selection import eligible_models as eligible_models
 from .model_selection import excess_error as excess_error
 from .model_selection import recommend as recommend
+from .recursive_fit import NextPoint as NextPoint
+from .recursive_fit import RecursiveFit as RecursiveFit
 from .slack import Slackness as Slackness
 from .slack import SlackPull as SlackPull
 from .slack import slack_pull as slack_pull
@@ -39,6 +50,7 @@ from .specimen_errors import odd_specimen_notes as odd_specimen_notes
 from .specimen_errors import specimens_of as specimens_of
 from .static_fit import fit as fit
 from .static_fit import refit as refit
+from .static_fit_result import Fit as Fit
 from .surface_shape import ShapeConstrainedFit as ShapeConstrainedFit
 from .surface_shape import fit_monotone as fit_monotone
 from .surface_shape import fit_shape_constrained as fit_shape_constrained
@@ -50,6 +62,9 @@ from .surface_violations import RISES_WITH_CONTRACTION as RISES_WITH_CONTRACTION
 from .surface_violations import RISES_WITH_FORCE as RISES_WITH_FORCE
 from .surface_violations import find_monotonicity_violations as find_monotonicity_violations
 from .surface_violations import find_shape_violations as find_shape_violations
+from .uncertainty import RELIABLE_GROUPS as RELIABLE_GROUPS
+from .uncertainty import Bootstrap as Bootstrap
+from .uncertainty import Uncertainty as Uncertainty
 from .volume_fit import VolumePoints as VolumePoints
 from .volume_fit import fit_volume as fit_volume
 from .volume_fit import volume_points as volume_points
@@ -57,13 +72,25 @@ from .volume_fit import volume_points as volume_points
 # isort: split
 # For the other rooms, not in __all__
 from .candidate_scores import RankedModel as RankedModel
-from .compared_points import FORCE_MARGIN as FORCE_MARGIN
+from .candidates import FORCE_MARGIN as FORCE_MARGIN
 from .compared_points import force_residuals as force_residuals
 from .compared_points import law_of_length as law_of_length
 from .comparison_chapter import compare_chapter as compare_chapter
 from .experiment_design import LEVEL_COUNT as LEVEL_COUNT
 from .experiment_design import ExperimentPlan as ExperimentPlan
 from .experiment_design import run_table as run_table
+from .fit_problem import FORCE as FORCE
+from .fit_problem import RESTING_LENGTH as RESTING_LENGTH
+from .fit_problem import SPECIMEN as SPECIMEN
+from .fit_problem import FitProblem as FitProblem
+from .fit_problem import default_censoring as default_censoring
+from .fit_problem import evaluate as evaluate
+from .fit_problem import linear_fields as linear_fields
+from .fit_problem import of_length as of_length
+from .fit_problem import with_length as with_length
+from .goodness import WorstPoint as WorstPoint
+from .goodness import check_determined_by_levels as check_determined_by_levels
+from .goodness import goodness_of_fit as goodness_of_fit
 from .pooling import pooled_band as pooled_band
 from .specimen_effects import SpecimenEffects as SpecimenEffects
 from .specimen_errors import ranked_specimen_errors as ranked_specimen_errors

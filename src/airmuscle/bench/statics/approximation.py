@@ -12,8 +12,10 @@ from ...physics.muscle.characteristic.sampling import check_approximates, sample
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.shown import parameter_table
-from ..estimation import POINT_COLUMNS, UNCENSORED, WorstPoint
+from ..estimation import UNCENSORED
+from ..inspection import POINT_COLUMNS
 from ..reported import Reported
+from .goodness import WorstPoint
 from .static_fit import fit
 
 BANDS = 6

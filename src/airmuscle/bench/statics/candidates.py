@@ -21,6 +21,10 @@ from ...physics.muscle.characteristic.calls import silent_beyond_range
 from ...physics.muscle.characteristic.validity_range import DataScales
 from ...recording import Recording
 
+FORCE_MARGIN = 3.0
+"""Limit of the force of laws that give contraction or pressure, in maxima of the measured force
+(chosen).
+"""
 FORCE_GRID_POINTS = 801
 """Grid points between zero and the maximum force; the law is interpolated linearly between them."""
 

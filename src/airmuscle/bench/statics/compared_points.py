@@ -14,31 +14,24 @@ from ...core import AirmuscleError, Array, HintedText, IdentificationError, tree
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording, resting_length_of
 from ..estimation import (
-    POINT_COLUMNS,
-    Fit,
     GroupRefits,
     GroupSplit,
     LeastSquares,
     LeastSquaresSolution,
     Loss,
     RowIndices,
-    design_matrix,
-    is_linear,
     label_folds,
     specimen_name,
-    with_length,
 )
-from .candidates import Candidate, evaluate_force, slack_rows
+from ..inspection import POINT_COLUMNS
+from .candidates import FORCE_MARGIN, Candidate, evaluate_force, slack_rows
 from .fit_points import FitPoints
+from .fit_problem import with_length
 from .lagging_rows import find_lagging_rows
 from .pooling import Pooling, make_pooling
 from .slack import MIN_PULL, PULL_RATIO, SlackPull, slack_pull, with_slack_bounds
 from .static_fit import refit
-
-FORCE_MARGIN = 3.0
-"""Limit of the force of laws that give contraction or pressure, in maxima of the measured force
-(chosen).
-"""
+from .static_fit_result import Fit
 
 
 class EvaluatedRows(NamedTuple):
@@ -263,8 +256,8 @@ class _FoldRefits:
         if points.kept.get("problem") is not fit.problem:  # not yet for another split
             bounded = with_slack_bounds(fit.problem, points)
             values = fit.values
-            if is_linear(bounded.problem):
-                matrix, constant = design_matrix(bounded.problem)
+            if bounded.problem.is_linear:
+                matrix, constant = bounded.problem.design_matrix()
                 solution = LeastSquaresSolution(values, matrix @ values + constant, matrix)
             else:
                 solution = bounded.problem.solution(values)

@@ -20,7 +20,6 @@ from ...report.chapter import Chapter, Plot, Table, TableColumn
 from ...report.formatting import symbol_formula, to_mathtext
 from ..diagnosis import DataUse, support_of
 from ..estimation import (
-    Fit,
     GroupSplit,
     LeastSquares,
     Loss,
@@ -40,6 +39,7 @@ from .model_selection import (
     is_contradicted,
     recommendation,
 )
+from .static_fit_result import Fit
 
 SPLITS = (RunSplit(), SpecimenSplit())
 """The splits of the two purposes."""

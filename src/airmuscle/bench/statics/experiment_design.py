@@ -21,14 +21,14 @@ from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..estimation import (
     EXACT_RANK_TOLERANCE,
-    POINT_COLUMNS,
     UNCENSORED,
     UndeterminedCombination,
     analyse_identifiability,
     first_greatest,
-    make_problem,
 )
+from ..inspection import POINT_COLUMNS
 from ..reported import Reported
+from .fit_problem import make_problem
 
 LEVEL_COUNT = 13
 """Levels of pressure, and of contraction, of the candidate runs; chosen."""

@@ -12,23 +12,11 @@ from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording, resting_length_of
 from ..diagnosis import Remarks, RepeatedRows, check_data, find_repeated_rows
-from ..estimation import (
-    POINT_COLUMNS,
-    RESTING_LENGTH,
-    Censoring,
-    FitProblem,
-    Runs,
-    default_censoring,
-    fitted_quantity_of,
-    force_limits,
-    make_problem,
-    sensor_deviations,
-    specimen_name,
-    with_length,
-)
+from ..estimation import Censoring, Runs, force_limits, sensor_deviations, specimen_name
 from ..inspection import (
     ISOBARIC,
     ISOMETRIC,
+    POINT_COLUMNS,
     RELATIVE_BAND,
     find_runs,
     find_static_points,
@@ -36,6 +24,14 @@ from ..inspection import (
     reading_numbers,
     rounding,
     spread,
+)
+from .fit_problem import (
+    RESTING_LENGTH,
+    FitProblem,
+    default_censoring,
+    fitted_quantity_of,
+    make_problem,
+    with_length,
 )
 from .lagging_rows import find_lagging_rows
 

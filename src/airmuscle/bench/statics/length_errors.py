@@ -16,15 +16,10 @@ from ...core import IdentificationError, ParameterError, ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from ...report.chapter import Chapter, Table, TableColumn
-from ..estimation import (
-    LeastSquares,
-    effective_sample_size,
-    evaluate,
-    solve_least_squares,
-    specimen_name,
-)
+from ..estimation import LeastSquares, effective_sample_size, solve_least_squares, specimen_name
 from .candidates import blank_surface
 from .fit_points import FitPoints
+from .fit_problem import evaluate
 from .pooling import population_of
 from .static_fit import refit
 

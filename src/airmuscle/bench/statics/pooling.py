@@ -13,26 +13,21 @@ from ...core import Array, IdentificationError, tree
 from ...physics.muscle.characteristic import ContractileSurface, PooledLengthLaw
 from ...recording import Recording
 from ..estimation import (
-    RESTING_LENGTH,
-    SPECIMEN,
     EffectRows,
-    Fit,
-    FitProblem,
     PooledCovariance,
     Runs,
     batch_sample_size,
-    design_matrix,
     estimate_pooled_covariance,
-    evaluate,
-    goodness_of_fit,
     normalised,
-    of_length,
     specimen_name,
 )
 from .candidates import UNREACHED_FORCE
 from .fit_points import FitPoints
+from .fit_problem import RESTING_LENGTH, SPECIMEN, FitProblem, evaluate, of_length
+from .goodness import goodness_of_fit
 from .slack import PULL_RATIO, Slackness
 from .specimen_effects import BoundedRows, SpecimenEffects, bounded_coefficients, predict_effects
+from .static_fit_result import Fit
 
 Rows = npt.NDArray[np.bool_]
 DECAY_RANGE = 0.05
@@ -177,7 +172,7 @@ class Pooling:
 
     @functools.cached_property
     def _design(self) -> tuple[Array, Array]:
-        return design_matrix(self.problem)
+        return self.problem.design_matrix()
 
     def law(self, population: Any, predicted: PredictedEffects) -> PooledLengthLaw:
         """The pooled law of a population law and the effects of the specimens."""

@@ -20,17 +20,10 @@ import numpy.typing as npt
 
 from ...core import Array, contraction_text, quantity_text
 from ...recording import Recording
-from ..estimation import (
-    FORCE,
-    POINT_COLUMNS,
-    RESTING_LENGTH,
-    FitProblem,
-    LeastSquaresSolution,
-    Loss,
-    is_linear,
-    solve_least_squares,
-)
+from ..estimation import LeastSquaresSolution, Loss, solve_least_squares
+from ..inspection import POINT_COLUMNS
 from .fit_points import FitPoints
+from .fit_problem import FORCE, RESTING_LENGTH, FitProblem
 
 Rows = npt.NDArray[np.bool_]
 MIN_PULL = 0.02
@@ -205,7 +198,7 @@ def with_slack_bounds(problem: FitProblem, points: FitPoints) -> BoundedProblem:
         and hasattr(problem.law, "with_resting_length")
         and bool((problem.censoring > 0).any())
     )
-    if not suits or not is_linear(problem):
+    if not suits or not problem.is_linear:
         return unchanged
     bounds = np.hstack([_bounds_of_run(run, i) for i, run in enumerate(points.recordings)])
     if not bounds.size:

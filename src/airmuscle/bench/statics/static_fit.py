@@ -24,30 +24,24 @@ from ..diagnosis import (
     support_of,
 )
 from ..estimation import (
-    FORCE,
-    RESTING_LENGTH,
     UNCENSORED,
     Censoring,
-    Fit,
-    FitProblem,
     LeastSquares,
     Loss,
     check_determined,
-    check_determined_by_levels,
-    default_censoring,
-    evaluate,
     find_initial_values,
     fit_statistics,
     gauss_newton,
-    goodness_of_fit,
-    is_linear,
     uncensored_rank,
 )
 from ..inspection import RIPPLE_BAND
 from .fit_points import FitPoints
+from .fit_problem import FORCE, RESTING_LENGTH, FitProblem, default_censoring, evaluate
+from .goodness import check_determined_by_levels, goodness_of_fit
 from .lagging_rows import find_lagging_rows
 from .pooling import check_poolable, make_pooling, pool, population_of
 from .slack import solve_bounded
+from .static_fit_result import Fit
 
 NO_EFFECT = 0.05
 """Effective number of parameters of the specimen effects below which the specimens do not differ
@@ -214,7 +208,7 @@ def refit(
     problem = points.problem(law, fixed=fixed)
     near = (
         None
-        if is_linear(problem) or loss != LeastSquares()
+        if problem.is_linear or loss != LeastSquares()
         else gauss_newton(problem, problem.initial_values)
     )
     try:

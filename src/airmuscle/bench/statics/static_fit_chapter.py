@@ -37,18 +37,11 @@ from ...report.chapter import (
 from ...report.equation import LawEquation, law_equation
 from ...report.equation.source_code import REMARKS, displayed_lines, source_codes
 from ...report.formatting import format_number
-from ..estimation import (
-    LEVEL_TOLERANCE,
-    MAX_LEVEL_WIDTH,
-    Band,
-    Fit,
-    confidence_band,
-    held_levels,
-    is_pressure_ramp,
-    levels_of,
-    with_length,
-)
+from ..estimation import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
 from .candidates import evaluate_force
+from .fit_problem import with_length
+from .intervals import Band, confidence_band
+from .static_fit_result import Fit
 from .surface_violations import shape_violations_of_fit, violation_table
 from .volume_fit import defect_values
 

@@ -22,10 +22,11 @@ from ...core import DASHES, LINES, Array, IdentificationError, legend_outside, n
 from ...physics.muscle.characteristic import ContractileSurface, ForceLaw, exponents
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot
-from ..estimation import Fit, levels_of, shortened_step
+from ..estimation import levels_of, shortened_step
 from ..reported import Reported
 from .exponential_surface import SurfaceFit, SurfaceProblem
 from .static_fit import fit
+from .static_fit_result import Fit
 from .surface_violations import MonotonicityViolation, find_shape_violations, violation_table
 
 Columns = Callable[[Array, int], Any]

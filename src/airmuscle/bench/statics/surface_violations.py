@@ -10,8 +10,8 @@ from ...core import Array, autodiff, check_whole
 from ...physics.muscle.characteristic import ForceLaw, ValidityRange
 from ...physics.muscle.characteristic.base import ContractionLaw
 from ...report.chapter import Table, TableColumn
-from ..estimation import Fit
 from .exponential_surface import LoadRange
+from .static_fit_result import Fit
 
 _ROUNDING = 1e-9
 """Slopes below this fraction of the maximum slope are rounding errors (chosen)."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...bench.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
 from ...bench.diagnosis.misfit import misfit_warning
-from ...bench.estimation import LEVEL, Fit
+from ...bench.estimation import LEVEL
 from ...bench.inspection import maximum_rate
-from ...bench.statics import RankedModel, standard_candidates
+from ...bench.statics import Fit, RankedModel, standard_candidates
 from ...bench.statics.specimen_errors import (
     SpecimenErrors,
     ranked_specimen_errors,

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...bench.estimation import Fit
+from ...bench.statics import Fit
 from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
 from ...physics import Characteristic, Muscle, Plant, Ratings, ValidityRange
 from .entry import OPTIONAL_PARTS, Check, Entry

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...bench.diagnosis import read
 from ...bench.dynamics import CrossPrediction, DynamicFit, cross_predict, fit_dynamic
 from ...bench.dynamics.experiment import Experiment, InitialValue, stated_ambient
-from ...bench.readers import ColumnMapping, mapping_of_tables, read, read_mapping
+from ...bench.readers import ColumnMapping, mapping_of_tables, read_mapping
 from ...core import ParameterError, ShortRepr, abridged, ambient_pressure
 from ...engine.run.problem import check_signal
 from ...physics.plant.plant import Plant

@@ -11,8 +11,9 @@ import numpy as np
 
 from ...bench.campaign import Campaign, LeftOutStage, StaticStage, ValidationRow, identify_campaign
 from ...bench.campaign.campaign_chapters import campaign_chapters, stage_data
+from ...bench.diagnosis.checked_reading import complete_bench
 from ...bench.readers import ColumnMapping
-from ...bench.readers.reader import complete_bench, find_files, read_file
+from ...bench.readers.reader import find_files, read_file
 from ...core import atomic_folder, check_writable
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml

@@ -7,9 +7,8 @@ from json import dumps
 from pathlib import Path
 from typing import Any
 
-from ...bench.estimation import RecursiveFit
 from ...bench.readers import RowReader, follow_lines
-from ...bench.statics import BenchLimits
+from ...bench.statics import BenchLimits, RecursiveFit
 from ...core import (
     ColumnError,
     IdentificationError,

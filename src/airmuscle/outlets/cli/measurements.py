@@ -11,9 +11,9 @@ import click
 
 import airmuscle as am
 
-from ...bench.diagnosis import level_tables
+from ...bench.diagnosis import level_tables, read
 from ...bench.inspection import check_contents, inspect_all, inspection_chapters
-from ...bench.readers import ColumnMapping, Decimation, RecordedTime, read, write
+from ...bench.readers import ColumnMapping, Decimation, RecordedTime, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
 from ...core import FileError, ParameterError

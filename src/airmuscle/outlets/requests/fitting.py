@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from ...bench.diagnosis import DataUse, support_of
-from ...bench.estimation import UNCENSORED, Fit, bootstrap, profile, weakly_determined
-from ...bench.estimation.problem import fitted_quantity_of
-from ...bench.estimation.uncertainty import Uncertainty
-from ...bench.statics import estimate_length_error, fit
+from ...bench.estimation import UNCENSORED
+from ...bench.statics import Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
 from ...bench.statics.candidates import Candidate, standard_candidates
 from ...bench.statics.comparison_chapter import LawSelection, compare_chapters, select_law
+from ...bench.statics.fit_problem import fitted_quantity_of
 from ...bench.statics.length_errors import length_error_chapter
 from ...bench.statics.specimen_errors import (
     odd_specimen_notes,
@@ -24,6 +23,7 @@ from ...bench.statics.specimen_errors import (
 from ...bench.statics.static_fit_chapter import fit_chapter
 from ...bench.statics.surface_shape import fit_shape_constrained
 from ...bench.statics.surface_violations import shape_violations_of_fit
+from ...bench.statics.uncertainty import Uncertainty
 from ...core import ParameterError
 from ...engine.processes import Workers
 from ...files.library import Entry, find_initial_law, missing_geometry, resting_lengths

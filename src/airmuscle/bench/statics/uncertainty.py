@@ -14,7 +14,7 @@ from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableCol
 from ...report.formatting import symbol_formula, to_mathtext
 from ..reported import Reported
 from .intervals import ProfileLikelihood
-from .result import Fit
+from .static_fit_result import Fit
 
 MIN_GROUPS = 5
 """Minimum number of groups. G groups give (2G - 1)!/(G! (G - 1)!) different samples, 35 with G = 4;

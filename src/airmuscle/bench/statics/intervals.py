@@ -9,12 +9,10 @@ import numpy as np
 
 from ...core import Array, IdentificationError
 from ...recording import Recording
-from ..statics import pooled_band
-from .model_evidence import student_quantile
-from .problem import RESTING_LENGTH, FitProblem
-from .result import Fit
-from .solver import is_linear, solve_least_squares
-from .weighting import LeastSquares
+from ..estimation import LeastSquares, solve_least_squares, student_quantile
+from .fit_problem import RESTING_LENGTH, FitProblem
+from .pooling import pooled_band
+from .static_fit_result import Fit
 
 
 class Band(NamedTuple):
@@ -104,9 +102,8 @@ def weakly_determined(fit: Fit) -> tuple[str, ...]:
     """Names of the parameters whose standard error is not reliable. These are highly correlated
     with another parameter or, in a nonlinear fit, have a large relative standard error."""
     correlation = fit.parameter_covariance.greatest_correlations()
-    nonlinear = not is_linear(
-        fit.problem
-    )  # in a linear fit a standard error is exact, however large
+    # In a linear fit a standard error is exact, however large.
+    nonlinear = not fit.problem.is_linear
     return tuple(
         e.name
         for e, r in zip(fit.estimates, correlation, strict=True)
@@ -157,15 +154,13 @@ def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
     does, or where a bound is reached first."""
     problem = fit.problem
     estimate = fit.estimates[index]
-    leaf = problem.free[index]
-    bounds = problem.free_leaves[index].declared.bounds
-    others = tuple(i for i in problem.free if i != leaf)
+    bounds = problem.parameters[index].bounds
 
     def is_beyond(value: float) -> bool:
-        leaves = list(problem.leaves)
-        leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
-        constrained = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
-        values = solve_least_squares(constrained, LeastSquares()).values if others else np.zeros(0)
+        constrained = problem.with_known(index, value)
+        values = np.zeros(0)
+        if constrained.parameters:
+            values = solve_least_squares(constrained, LeastSquares()).values
         return _sum_of_squares(constrained, values) > threshold
 
     inside = estimate.value

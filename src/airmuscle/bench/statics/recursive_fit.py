@@ -25,8 +25,8 @@ from ...core import (
     within,
 )
 from ...physics.muscle.characteristic import ContractileSurface, ValidityRange, exponents
-from ..statics import LEVEL_COUNT, BenchLimits
-from .ties import first_greatest
+from ..estimation import first_greatest
+from .experiment_design import LEVEL_COUNT, BenchLimits
 
 PRIOR = 1e-4
 """Information on each coefficient before the first sample, relative to one sample (chosen): a prior

@@ -10,14 +10,21 @@ from ...core import Array, Hint, IdentificationError, check_whole
 from ...engine.distribution import DistributedCalls, stored_result
 from ...engine.processes import Workers, check_running, process_pool
 from ...recording import Recording
-from ..statics import FitPoints
-from .cross_validation import GroupSplit, LevelSplit, default_split
-from .group_refits import GroupRefits, KnownMinima, RowIndices
-from .problem import FitProblem
-from .result import Fit
-from .solver import design_matrix, is_linear, solve_iteratively, solve_least_squares
+from ..estimation import (
+    GroupRefits,
+    GroupSplit,
+    KnownMinima,
+    LeastSquares,
+    LevelSplit,
+    RowIndices,
+    default_split,
+    solve_iteratively,
+    solve_least_squares,
+)
+from .fit_points import FitPoints
+from .fit_problem import FitProblem
+from .static_fit_result import Fit
 from .uncertainty import MIN_GROUPS, RELIABLE_GROUPS, Bootstrap
-from .weighting import LeastSquares
 
 REFITS_OF_A_TASK = 100
 """Refits of a law that is not linear in its parameters, that are computed one after the other
@@ -78,7 +85,7 @@ def bootstrap(
         .multinomial(count, np.full(count, 1.0 / count), size=refits)
         .astype(float)
     )
-    if is_linear(fit.problem) and isinstance(fit.loss, LeastSquares):
+    if fit.problem.is_linear and isinstance(fit.loss, LeastSquares):
         return Bootstrap(fit, _refit_linear(fit.problem, fit.values, group, draws), count, seed)
     report = progress or (lambda fraction: None)
     blocks = [draws[i : i + REFITS_OF_A_TASK] for i in range(0, refits, REFITS_OF_A_TASK)]
@@ -101,7 +108,7 @@ def _refit_linear(problem: FitProblem, values: Array, group: RowIndices, draws: 
     """All refits from the normal matrices of the groups: one product of (refits, groups) with
     (groups, P^2 + P).
     """
-    matrix, constant = design_matrix(problem)
+    matrix, constant = problem.design_matrix()
     active = problem.active_rows(matrix @ values + constant)
     scale = np.linalg.norm(matrix[active], axis=0)
     # An orthonormal basis of the complete design matrix keeps the normal matrices near the
@@ -151,7 +158,7 @@ def _refit_iteratively(
     known = KnownMinima(problem, fit.values, group, count)
     for found in known_values[np.isfinite(known_values).all(axis=1)]:
         known.add(found)
-    if isinstance(fit.loss, LeastSquares) and not is_linear(problem):
+    if isinstance(fit.loss, LeastSquares) and not problem.is_linear:
         near = GroupRefits(problem, problem.solution(fit.values), group, count)
     for i, counts in enumerate(draws):
         if progress is not None:

@@ -14,17 +14,14 @@ from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter, NamedValue, Plot, Table
-from ...report.shown import estimate_table
+from ...report.shown import BRIEF_ROWS, estimate_table
 from ..diagnosis import LawMisfit, Remarks, Scatter
+from ..estimation import CorrelationIndex, Estimate, Loss, ParameterCovariance
 from ..reported import Reported
-from ..statics import SpecimenEffects
-from .parameter_covariance import ParameterCovariance
-from .problem import FORCE, FitProblem, FittedQuantity, evaluate
-from .statistics import CorrelationIndex, Estimate, WorstPoint
-from .weighting import Loss
+from .fit_problem import FORCE, FitProblem, FittedQuantity, evaluate
+from .goodness import WorstPoint
+from .specimen_effects import SpecimenEffects
 
-MAX_ROWS = 12
-"""Maximum number of parameters in the brief view (chosen)."""
 MANY_POINTS = 1000
 """Number of points of a plot from which markers are small."""
 
@@ -273,7 +270,7 @@ class Fit(Reported):
             "parameter": list(self.names),
             **dict(zip(self.names, self.correlations.T, strict=True)),
         }
-        estimates = estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS)
+        estimates = estimate_table(self.estimates, "parameters", "Parameters", brief=BRIEF_ROWS)
         tables = (estimates, Table("correlations", "Correlations", correlations, shown=False))
         plots = (Plot("errors", "Modelled against measured values, and residuals.", self.plot),)
         misfit = "" if self.misfit is None else str(self.misfit)
