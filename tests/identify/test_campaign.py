@@ -525,7 +525,7 @@ def test_a_planned_run_is_described_by_its_levels():
 
 def test_the_specimen_that_does_not_follow_the_others_is_noted(monkeypatch):
     """Four muscles of one type; the third has 70 % of the force."""
-    kept = "airmuscle.bench.statics.model_selection.started_candidates"
+    kept = "airmuscle.bench.comparison.model_selection.started_candidates"
     monkeypatch.setattr(kept, lambda runs: (standard_candidates(runs)[2:5], ()))
     random = np.random.default_rng(2)
     time = np.linspace(0.0, 60.0, 60)

@@ -32,15 +32,15 @@ from airmuscle.bench import (
     standard_candidates,
     write,
 )
-from airmuscle.bench.estimation import ALWAYS_FITTED, default_split
-from airmuscle.bench.statics import (
+from airmuscle.bench.comparison import (
     FoldScore,
     compare_chapter,
     compare_chapters,
-    evaluate_force,
     excess_error,
     recommend,
 )
+from airmuscle.bench.estimation import ALWAYS_FITTED, default_split
+from airmuscle.bench.statics import evaluate_force
 from airmuscle.core import model, parameter
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.outlets.requests import FitRequest, build

@@ -22,7 +22,8 @@ from airmuscle.bench import (
     find_length_errors,
     select_for_both,
 )
-from airmuscle.bench.statics import blank_surface, comparison_chapter, corrected_length
+from airmuscle.bench.comparison import comparison_chapter
+from airmuscle.bench.statics import blank_surface, corrected_length
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, EffectiveLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording

@@ -25,8 +25,9 @@ from airmuscle.bench import (
     select_for_both,
     standard_candidates,
 )
+from airmuscle.bench.comparison import compared_points
 from airmuscle.bench.estimation import EffectRows, Runs, estimate_pooled_covariance
-from airmuscle.bench.statics import compared_points, predict_effects, static_fit
+from airmuscle.bench.statics import predict_effects, static_fit
 from airmuscle.bench.statics.static_fit_chapter import equation_section
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save

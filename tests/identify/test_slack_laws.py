@@ -25,18 +25,15 @@ from airmuscle.bench import (
     fit,
     standard_candidates,
 )
-from airmuscle.bench.estimation import batch_sample_size, solve_least_squares
-from airmuscle.bench.statics import (
-    FitPoints,
-    Slackness,
-    SlackPull,
+from airmuscle.bench.comparison import (
     SpecimenErrors,
     eligible_models,
     excess_error,
     odd_specimen_notes,
     recommend,
-    slack_pull,
 )
+from airmuscle.bench.estimation import batch_sample_size, solve_least_squares
+from airmuscle.bench.statics import FitPoints, Slackness, SlackPull, slack_pull
 from airmuscle.core import tree
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, LogarithmicLength, PooledLengthLaw

@@ -13,9 +13,9 @@ import pytest
 
 import airmuscle as am
 from airmuscle.bench import fit, standard_candidates
+from airmuscle.bench.comparison import SpecimenErrors, specimens_of
+from airmuscle.bench.comparison.specimen_errors import specimen_errors
 from airmuscle.bench.estimation import degrees_of_freedom, leverages, t_quantile
-from airmuscle.bench.statics import SpecimenErrors, specimens_of
-from airmuscle.bench.statics.specimen_errors import specimen_errors
 from airmuscle.files import Entry, save
 from airmuscle.files.library import predict_with_entry
 from airmuscle.files.library.fitted_entry import fitted_entry

@@ -28,7 +28,7 @@ from arm_episodes import made_episodes
 
 import airmuscle as am
 from airmuscle.bench import Candidate, ColumnMapping, LevelSplit, compare, read, standard_candidates
-from airmuscle.bench.statics import model_selection
+from airmuscle.bench.comparison import model_selection
 from airmuscle.errors import IdentificationError
 from airmuscle.outlets.studio import (
     FIT_WORKERS,

@@ -17,6 +17,10 @@ from .campaign import fit_held_creep as fit_held_creep
 from .campaign import free_of_creep as free_of_creep
 from .campaign import identify_campaign as identify_campaign
 from .campaign import valve_commands as valve_commands
+from .comparison import Comparison as Comparison
+from .comparison import LawSelection as LawSelection
+from .comparison import compare as compare
+from .comparison import select_for_both as select_for_both
 from .diagnosis import DataUse as DataUse
 from .diagnosis import LevelRecord as LevelRecord
 from .diagnosis import Support as Support
@@ -151,9 +155,7 @@ from .statics import Band as Band
 from .statics import BenchLimits as BenchLimits
 from .statics import Bootstrap as Bootstrap
 from .statics import Candidate as Candidate
-from .statics import Comparison as Comparison
 from .statics import Fit as Fit
-from .statics import LawSelection as LawSelection
 from .statics import LengthError as LengthError
 from .statics import ModelApproximation as ModelApproximation
 from .statics import ProfileLikelihood as ProfileLikelihood
@@ -161,7 +163,6 @@ from .statics import RecursiveFit as RecursiveFit
 from .statics import ShapeConstrainedFit as ShapeConstrainedFit
 from .statics import approximate as approximate
 from .statics import bootstrap as bootstrap
-from .statics import compare as compare
 from .statics import confidence_band as confidence_band
 from .statics import estimate_length_error as estimate_length_error
 from .statics import find_length_errors as find_length_errors
@@ -170,6 +171,5 @@ from .statics import fit as fit
 from .statics import fit_chapter as fit_chapter
 from .statics import fit_shape_constrained as fit_shape_constrained
 from .statics import profile as profile
-from .statics import select_for_both as select_for_both
 from .statics import standard_candidates as standard_candidates
 from .statics import weakly_determined as weakly_determined

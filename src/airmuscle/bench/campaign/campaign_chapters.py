@@ -11,12 +11,13 @@ import numpy as np
 from ...core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, Array, legend_below, new_figure
 from ...physics import CreepElements
 from ...report import Chapter, Plot, Table, TableColumn, as_data
+from ..comparison import compare_chapter
 from ..diagnosis import level_tables, level_text
 from ..dynamics import draw_residuals, dynamic_chapters, residual_panels, running_extreme
 from ..hysteresis import hysteresis_chapters, joint_friction_chapter, loops_not_joined
 from ..inspection import level_intervals
 from ..prediction import thinned_rows
-from ..statics import MuscleDescription, compare_chapter, fit_chapter
+from ..statics import MuscleDescription, fit_chapter
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
 from .friction_and_release import FrictionStage, ReleaseStage

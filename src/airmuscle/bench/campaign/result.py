@@ -12,9 +12,10 @@ from ...core import Array, IdentificationError, ShortRepr, counted
 from ...physics import CreepElements, ForceLaw, Friction, Geometry, LinearDamper, Muscle, NoFriction
 from ...recording import Recording
 from ...report.chapter import Chapter, Table, TableColumn
+from ..comparison import law_of_length
 from ..prediction import predicted_force
 from ..reported import Reported
-from ..statics import ExperimentPlan, law_of_length, run_table
+from ..statics import ExperimentPlan, run_table
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
 from .friction_and_release import FrictionStage, ReleaseStage

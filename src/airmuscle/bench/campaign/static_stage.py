@@ -11,20 +11,17 @@ import numpy as np
 from ...core import AirmuscleError, Array, PhysicsError, ShortRepr, counted
 from ...physics import ChebyshevGeometry, CreepElements, ForceLaw, Friction
 from ...recording import Recording
-from ..diagnosis import check_data, support_of
-from ..prediction import creep_force, friction_along
-from ..statics import (
-    FORCE_MARGIN,
+from ..comparison import (
     Comparison,
-    Fit,
-    FitPoints,
     compare,
     force_residuals,
     law_of_length,
     odd_specimen_notes,
     ranked_specimen_errors,
-    refit,
 )
+from ..diagnosis import check_data, support_of
+from ..prediction import creep_force, friction_along
+from ..statics import FORCE_MARGIN, Fit, FitPoints, refit
 from .record import CampaignRecord, RecordKind, slow_rows, static_levels
 from .transient import LeftOutStage, is_held, thin, with_force
 

@@ -1,5 +1,5 @@
-"""Identification of a static law from points: fit, comparison of laws, several lengths, design of
-experiments.
+"""Identification of a static law from points: fit with its uncertainty, several lengths, design
+of experiments.
 """
 
 from ...core.stubs import attach_stub

@@ -1,14 +1,10 @@
 from .approximation import ModelApproximation as ModelApproximation
 from .approximation import approximate as approximate
 from .bootstrapping import bootstrap as bootstrap
-from .candidate_scores import FoldScore as FoldScore
 from .candidates import Candidate as Candidate
 from .candidates import blank_surface as blank_surface
 from .candidates import evaluate_force as evaluate_force
 from .candidates import standard_candidates as standard_candidates
-from .comparison_chapter import LawSelection as LawSelection
-from .comparison_chapter import compare_chapters as compare_chapters
-from .comparison_chapter import select_for_both as select_for_both
 from .experiment_design import BenchLimits as BenchLimits
 from .experiment_design import PlannedRun as PlannedRun
 from .experiment_design import candidate_runs as candidate_runs
@@ -34,20 +30,12 @@ from .length_errors import LengthError as LengthError
 from .length_errors import corrected_length as corrected_length
 from .length_errors import estimate_length_error as estimate_length_error
 from .length_errors import find_length_errors as find_length_errors
-from .model_selection import Comparison as Comparison
-from .model_selection import compare as compare
-from .model_selection import eligible_models as eligible_models
-from .model_selection import excess_error as excess_error
-from .model_selection import recommend as recommend
 from .recursive_fit import NextPoint as NextPoint
 from .recursive_fit import RecursiveFit as RecursiveFit
 from .slack import Slackness as Slackness
 from .slack import SlackPull as SlackPull
 from .slack import slack_pull as slack_pull
 from .specimen_effects import predict_effects as predict_effects
-from .specimen_errors import SpecimenErrors as SpecimenErrors
-from .specimen_errors import odd_specimen_notes as odd_specimen_notes
-from .specimen_errors import specimens_of as specimens_of
 from .static_fit import fit as fit
 from .static_fit import refit as refit
 from .static_fit_result import Fit as Fit
@@ -71,11 +59,11 @@ from .volume_fit import volume_points as volume_points
 
 # isort: split
 # For the other rooms, not in __all__
-from .candidate_scores import RankedModel as RankedModel
 from .candidates import FORCE_MARGIN as FORCE_MARGIN
-from .compared_points import force_residuals as force_residuals
-from .compared_points import law_of_length as law_of_length
-from .comparison_chapter import compare_chapter as compare_chapter
+from .candidates import MIN_POOLED as MIN_POOLED
+from .candidates import ExcludedModel as ExcludedModel
+from .candidates import slack_rows as slack_rows
+from .candidates import started_candidates as started_candidates
 from .experiment_design import LEVEL_COUNT as LEVEL_COUNT
 from .experiment_design import ExperimentPlan as ExperimentPlan
 from .experiment_design import run_table as run_table
@@ -91,8 +79,15 @@ from .fit_problem import with_length as with_length
 from .goodness import WorstPoint as WorstPoint
 from .goodness import check_determined_by_levels as check_determined_by_levels
 from .goodness import goodness_of_fit as goodness_of_fit
+from .length_errors import length_notes as length_notes
+from .pooling import Pooling as Pooling
+from .pooling import make_pooling as make_pooling
 from .pooling import pooled_band as pooled_band
+from .pooling import population_of as population_of
+from .slack import MIN_PULL as MIN_PULL
+from .slack import PULL_RATIO as PULL_RATIO
+from .slack import with_slack_bounds as with_slack_bounds
 from .specimen_effects import SpecimenEffects as SpecimenEffects
-from .specimen_errors import ranked_specimen_errors as ranked_specimen_errors
+from .static_fit import fit_to_points as fit_to_points
 from .static_fit_chapter import MuscleDescription as MuscleDescription
 from .static_fit_chapter import fit_chapter as fit_chapter

@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from ...bench.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
-from ...bench.diagnosis.misfit import misfit_warning
-from ...bench.estimation import LEVEL
-from ...bench.inspection import maximum_rate
-from ...bench.statics import Fit, RankedModel, standard_candidates
-from ...bench.statics.specimen_errors import (
+from ...bench.comparison import RankedModel
+from ...bench.comparison.specimen_errors import (
     SpecimenErrors,
     ranked_specimen_errors,
     resting_lengths_of,
     specimens_of,
 )
+from ...bench.diagnosis.misfit import misfit_warning
+from ...bench.estimation import LEVEL
+from ...bench.inspection import maximum_rate
+from ...bench.statics import Fit, standard_candidates
 from ...core import (
     HintedText,
     IdentificationError,

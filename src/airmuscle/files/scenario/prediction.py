@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ...bench.campaign import is_held
+from ...bench.comparison import law_of_length
 from ...bench.dynamics import Experiment, RecordUnknown
 from ...bench.estimation import specimen_name, widening
 from ...bench.prediction import RecordPrediction, length_notes, predict_dynamic, predict_static
 from ...bench.readers.plausibility import CONTRACTION_RANGE
-from ...bench.statics import law_of_length
 from ...bench.statics.fit_problem import fitted_quantity_of
 from ...core import ColumnError, Hint, ParameterError
 from ...engine.run import Integrator

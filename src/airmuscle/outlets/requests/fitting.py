@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.diagnosis import DataUse, support_of
-from ...bench.estimation import UNCENSORED
-from ...bench.statics import Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
-from ...bench.statics.candidates import Candidate, standard_candidates
-from ...bench.statics.comparison_chapter import LawSelection, compare_chapters, select_law
-from ...bench.statics.fit_problem import fitted_quantity_of
-from ...bench.statics.length_errors import length_error_chapter
-from ...bench.statics.specimen_errors import (
+from ...bench.comparison.comparison_chapter import LawSelection, compare_chapters, select_law
+from ...bench.comparison.specimen_errors import (
     odd_specimen_notes,
     ranked_specimen_errors,
     specimen_errors,
 )
+from ...bench.diagnosis import DataUse, support_of
+from ...bench.estimation import UNCENSORED
+from ...bench.statics import Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
+from ...bench.statics.candidates import Candidate, standard_candidates
+from ...bench.statics.fit_problem import fitted_quantity_of
+from ...bench.statics.length_errors import length_error_chapter
 from ...bench.statics.static_fit_chapter import fit_chapter
 from ...bench.statics.surface_shape import fit_shape_constrained
 from ...bench.statics.surface_violations import shape_violations_of_fit

@@ -17,13 +17,13 @@ import numpy as np
 
 import airmuscle as am
 
+from ...bench.comparison.comparison_chapter import LawSelection
 from ...bench.diagnosis import DataUse, support_of
 from ...bench.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
 from ...bench.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ...bench.hysteresis.joint import select_friction
 from ...bench.inspection import Inspection, Outlier, Run, check_contents, inspect_all, kept_rows
 from ...bench.readers.constants import CONSTANT_QUANTITIES
-from ...bench.statics.comparison_chapter import LawSelection
 from ...bench.statics.static_fit_chapter import band_curves, equation_section
 from ...core import AirmuscleError, AirmuscleWarning, atomic_folder
 from ...files.library import missing_geometry, part_toml, resting_lengths, save

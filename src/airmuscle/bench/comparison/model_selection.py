@@ -24,11 +24,16 @@ from ..estimation import (
     tied_groups,
 )
 from ..reported import Reported
+from ..statics import (
+    Candidate,
+    ExcludedModel,
+    FitPoints,
+    find_length_errors,
+    length_notes,
+    started_candidates,
+)
 from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, score_candidates
-from .candidates import Candidate, ExcludedModel, started_candidates
 from .compared_points import ComparedPoints
-from .fit_points import FitPoints
-from .length_errors import find_length_errors, length_notes
 
 MIN_FOLDS = 6
 """Number of folds from which the standard error of their differences decides alone (chosen): the

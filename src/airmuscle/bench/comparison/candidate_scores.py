@@ -12,13 +12,18 @@ from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ..estimation import LeastSquares, Loss, aicc, effective_sample_size
-from .candidates import Candidate, ExcludedModel
+from ..statics import (
+    FORCE,
+    Candidate,
+    ExcludedModel,
+    Fit,
+    SlackPull,
+    fit_to_points,
+    fitted_quantity_of,
+    linear_fields,
+    population_of,
+)
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows
-from .fit_problem import FORCE, fitted_quantity_of, linear_fields
-from .pooling import population_of
-from .slack import SlackPull
-from .static_fit import fit_to_points
-from .static_fit_result import Fit
 
 MAX_RECOMMENDED_EXCESS = 0.25
 """Maximum excess of the error of a recommended law over the lowest one (chosen)."""

@@ -12,11 +12,10 @@ from ...core import AirmuscleError, Hint, HintedText
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from ..estimation import MIN_MEMBERS, SpecimenSplit, leverages, specimen_name, t_quantile
+from ..statics import Candidate, Fit
 from .candidate_scores import FoldScore, RankedModel
-from .candidates import Candidate
 from .compared_points import ComparedPoints
 from .model_selection import Comparison
-from .static_fit_result import Fit
 
 MIN_JUDGED = 4
 """Number of specimens from which one that does not follow the others is named (chosen): of three,

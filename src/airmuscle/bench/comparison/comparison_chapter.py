@@ -28,8 +28,8 @@ from ..estimation import (
     in_order,
     specimen_name,
 )
+from ..statics import MIN_POOLED, Candidate, Fit
 from .candidate_scores import RankedModel
-from .candidates import MIN_POOLED, Candidate
 from .model_selection import (
     Comparison,
     compare,
@@ -39,7 +39,6 @@ from .model_selection import (
     is_contradicted,
     recommendation,
 )
-from .static_fit_result import Fit
 
 SPLITS = (RunSplit(), SpecimenSplit())
 """The splits of the two purposes."""

@@ -24,14 +24,24 @@ from ..estimation import (
     specimen_name,
 )
 from ..inspection import POINT_COLUMNS
-from .candidates import FORCE_MARGIN, Candidate, evaluate_force, slack_rows
-from .fit_points import FitPoints
-from .fit_problem import with_length
-from .lagging_rows import find_lagging_rows
-from .pooling import Pooling, make_pooling
-from .slack import MIN_PULL, PULL_RATIO, SlackPull, slack_pull, with_slack_bounds
-from .static_fit import refit
-from .static_fit_result import Fit
+from ..statics import (
+    FORCE_MARGIN,
+    MIN_PULL,
+    PULL_RATIO,
+    Candidate,
+    Fit,
+    FitPoints,
+    Pooling,
+    SlackPull,
+    evaluate_force,
+    find_lagging_rows,
+    make_pooling,
+    refit,
+    slack_pull,
+    slack_rows,
+    with_length,
+    with_slack_bounds,
+)
 
 
 class EvaluatedRows(NamedTuple):
