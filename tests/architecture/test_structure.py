@@ -128,36 +128,63 @@ def imported(path: Path) -> set[str]:
     return modules
 
 
+def floors_of(below: dict[str, set[str]]) -> dict[str, int]:
+    """The floor of every room: one above the highest of those that it imports."""
+
+    @functools.cache
+    def floor(room: str) -> int:
+        return 1 + max((floor(lower) for lower in below.get(room, ())), default=0)
+
+    return {room: floor(room) for room in below}
+
+
+def arrows_between(folder: Path) -> dict[str, set[str]]:
+    """For every room of a package, a file or a folder in it, the rooms that it imports."""
+    package = ".".join(["airmuscle", *folder.relative_to(SOURCE).parts])
+    rooms = {path.stem for path in folder.iterdir() if path.suffix == ".py" or path.is_dir()} - {
+        "__init__",
+        "__pycache__",
+    }
+    below: dict[str, set[str]] = {room: set() for room in rooms}
+    for path in folder.rglob("*.py"):
+        room = path.relative_to(folder).parts[0].removesuffix(".py")
+        if room == "__init__":
+            continue
+        modules = {name for name in imported(path) if name.startswith(f"{package}.")}
+        targets = {name.removeprefix(f"{package}.").split(".")[0] for name in modules}
+        below[room] |= (targets & rooms) - {room}
+    return below
+
+
 def test_the_rooms_have_60_arrows_and_10_floors_at_most():
     """An arrow leads from a package (or `benchmarks/`) to another one that it imports; a floor is
     above all it imports.
     """
-    below: dict[str, set[str]] = defaultdict(set)
-    for path in FILES:
-        room, *rest = path.relative_to(SOURCE).parts
-        if not rest:  # the face
-            continue
-        below[room] |= {name.split(".")[1] for name in imported(path) if "." in name}
-    for path in (ROOT / "benchmarks").glob("*.py"):
-        names = {
-            name
-            for node in statements(tree_of(path))
-            if isinstance(node, ast.ImportFrom)
-            for name in [node.module or ""]
-        }
-        below["benchmarks"] |= {
-            name.split(".")[1] for name in names if name.startswith("airmuscle.")
-        }
     rooms = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
-    below = {room: (names & rooms) - {room} for room, names in below.items()}
-
-    @functools.cache
-    def floor(room: str) -> int:
-        return 1 + max((floor(other) for other in below.get(room, ())), default=0)
-
-    assert len(rooms | {"benchmarks"}) <= 14
-    assert max(floor(room) for room in below) <= 10
+    below = {room: names & rooms for room, names in arrows_between(SOURCE).items() if room in rooms}
+    below["benchmarks"] = {
+        (node.module or "").split(".")[1]
+        for path in (ROOT / "benchmarks").glob("*.py")
+        for node in statements(tree_of(path))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airmuscle.")
+    } & rooms
+    assert len(below) <= 14
+    assert max(floors_of(below).values()) <= 10
     assert sum(len(names) for names in below.values()) <= 60
+
+
+def test_the_bench_has_12_rooms_8_floors_and_60_arrows_at_most():
+    below = arrows_between(SOURCE / "bench")
+    assert len(below) <= 12
+    assert max(floors_of(below).values()) <= 8
+    assert sum(len(names) for names in below.values()) <= 60
+
+
+@pytest.mark.parametrize("room", sorted(arrows_between(SOURCE / "bench").keys() - {"reported"}))
+def test_a_room_of_the_bench_has_60_arrows_inside_at_most(room: str):
+    arrows = arrows_between(SOURCE / "bench" / room)
+    bound = 116 if room == "readers" else 60
+    assert sum(len(names) for names in arrows.values()) <= bound
 
 
 def test_laws_do_not_import_each_other():

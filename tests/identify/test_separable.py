@@ -27,7 +27,6 @@ from airmuscle.bench import (
 )
 from airmuscle.bench.estimation import (
     find_initial_values,
-    is_linear_parameter,
     label_folds,
     shortened_step,
     solve_censored_least_squares,
@@ -162,7 +161,7 @@ def test_slack_rows_take_part_in_the_projection():
     assert problem.censoring.any()
     start = find_initial_values(problem)
     assert start[2] == pytest.approx(-40.0, rel=1e-4)
-    linear = is_linear_parameter(problem)
+    linear = problem.is_linear_parameter
     assert linear.tolist() == [True, True, False, True, True, True]
     again = start.copy()
     again[linear] = 0.0
