@@ -24,7 +24,7 @@ from real_intervals import held_points
 from startup import program
 
 import airmuscle as am
-from airmuscle.bench.comparison.compared_points import (force_residuals)
+from airmuscle.bench.comparison.compared_points import force_residuals
 
 
 class Bar(NamedTuple):

@@ -22,9 +22,13 @@ import numpy as np
 import pandas as pd
 
 import airmuscle as am
-from airmuscle.bench.comparison.candidate_scores import (count_parameters)
+from airmuscle.bench.comparison.candidate_scores import count_parameters
+from airmuscle.bench.comparison.compared_points import (
+    evaluated_rows,
+    force_residuals,
+    residuals_of_rows,
+)
 from airmuscle.bench.statics.candidates import blank_surface
-from airmuscle.bench.comparison.compared_points import (evaluated_rows, force_residuals, residuals_of_rows)
 from airmuscle.core.errors import IdentificationError
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")

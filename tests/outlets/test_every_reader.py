@@ -27,7 +27,8 @@ from measurement_files import (
 )
 
 from airmuscle.bench import ColumnMapping, read, read_episodes
-from airmuscle.bench.readers import formats, separate_process
+from airmuscle.bench.readers.formats import format_table
+from airmuscle.bench.readers.tables import separate_process
 from airmuscle.errors import AirmuscleError, FileError
 
 SECRET = 77.0
@@ -56,14 +57,14 @@ KINDS = pytest.mark.parametrize("reading", [recorded, as_episodes])
 
 def test_every_format_has_a_sample():
     suffixes = {Path(name).suffix for name in WRITERS}
-    for form in formats.FORMATS:
+    for form in format_table.FORMATS:
         assert not form.extensions or suffixes & set(form.extensions), form.name
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_every_format_gives_the_same_recording(tmp_path: Path, name: str):
     WRITERS[name](tmp_path / name)
-    if formats.format_of(tmp_path / name).tables is None:
+    if format_table.format_of(tmp_path / name).tables is None:
         with pytest.raises(FileError, match="are read as episodes of an arm alone"):
             read(tmp_path / name)
         return
@@ -82,9 +83,9 @@ def test_every_format_gives_the_same_episode(tmp_path: Path, name: str):
     assert pressure[:, 1] == pytest.approx(COLUMNS["p2"], rel=1e-9)
 
 
-@pytest.mark.parametrize("form", formats.FORMATS, ids=lambda form: form.name)
+@pytest.mark.parametrize("form", format_table.FORMATS, ids=lambda form: form.name)
 def test_what_the_program_does_not_parse_itself_is_read_in_a_separate_process(form):
-    assert form.is_separate or form is formats.TEXT
+    assert form.is_separate or form is format_table.TEXT
 
 
 # Monsters of any format

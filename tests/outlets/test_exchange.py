@@ -12,7 +12,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import ColumnMapping, Decimation, from_pandas, read, read_csv, to_xarray, write
-from airmuscle.bench.readers import raw_csv
+from airmuscle.bench.readers.formats import raw_csv
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError
 from airmuscle.recording import Recording
 

@@ -168,7 +168,7 @@ def test_the_number_of_lines_above_the_headings_may_be_stated(tmp_path, write):
 
 
 def test_the_heading_row_of_a_large_file_is_found_in_the_same_way(tmp_path, monkeypatch):
-    monkeypatch.setattr("airmuscle.bench.readers.raw_csv.LARGE_FILE_BYTES", 10)
+    monkeypatch.setattr("airmuscle.bench.readers.formats.raw_csv.LARGE_FILE_BYTES", 10)
     assert len(only(text(tmp_path, [*PREAMBLE, HEADINGS, UNITS, *ROWS]))) == 4
     assert len(only(text(tmp_path, NUMBERED), columns=MAPPED)) == 4
 

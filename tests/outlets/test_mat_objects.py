@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import ColumnMapping, read
-from airmuscle.bench.readers import MatlabObject, find_objects, mat_contents, read_mat_tables
+from airmuscle.bench.readers import MatlabObject, find_objects, read_mat_tables
+from airmuscle.bench.readers.formats import mat_contents
 from airmuscle.errors import FileError
 
 scipy_io = pytest.importorskip("scipy.io")

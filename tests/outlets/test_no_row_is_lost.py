@@ -14,7 +14,9 @@ from command_line import airmuscle
 from measurement_files import FILES, ROWS, STEP, UNITS, WRITERS, table_of_cells
 
 from airmuscle.bench import ColumnMapping, NoTime, read
-from airmuscle.bench.readers import Channel, constants, formats, merge_channels
+from airmuscle.bench.readers import Channel, merge_channels
+from airmuscle.bench.readers.formats import format_table
+from airmuscle.bench.readers.tables import constants
 from airmuscle.errors import AirmuscleWarning, ColumnError
 from airmuscle.recording import columns
 
@@ -91,7 +93,7 @@ def test_measured_channels_that_do_not_overlap_are_named_with_the_remedy(tmp_pat
 @pytest.mark.parametrize("name", FILES)
 def test_every_row_of_every_format_is_read(tmp_path: Path, name: str):
     WRITERS[name](tmp_path / name)
-    if formats.format_of(tmp_path / name).tables is None:
+    if format_table.format_of(tmp_path / name).tables is None:
         pytest.skip("episodes alone")
     (recording,) = read(tmp_path / name, ColumnMapping(units=UNITS))
     assert len(recording) == ROWS

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import Selection, raw_hdf5, raw_mat, raw_mdf, read_contents
-from airmuscle.bench.readers import time_base as pieces
+from airmuscle.bench.readers import Selection, read_contents
+from airmuscle.bench.readers.formats import raw_hdf5, raw_mat, raw_mdf
+from airmuscle.bench.readers.tables import time_base as pieces
 from airmuscle.errors import AirmuscleError, ColumnError
 
 h5py = pytest.importorskip("h5py", reason="h5py is not installed")

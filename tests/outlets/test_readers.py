@@ -25,12 +25,12 @@ from airmuscle.bench.readers import (
     Selection,
     call_in_separate_process,
     mapping_of_tables,
-    raw_csv,
     read_mapping,
     read_mat_tables,
     seconds_from_clock,
-    separate_process,
 )
+from airmuscle.bench.readers.formats import raw_csv
+from airmuscle.bench.readers.tables import separate_process
 from airmuscle.errors import (
     AirmuscleWarning,
     ColumnError,

@@ -13,7 +13,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import raw_csv
+from airmuscle.bench.readers.formats import raw_csv
 from airmuscle.errors import ColumnError, FileError
 from airmuscle.recording import Recording
 

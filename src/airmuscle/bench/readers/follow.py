@@ -20,13 +20,20 @@ from ...core import (
     listed,
 )
 from ...recording.columns import displacement_columns, find_quantity_name
-from .channels import RawTable
-from .file_kind import readable
-from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
 from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
-from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
+from .tables import (
+    RawTable,
+    TextFormat,
+    TextHeader,
+    has_content,
+    is_comment,
+    is_number,
+    parse_header,
+    readable,
+    split_cells,
+)
 
 MAX_UNREADABLE = 100
 MAX_HEADER_LINES = 1000

@@ -21,12 +21,18 @@ from ...recording.columns import (
     parse_heading,
 )
 from ...recording.recording import Recording
-from . import constants as fixed
-from .channels import MAX_QUOTED, Cells, RawTable
-from .constants import constant_from_column, parse_constant_name
 from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
-from .time_base import epoch_unit, seconds_from_clock
+from .tables import (
+    MAX_QUOTED,
+    Cells,
+    RawTable,
+    constant_from_column,
+    epoch_unit,
+    parse_constant_name,
+    seconds_from_clock,
+)
+from .tables import constants as fixed
 
 MAX_LABELS = 8
 MIN_LABEL_ROWS = 3

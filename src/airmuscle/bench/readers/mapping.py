@@ -52,21 +52,29 @@ from ...recording.columns import (
     parse_heading,
     split_unit,
 )
-from .channels import RawTable
-from .constants import (
+from .tables import (
+    MISSING_VALUES,
     SPECIMEN,
+    TIME_BASES,
+    Decimation,
+    Downsampling,
+    FileNamePattern,
+    MissingValues,
+    RawTable,
+    RecordedTime,
+    RefuseMissing,
+    Selection,
+    TextFormat,
+    TimeBase,
+    bare_heading,
     check_constants,
     collect_constants,
     file_conversion,
     held_value,
+    parse_code,
     parse_constant_name,
+    read_toml,
 )
-from .file_kind import read_toml
-from .header import FileNamePattern, bare_heading
-from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
-from .selection import Selection
-from .text_format import TextFormat
-from .time_base import TIME_BASES, Decimation, Downsampling, RecordedTime, TimeBase
 
 STATED = ("resting_length", "ambient", "displacement_zero", "specimen")
 """Constants of a run that are fields of a mapping."""

@@ -25,11 +25,18 @@ from ...core import (
 )
 from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
-from .channels import Cells, RawTable
-from .constants import file_conversion
 from .missing_codes import code_of
-from .missing_values import DropMissing, Mask
-from .time_base import AS_RECORDED, MAP_TIME, UNIFORM, WITHOUT_TIME
+from .tables import (
+    AS_RECORDED,
+    MAP_TIME,
+    UNIFORM,
+    WITHOUT_TIME,
+    Cells,
+    DropMissing,
+    Mask,
+    RawTable,
+    file_conversion,
+)
 
 CONTRACTION_RANGE = (-0.5, 1.0)
 """Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the

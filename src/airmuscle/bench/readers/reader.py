@@ -11,13 +11,18 @@ from typing import Any
 
 from ...core import FileError, ParameterError, abridged, printable
 from ...recording.recording import Recording
-from .channels import RawTable
-from .constants import split_specimens
-from .formats import EXTENSIONS, TEXT, format_of
+from .formats import (
+    EXTENSIONS,
+    TEXT,
+    Progress,
+    format_of,
+    read_csv_table,
+    read_text_stream,
+    read_text_tables,
+)
 from .interpret import interpret
 from .mapping import ColumnMapping, apply_mapping, read_mapping
-from .raw_csv import Progress, read_csv_table, read_text_stream, read_text_tables
-from .time_base import Decimation, Downsampling, downsample
+from .tables import Decimation, Downsampling, RawTable, downsample, split_specimens
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]

@@ -14,12 +14,9 @@ import numpy as np
 from ...core import AirmuscleError, FileError, ParameterError, abridged, atomic_file, one_line
 from ...recording.columns import split_unit
 from ...recording.recording import Recording, column_heading
-from .channels import Channel, merge_channels
-from .constants import CONSTANT_UNITS
-from .header import is_number
 from .interpret import interpret
 from .mapping import ColumnMapping, apply_mapping
-from .separate_process import import_lab_package
+from .tables import CONSTANT_UNITS, Channel, import_lab_package, is_number, merge_channels
 
 
 def write(recording: Recording, path: str | Path, *, comments: bool = True) -> Path:

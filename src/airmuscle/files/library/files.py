@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...bench.readers.file_kind import read_toml as read_toml_file
+from ...bench.readers.tables.file_kind import read_toml as read_toml_file
 from ...core import (
     AirmuscleError,
     FileError,

@@ -10,8 +10,8 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TextIO
 
-from ...bench.readers.missing_values import MISSING_VALUES
-from ...bench.readers.time_base import TIME_BASES
+from ...bench.readers.tables.missing_values import MISSING_VALUES
+from ...bench.readers.tables.time_base import TIME_BASES
 from ...core import Hint, printable
 from ...report.chapter import Table
 from ...report.data import as_json

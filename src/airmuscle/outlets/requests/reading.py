@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.readers import ColumnMapping, mapping_of_tables, read_mapping
-from ...bench.readers.missing_values import parse_code
+from ...bench.readers.tables.missing_values import parse_code
 from .declaration import RequestError, many, optional, request
 
 

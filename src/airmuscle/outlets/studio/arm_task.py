@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ...bench import propose_mapping
-from ...bench.readers.file_kind import parse_toml
+from ...bench.readers.tables.file_kind import parse_toml
 from ...core import AirmuscleError, FileError, atomic_folder, suggestion
 from ...files.library import list_plants
 from ...report.data import as_json, as_sheet

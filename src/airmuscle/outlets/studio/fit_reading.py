@@ -13,11 +13,11 @@ import airmuscle as am
 from ...bench.diagnosis import DataUse, support_of
 from ...bench.diagnosis.checked_reading import check_bench
 from ...bench.inspection import Outlier, check_contents, find_bench_outliers
-from ...bench.readers.channels import RawTable
-from ...bench.readers.constants import parse_constant_name, split_specimens
 from ...bench.readers.interpret import interpret, resolve_headings, unit_conversion
 from ...bench.readers.mapping import apply_mapping
 from ...bench.readers.reader import read_tables
+from ...bench.readers.tables.channels import RawTable
+from ...bench.readers.tables.constants import parse_constant_name, split_specimens
 from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, Hint, quantity
 from ...recording.columns import parse_heading
 from ..requests.declaration import Instruction, RequestError, reworded

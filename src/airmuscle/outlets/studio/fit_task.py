@@ -23,7 +23,7 @@ from ...bench.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loop
 from ...bench.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ...bench.hysteresis.joint import select_friction
 from ...bench.inspection import Inspection, Outlier, Run, check_contents, inspect_all, kept_rows
-from ...bench.readers.constants import CONSTANT_QUANTITIES
+from ...bench.readers.tables.constants import CONSTANT_QUANTITIES
 from ...bench.statics.static_fit_chapter import band_curves, equation_section
 from ...core import AirmuscleError, AirmuscleWarning, atomic_folder
 from ...files.library import missing_geometry, part_toml, resting_lengths, save

@@ -18,7 +18,7 @@ import unicodedata
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
-from ...bench.readers.formats import EPISODE_EXTENSIONS
+from ...bench.readers.formats.format_table import EPISODE_EXTENSIONS
 from ...core import is_running
 from .security import BadRequest
 

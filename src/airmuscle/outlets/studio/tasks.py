@@ -14,7 +14,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ...bench.readers.file_kind import parse_toml
+from ...bench.readers.tables.file_kind import parse_toml
 from ...core import AirmuscleError, Array, ParameterError, is_known_unit
 from ...design.sizing.scenario import sizing_scenario
 from ...files.library import Location, is_path, list_plants, plant_tables, read_toml

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core import FileError, abridged
-from .arrays import STEPS, Arrays, flat, numbers_of
-from .separate_process import reading
+from ....core import FileError, abridged
+from ..tables import STEPS, Arrays, flat, numbers_of, reading
 
 LINES = ".jsonl"
 """Extension of files with an object in each line."""

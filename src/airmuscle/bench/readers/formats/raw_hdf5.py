@@ -7,12 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from ...core import FileError
-from .arrays import Arrays, episodes_of, flat
-from .channels import Channel, RawTable, merge_channels
-from .selection import Selection
-from .separate_process import import_lab_package, reading
-from .time_base import Downsampling, Reduction, check_reduced_lengths
+from ....core import FileError
+from ..tables import (
+    Arrays,
+    Channel,
+    Downsampling,
+    RawTable,
+    Reduction,
+    Selection,
+    check_reduced_lengths,
+    episodes_of,
+    flat,
+    import_lab_package,
+    merge_channels,
+    reading,
+)
 
 StoredTable = tuple[str, list[Channel], dict[str, float | str], Reduction]
 """Name, channels and constants of a group or a dataset of an HDF5 file, and the reduction of its

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core import FileError
-from ...recording.recording import RowNote
-from .channels import Channel, RawTable, merge_channels
-from .selection import Selection
-from .separate_process import import_lab_package, reading
+from ....core import FileError
+from ....recording.recording import RowNote
+from ..tables import Channel, RawTable, Selection, import_lab_package, merge_channels, reading
 
 STANDARD = ("geometry_msgs/", "sensor_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
 """Packages whose fields are no quantities of a muscle by their names, except those in

@@ -11,9 +11,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, Hint, HintedText, check_field_types, one_line
-from ...recording.columns import Heading
-from ...recording.recording import RowNote, list_rows
+from ....core import Array, ColumnError, Hint, HintedText, check_field_types, one_line
+from ....recording.columns import Heading
+from ....recording.recording import RowNote, list_rows
 from .channels import Cells, RawTable, taken
 from .constants import parse_constant_name
 from .time_base import seconds_from_clock

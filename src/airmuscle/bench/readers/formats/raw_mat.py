@@ -14,10 +14,21 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ColumnError, FileError, Hint
-from ...recording.columns import parse_heading
-from .arrays import Arrays, episodes_of, flat
-from .channels import Channel, RawTable, merge_channels
+from ....core import ColumnError, FileError, Hint
+from ....recording.columns import parse_heading
+from ..tables import (
+    ALL_ROWS,
+    Arrays,
+    Channel,
+    Decimation,
+    RawTable,
+    Reduction,
+    Selection,
+    episodes_of,
+    flat,
+    merge_channels,
+    reading,
+)
 from .mat_contents import (
     READABLE,
     MatlabObject,
@@ -27,9 +38,6 @@ from .mat_contents import (
     read_objects,
 )
 from .raw_hdf5 import read_hdf5_arrays, read_hdf5_tables
-from .selection import Selection
-from .separate_process import reading
-from .time_base import ALL_ROWS, Decimation, Reduction
 
 
 def read_mat_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:

@@ -22,10 +22,15 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, FileError
+from ....core import Array, FileError
+from ..tables import (
+    Downsampling,
+    Reduction,
+    check_reduced_lengths,
+    import_lab_package,
+    is_installed,
+)
 from .raw_hdf5 import check_no_external_links, check_own_dataset, check_own_values
-from .separate_process import import_lab_package, is_installed
-from .time_base import Downsampling, Reduction, check_reduced_lengths
 
 MAX_CELLS = 10_000
 """Maximum number of elements of a cell array of version 7.3 that is read, such as names of columns

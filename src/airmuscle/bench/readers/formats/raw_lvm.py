@@ -12,11 +12,20 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import ColumnError, FileError, abridged
-from .channels import Cells, Channel, RawTable, merge_channels
+from ....core import ColumnError, FileError, abridged
+from ..tables import (
+    Cells,
+    Channel,
+    NumberedLines,
+    RawTable,
+    Selection,
+    TextFormat,
+    TextHeader,
+    check_cell_sizes,
+    has_content,
+    merge_channels,
+)
 from .raw_csv import parse_columns, read_text
-from .selection import Selection
-from .text_format import NumberedLines, TextFormat, TextHeader, check_cell_sizes, has_content
 
 LVM_BEGINNING = b"LabVIEW Measurement"
 """First bytes of a file; one of numbers alone has no header, whatever its extension."""

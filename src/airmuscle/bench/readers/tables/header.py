@@ -7,8 +7,8 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ...core import ColumnError, FileError, Hint, UnitError, conversion, listed
-from ...recording.columns import parse_heading
+from ....core import ColumnError, FileError, Hint, UnitError, conversion, listed
+from ....recording.columns import parse_heading
 from .constants import CONSTANT_UNITS, parse_constant_name
 
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")

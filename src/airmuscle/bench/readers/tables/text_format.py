@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import FileError, ParameterError, abridged
+from ....core import FileError, ParameterError, abridged
 from . import header
 from .channels import Cells, RawTable
 

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...core import AirmuscleError, FileError, ParameterError, abridged
-from ...engine.processes import Worker, WorkerError
+from ....core import AirmuscleError, FileError, ParameterError, abridged
+from ....engine.processes import Worker, WorkerError
 from .file_kind import check_regular_file
 
 

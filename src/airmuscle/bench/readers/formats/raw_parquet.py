@@ -8,11 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError
-from .arrays import STEPS, Arrays
-from .channels import Channel, RawTable, merge_channels
-from .selection import Selection
-from .separate_process import import_lab_package, reading
+from ....core import Array, ColumnError
+from ..tables import (
+    STEPS,
+    Arrays,
+    Channel,
+    RawTable,
+    Selection,
+    import_lab_package,
+    merge_channels,
+    reading,
+)
 
 
 def read_parquet_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, UnitError, conversion, quantity
-from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion
-from ...recording.columns import UNIT_SPELLINGS, Heading
+from ....core import Array, ColumnError, UnitError, conversion, quantity
+from ....core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion
+from ....recording.columns import UNIT_SPELLINGS, Heading
 from .channels import Cells, RawTable
 
 SPECIMEN = "specimen"

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .arrays import Arrays, flat
-from .separate_process import reading
+from ..tables import Arrays, flat, reading
 
 
 def read_npz_arrays(path: Path) -> list[Arrays]:

@@ -7,11 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array
-from .channels import Channel, RawTable, merge_channels
-from .selection import Selection
-from .separate_process import import_lab_package, reading
-from .time_base import Reduction
+from ....core import Array
+from ..tables import (
+    Channel,
+    RawTable,
+    Reduction,
+    Selection,
+    import_lab_package,
+    merge_channels,
+    reading,
+)
 
 _TIME_MASTER = 1
 """Type of a master channel that contains time, in both versions of the format."""

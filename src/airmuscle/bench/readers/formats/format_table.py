@@ -10,10 +10,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ...core import FileError
-from .arrays import Arrays, arrays_of_table
-from .channels import RawTable
-from .file_kind import check_is_data, check_regular_file
+from ....core import FileError
+from ..tables import (
+    Arrays,
+    RawTable,
+    Selection,
+    arrays_of_table,
+    call_in_separate_process,
+    check_installed,
+    check_is_data,
+    check_regular_file,
+)
 from .raw_csv import read_text_tables
 from .raw_hdf5 import read_hdf5_arrays, read_hdf5_tables
 from .raw_json import read_json_arrays
@@ -25,8 +32,6 @@ from .raw_parquet import read_parquet_arrays, read_parquet_tables
 from .raw_rosbag import read_rosbag_tables
 from .raw_tdms import read_tdms_tables
 from .raw_workbook import read_workbook_tables
-from .selection import Selection
-from .separate_process import call_in_separate_process, check_installed
 
 TableReader = Callable[[Path, Selection], tuple[RawTable, ...]]
 ArrayReader = Callable[[Path], list[Arrays]]

@@ -11,24 +11,31 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...core import ColumnError, FileError, Hint, abridged, listed
-from ...recording.recording import list_rows
-from . import text_format as form
-from .channels import Cells, RawTable, numbers_if_all
-from .file_kind import check_beginning, check_text_file, readable
-from .header import COMMA_NUMBER, POINT_NUMBER
-from .missing_values import MAX_LISTED
-from .selection import Selection
-from .text_format import (
+from ....core import ColumnError, FileError, Hint, abridged, listed
+from ....recording.recording import list_rows
+from ..tables import (
+    COMMA_NUMBER,
+    MAX_LISTED,
+    POINT_NUMBER,
+    Cells,
+    Decimation,
+    Downsampling,
     NumberedLines,
+    RawTable,
+    Selection,
     TextFormat,
     TextHeader,
+    check_beginning,
+    check_text_file,
+    downsample,
     has_content,
     is_comment,
+    numbers_if_all,
     parse_header,
+    readable,
     split_cells,
 )
-from .time_base import Decimation, Downsampling, downsample
+from ..tables import text_format as form
 
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 

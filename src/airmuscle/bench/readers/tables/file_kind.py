@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ...core import FileError
+from ....core import FileError
 
 _SIGNATURES = (
     (b"\x89PNG", "a PNG image"),

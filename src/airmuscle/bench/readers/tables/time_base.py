@@ -16,8 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, Hint, HintedText, ParameterError, check_field_types
-from ...recording.recording import RowNote
+from ....core import Array, ColumnError, Hint, HintedText, ParameterError, check_field_types
+from ....recording.recording import RowNote
 from .channels import Cells, RawTable
 
 _GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T](.+)")

@@ -9,13 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ColumnError, FileError, check_known, listed
-from . import header
-from .channels import Cells, RawTable, numbers_if_all
-from .selection import Selection
-from .separate_process import import_lab_package, reading
-from .text_format import TextFormat
-from .time_base import seconds_from_clock
+from ....core import ColumnError, FileError, check_known, listed
+from ..tables import (
+    Cells,
+    RawTable,
+    Selection,
+    TextFormat,
+    header,
+    import_lab_package,
+    numbers_if_all,
+    reading,
+    seconds_from_clock,
+)
 
 _EMPTY = (None, "")
 _NUMBERS = float | int | datetime.date | datetime.time | datetime.timedelta

@@ -5,10 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import FileError
-from .channels import Channel, RawTable, merge_channels
-from .selection import Selection
-from .separate_process import import_lab_package, reading
+from ....core import FileError
+from ..tables import Channel, RawTable, Selection, import_lab_package, merge_channels, reading
 
 NO_DATE = np.datetime64("1904-01-01T00:00:00", "us")
 """The date that LabVIEW writes where none is set, the origin of its time."""

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, Hint, listed
-from ...recording.columns import find_quantity_name, parse_heading, split_unit
-from ...recording.recording import RowNote
+from ....core import Array, ColumnError, Hint, listed
+from ....recording.columns import find_quantity_name, parse_heading, split_unit
+from ....recording.recording import RowNote
 
 MAX_QUOTED = 180
 """Maximum number of characters of names in a message (chosen)."""

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Iterable
 
-from ...core import FileError, alternatives
+from ....core import FileError, alternatives
 from .text_format import TextFormat
 from .time_base import Decimation, Downsampling
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError
+from ....core import Array, ColumnError
 from .channels import RawTable
 
 Arrays = Mapping[str, Array]

@@ -1,0 +1,12 @@
+from .format_table import EPISODE_EXTENSIONS as EPISODE_EXTENSIONS
+from .format_table import EXTENSIONS as EXTENSIONS
+from .format_table import TEXT as TEXT
+from .format_table import format_of as format_of
+from .mat_contents import MatlabObject as MatlabObject
+from .mat_contents import find_objects as find_objects
+from .mat_contents import read_contents as read_contents
+from .raw_csv import Progress as Progress
+from .raw_csv import read_csv_table as read_csv_table
+from .raw_csv import read_text_stream as read_text_stream
+from .raw_csv import read_text_tables as read_text_tables
+from .raw_mat import read_mat_tables as read_mat_tables
