@@ -105,9 +105,11 @@ def _at_points(
         i: leaf for i, leaf in enumerate(leaves) if isinstance(leaf, np.ndarray) and leaf.ndim
     }
     numeric = [np.asarray(x, dtype=float) for x in (*arguments, *arrays.values())]
-    broadcast = np.broadcast_arrays(*numeric)
-    shape = broadcast[0].shape
-    points = [np.ascontiguousarray(x).reshape(-1) for x in broadcast]
+    shape = numeric[0].shape
+    if any(x.shape != shape for x in numeric):  # to broadcast takes as long as 20 operations
+        numeric = list(np.broadcast_arrays(*numeric))
+        shape = numeric[0].shape
+    points = [np.ascontiguousarray(x).reshape(-1) for x in numeric]
     size = points[0].size
     at = points[: len(arguments)]
     columns = dict(zip(arrays, points[len(arguments) :], strict=True))

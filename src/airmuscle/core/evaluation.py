@@ -23,25 +23,26 @@ Vector = Sequence[Any]
 """Numbers, or arrays of equal shape with a number for each point."""
 
 
-def _mask(condition: Any, x: Any) -> Any:
-    """`x` where the condition holds, else 0; one number where it holds nowhere, as in most terms
-    beyond a validity range.
+def _condition(holds: Any) -> Any:
+    """1 or 0 where a condition holds at all points or at none, as do most of those for what lies
+    beyond a validity range; else 1 or 0 for each point.
     """
-    if np.ndim(condition) == 0:
-        return x if condition else 0.0
-    holds = np.not_equal(condition, 0.0)
-    if holds.all():
-        return x
-    return np.where(holds, x, 0.0) if holds.any() else 0.0
+    count = np.count_nonzero(holds)
+    if count == 0:
+        return 0.0
+    return 1.0 if count == np.size(holds) else holds * 1.0
+
+
+def _mask(condition: Any, x: Any) -> Any:
+    if isinstance(condition, np.ndarray) and condition.ndim:
+        return np.where(condition, x, 0.0)
+    return x if condition else 0.0
 
 
 def _select(condition: Any, x: Any, y: Any) -> Any:
-    if np.ndim(condition) == 0:
-        return x if condition else y
-    holds = np.not_equal(condition, 0.0)
-    if holds.all():
-        return x
-    return np.where(holds, x, y) if holds.any() else y
+    if isinstance(condition, np.ndarray) and condition.ndim:
+        return np.where(condition, x, y)
+    return x if condition else y
 
 
 # Operations of arrays. Conditions are numbers, 1 or 0, because laws multiply by them.
@@ -75,13 +76,13 @@ OF_ARRAYS: dict[Operation, Callable[..., Any]] = {
     Operation.FLOOR: np.floor,
     Operation.FMIN: np.fmin,
     Operation.FMAX: np.fmax,
-    Operation.LESS: lambda x, y: np.less(x, y) * 1.0,
-    Operation.LESS_EQUAL: lambda x, y: np.less_equal(x, y) * 1.0,
-    Operation.EQUAL: lambda x, y: np.equal(x, y) * 1.0,
-    Operation.NOT_EQUAL: lambda x, y: np.not_equal(x, y) * 1.0,
-    Operation.NOT: lambda x: np.equal(x, 0.0) * 1.0,
-    Operation.AND: lambda x, y: np.logical_and(x, y) * 1.0,
-    Operation.OR: lambda x, y: np.logical_or(x, y) * 1.0,
+    Operation.LESS: lambda x, y: _condition(np.less(x, y)),
+    Operation.LESS_EQUAL: lambda x, y: _condition(np.less_equal(x, y)),
+    Operation.EQUAL: lambda x, y: _condition(np.equal(x, y)),
+    Operation.NOT_EQUAL: lambda x, y: _condition(np.not_equal(x, y)),
+    Operation.NOT: lambda x: _condition(np.equal(x, 0.0)),
+    Operation.AND: lambda x, y: _condition(np.logical_and(x, y)),
+    Operation.OR: lambda x, y: _condition(np.logical_or(x, y)),
     Operation.MASK: _mask,
     Operation.SELECT: _select,
 }
@@ -189,6 +190,12 @@ def _of_arrays(function: Recorded, arrays: frozenset[int]) -> set[int]:
     return beside
 
 
+def _form_of_constants(node: Node, of_arrays: bool) -> Callable[[float], Any]:
+    """The form of the constants of an operation: NumPy converts a number each time that it is
+    combined with an array, which takes as long as the operation."""
+    return np.array if of_arrays and node.operation in _INFIX else float
+
+
 class _Step(NamedTuple):
     operation: Callable[..., Any]
     target: int
@@ -206,10 +213,10 @@ def _interpreted(
     inputs: list[tuple[int, int, int]] = []
     steps: list[_Step] = []
 
-    def place_of(node: Node) -> int:
+    def place_of(node: Node, form: Callable[[float], Any] = float) -> int:
         if node.operation != CONSTANT:
             return register[id(node)]
-        start.append(node.value)
+        start.append(form(node.value))
         return len(start) - 1
 
     for node in function.ordered:
@@ -217,8 +224,10 @@ def _interpreted(
             argument, element = function.place[id(node)]
             inputs.append((len(start), argument, element))
         else:
-            sources = tuple(map(place_of, node.arguments))
-            table = OF_ARRAYS if id(node) in beside else _FAST_NUMBERS
+            of_arrays = id(node) in beside
+            form = _form_of_constants(node, of_arrays)
+            sources = tuple(place_of(argument, form) for argument in node.arguments)
+            table = OF_ARRAYS if of_arrays else _FAST_NUMBERS
             steps.append(_Step(table[node.operation], len(start), sources, ()))
         register[id(node)] = len(start)
         start.append(None)
@@ -320,6 +329,7 @@ def _printed(function: Recorded, beside: set[int]) -> Callable[[Sequence[Vector]
     for root in function.roots:
         last.pop(id(root), None)
     names: dict[int, str] = {}
+    constants: dict[float, str] = {}
     free: list[str] = []
     lines: list[str] = []
     count = 0
@@ -328,7 +338,14 @@ def _printed(function: Recorded, beside: set[int]) -> Callable[[Sequence[Vector]
             argument, element = function.place[id(node)]
             names[id(node)] = f"x{argument}[{element}]"
             continue
-        text = _line(node, [_text(x, names) for x in node.arguments], id(node) in beside)
+        of_arrays = id(node) in beside
+        texts = [_text(x, names) for x in node.arguments]
+        if _form_of_constants(node, of_arrays) is np.array:
+            for position, operand in enumerate(node.arguments):
+                if operand.operation == CONSTANT:
+                    name = constants.setdefault(operand.value, f"c{len(constants)}")
+                    texts[position] = name
+        text = _line(node, texts, of_arrays)
         for identity in {id(argument) for argument in node.arguments}:
             name = names.get(identity, "")
             if last.get(identity) == id(node) and name.startswith("v"):
@@ -345,6 +362,7 @@ def _printed(function: Recorded, beside: set[int]) -> Callable[[Sequence[Vector]
     unpack = [f"    {arguments} = vectors"] if arguments else []
     source = "\n".join(["def evaluate(vectors):", *unpack, *lines, f"    return ({results})"])
     space = dict(_names())
+    space.update((name, np.array(value)) for value, name in constants.items())
     exec(compile(source, "<recorded function>", "exec"), space)
     evaluate: Callable[[Sequence[Vector]], Sequence[Any]] = space["evaluate"]
     return evaluate
