@@ -122,6 +122,7 @@ ARGUMENTS = {
     "displacement_zero": "reading of a displacement at the resting length [m]",
     "skip_rows": "number of lines above the headings of a file",
     "missing": "treatment of missing values: refused, left out or interpolated",
+    "sections": "further keys of a mapping for the files of a pattern of names",
     "drop_outliers": "whether the rows of suspected outliers are left out",
     "path": "path of a file to read or to write",
     "recording": "a measured or simulated run",

@@ -70,8 +70,8 @@ CSV = {
     "without units": (
         bench("pressure,length,force"),
         (
-            r"'pressure': no unit is stated. State that of the values in the column header, for"
-            r" example 'pressure \[kPa\]'"
+            r"no unit is stated for 3 columns \(pressure, length, force\). .* use --unit"
+            r" 'pressure=...' --unit 'length=...' --unit 'force=...'"
         ),
     ),
     "decimal comma": (

@@ -5,3 +5,8 @@ from .recording import Recording as Recording
 # isort: split
 # For the other rooms, not in __all__
 from .recording import resting_length_of as resting_length_of
+from .vocabulary import UNIT_NAMES as UNIT_NAMES
+from .vocabulary import WORDS as WORDS
+from .vocabulary import Certainty as Certainty
+from .vocabulary import read_heading as read_heading
+from .vocabulary import unit_named as unit_named

@@ -311,6 +311,8 @@ _MARKED_FORMS = (
 )
 MAX_HEADING = 1000
 """Number of characters of a heading above which it states no quantity and no unit (chosen)."""
+_INDEX = re.compile(r":?\s*,?\s*\d+(?<!^1)")
+"""A number of a sensor or a column of a matrix, `force (2)` or `y(:,1)`, which is no unit."""
 _SUFFIX_FORM = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
 
 
@@ -324,6 +326,8 @@ class Heading:
     name: str
     unit: str | None
     known: bool
+    evidence: str = ""
+    """Evidence for the quantity where the name is not that of a quantity: words inside it."""
 
     @property
     def target(self) -> str | None:
@@ -349,6 +353,8 @@ def parse_heading(text: str) -> Heading:
     text = text.strip()
     for form in (*_MARKED_FORMS, _SUFFIX_FORM) if len(text) <= MAX_HEADING else ():
         match = form.fullmatch(text)
+        if match and _INDEX.fullmatch(match["unit"]):
+            continue
         name = find_quantity_name(match["name"]) if match else None
         if match and name:
             target = QUANTITIES[name.rpartition(".")[2]].unit

@@ -4,6 +4,7 @@ from .branch_residuals import FILTER as FILTER
 from .branch_residuals import delay_notes as delay_notes
 from .branch_residuals import find_delay as find_delay
 from .checked_reading import check_bench as check_bench
+from .checked_reading import complete_bench as complete_bench
 from .checked_reading import read as read
 from .data_checks import Scatter as Scatter
 from .level_records import LevelRecord as LevelRecord

@@ -16,9 +16,10 @@ from ..readers import (
     Progress,
     Source,
     as_mapping,
+    check_mapped_columns,
     check_unit_consistency,
     find_files,
-    read_file,
+    read_one,
     warn_of_rates_without_time,
 )
 from .suspicious_values import warn_of_suspicious_values
@@ -49,11 +50,10 @@ def read(
     and remedy.
     """
     stated = as_mapping(mapping, fields)
-    recordings = [
-        recording
-        for path in find_files(source)
-        for recording in read_file(path, stated, downsampling, progress)
-    ]
+    parts = [read_one(path, stated, downsampling, progress) for path in find_files(source)]
+    recordings = [recording for part in parts for recording in part.recordings]
+    present = {name for part in parts for name in part.present}
+    check_mapped_columns(stated, present, parts[0].table)
     return tuple(complete_bench(recordings, stated))
 
 

@@ -4,9 +4,11 @@ Units are converted, absolute pressures become gauge pressures, and implausible 
 """
 
 import contextlib
+import dataclasses
 import datetime
 import difflib
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +19,11 @@ from ...recording.columns import (
     QUANTITIES,
     UNIT_SPELLINGS,
     Heading,
-    find_quantity_name,
     parse_heading,
 )
 from ...recording.recording import Recording
+from ...recording.vocabulary import read_heading
+from .column_names import ReadColumn, quantities_of_units, read_columns
 from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
 from .tables import (
@@ -29,6 +32,8 @@ from .tables import (
     RawTable,
     constant_from_column,
     epoch_unit,
+    guessed_time_unit,
+    is_clock,
     parse_constant_name,
     seconds_from_clock,
 )
@@ -125,7 +130,7 @@ def _converted_columns(
     """The columns in SI units, and notes on overridden and assumed units, on unknown columns, and
     on the ambient pressure of absolute pressures where it is not stated."""
     columns: dict[str, Array] = {}
-    notes = [*table.notes, *_overridden_units(table, headings)]
+    notes = [*table.notes, *_overridden_units(table, headings), *_read_by_words(headings)]
     unknown = list[str]()
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
@@ -154,6 +159,21 @@ def _converted_columns(
     return columns, notes
 
 
+def _read_by_words(headings: Sequence[Heading]) -> list[str]:
+    """Notes on the columns whose quantity or unit is not stated by the name of a quantity."""
+    columns: dict[str, list[str]] = {}
+    for heading in headings:
+        if heading.known and heading.evidence:
+            unit = f" [{heading.unit}]" if heading.unit else ""
+            columns.setdefault(heading.evidence, []).append(
+                f"'{heading.text}' as {heading.name}{unit}"
+            )
+    return [
+        f"Read {evidence}: {listed(texts, 4 * MAX_QUOTED, MAX_QUOTED)}."
+        for evidence, texts in columns.items()
+    ]
+
+
 def _overridden_units(table: RawTable, headings: Sequence[Heading]) -> list[str]:
     """A note on each unit of the file, in its unit row or its heading, that the user overrides."""
     notes = []
@@ -170,37 +190,75 @@ def _overridden_units(table: RawTable, headings: Sequence[Heading]) -> list[str]
 
 def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     """The headings with their units, from the user, the unit row or the heading itself, in this
-    order of precedence.
+    order of precedence, and quantities by their whole names or by the words in them.
     """
-    parsed = [
-        Heading(h, h, None, False) if h in table.fields else parse_heading(h)
-        for h in table.headings
-    ]
-    user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
-    _check_user_units(table, parsed, user_units)
-    row = table.units or ()
+    user_units = quantities_of_units(units)
+    columns = read_columns(table, user_units)
+    _check_user_units(table, columns, user_units)
     headings = []
-    below_all = [*row, *[""] * (len(parsed) - len(row))]
-    for h, below, cells in zip(parsed, below_all, table.columns, strict=False):
-        stated = user_units.get(h.name, user_units.get(h.text))
-        if h.name == "time" and not (stated or below or h.unit):
-            stated = epoch_unit(cells)
-        if not stated and h.known:
-            _check_unit_row(table, h, below)
-        headings.append(Heading(h.text, h.name, stated or below or h.unit, h.known))
+    below_all = [*(table.units or ()), *[""] * len(columns)]
+    for column, below, cells in zip(columns, below_all, table.columns, strict=False):
+        heading = column.heading
+        is_stated = heading.name in user_units or heading.text in user_units
+        if heading.name == "time" and not heading.unit:
+            heading = dataclasses.replace(heading, unit=epoch_unit(cells))
+            guess = guessed_time_unit(cells) if heading.unit is None else None
+            if guess is not None:
+                heading = dataclasses.replace(heading, unit=guess.unit, evidence=guess.reason)
+        if not is_stated and heading.known and not heading.evidence:
+            _check_unit_row(table, parse_heading(heading.text), below)
+        headings.append(heading)
     check_unique(table, headings)
     _check_any_known(table, headings)
+    _check_units(table, headings, columns)
     return headings
 
 
+def _check_units(
+    table: RawTable, headings: Sequence[Heading], columns: Sequence[ReadColumn]
+) -> None:
+    """Raise UnitError where units are not stated, with all of them at once."""
+    lacking = [
+        heading
+        for heading, cells in zip(headings, table.columns, strict=True)
+        if heading.known
+        and heading.unit is None
+        and heading.target != "1"
+        and not (heading.name == "time" and is_clock(cells))
+    ]
+    if len(lacking) < 2:
+        return
+    open_columns = [
+        column.heading.text
+        for column in columns
+        if column.is_open and column.reading and column.reading.unit is None
+    ]
+    named = [heading.text for heading in lacking]
+    usual = "; ".join(
+        f"{heading.name}: {', '.join(UNIT_SPELLINGS[heading.target or '1'][:5])}"
+        for heading in lacking
+    )
+    values: dict[str, Any] = {
+        **{heading.name: ... for heading in lacking},
+        **dict.fromkeys(open_columns, ...),
+    }
+    raise UnitError(
+        f"{table.origin}: no unit is stated for {len(lacking)} columns"
+        f" ({listed(named, MAX_QUOTED)}). State those of the values in the headings; usual units"
+        f" are {usual}.",
+        hint=Hint("To state the units", "units", values, "ColumnMapping"),
+    )
+
+
 def _check_user_units(
-    table: RawTable, headings: Sequence[Heading], user_units: Mapping[str, str]
+    table: RawTable, columns: Sequence[ReadColumn], user_units: Mapping[str, str]
 ) -> None:
     """Raise ColumnError where the user states the unit of a column that the table lacks."""
-    names = [heading.name for heading in headings]
-    texts = [heading.text for heading in headings]
+    names = [column.heading.name for column in columns]
+    texts = [column.heading.text for column in columns]
+    words = [column.reading.quantity for column in columns if column.reading]
     for key in user_units:
-        if key not in names and key not in texts:
+        if key not in names and key not in texts and key not in words:
             raise ColumnError(
                 f"{table.origin}: a unit is given for '{key}', but the columns are"
                 f" {listed(names)}.{suggestion(key, names)}"
@@ -212,9 +270,7 @@ def _check_any_known(table: RawTable, headings: Sequence[Heading]) -> None:
     if any(heading.known for heading in headings):
         return
     texts = [heading.text for heading in headings]
-    near = list[str]()
-    for text in texts:
-        near += difflib.get_close_matches(text.lower(), QUANTITIES, n=1)
+    near = list(filter(None, map(_misspelt, texts)))
     hint = f" Did you mean '{near[0]}'?" if near else ""
     raise ColumnError(
         f"{table.origin}: no column is a known quantity ({listed(texts, MAX_QUOTED)}); known"
@@ -329,12 +385,38 @@ def _keep_unknown_column(
     columns[heading.text or "unnamed"] = cells
     if heading.text in table.fields:
         return _field_note(heading)
-    near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
-    hint = headed.proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
+    hint = headed.proposal(heading.text) or _proposed_reading(heading)
     if not hint:
         unknown.append(f"'{heading.text}'")
         return ""
     return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+
+
+MOST_LETTERS = 0.8
+"""Share of common letters from which a name is proposed for a misspelt one (chosen)."""
+
+
+def _proposed_reading(heading: Heading) -> str:
+    """A sentence that proposes what a heading may mean, by its words or by most of its letters;
+    empty for others.
+    """
+    near = _misspelt(heading.text)
+    if near:
+        return f" Did you mean '{near}'?"
+    reading = read_heading(heading.text, heading.unit or "")
+    if reading is None:
+        return ""
+    reason = "" if reading.unit else ", of which no unit is stated"
+    return f" It may be the {reading.quantity}{reason}."
+
+
+def _misspelt(text: str) -> str:
+    """The quantity whose name has most of the letters of the first word of a heading; empty if none
+    has.
+    """
+    word = text.partition(" ")[0].lower()
+    near = difflib.get_close_matches(word, QUANTITIES, n=1, cutoff=MOST_LETTERS)
+    return near[0] if near and not parse_heading(text).known else ""
 
 
 def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:

@@ -26,8 +26,9 @@ spare = ""
 """
 
 import dataclasses
+import fnmatch
 import warnings
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from types import UnionType
 from typing import Any
@@ -36,6 +37,7 @@ from ...core import (
     AirmuscleError,
     AirmuscleWarning,
     ColumnError,
+    Hint,
     ParameterError,
     UnitError,
     abridged,
@@ -85,6 +87,8 @@ OUTLIERS = {"keep": False, "drop": True}
 """Whether suspected outliers are left out, by the words of mapping files and of the command
 line.
 """
+QUESTION = "?"
+"""Stands in a mapping for what its user must answer, `pressure [?]`."""
 _TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name")
 _WORDS: Mapping[str, Mapping[str, Any]] = {
     "time": TIME_BASES,
@@ -126,6 +130,8 @@ class ColumnMapping:
     missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with the
                numbers and texts that stand for missing values, such as -999
     drop_outliers  whether the rows of suspected outliers are left out
+    sections   further keys for the files of a pattern: {"*.tdms": {"columns": {"AI 0": "force
+               [N]"}}}
     """
 
     columns: Mapping[str | int, str] = dataclasses.field(default_factory=dict)
@@ -144,6 +150,17 @@ class ColumnMapping:
     time: TimeBase = RecordedTime()
     missing: MissingValues = RefuseMissing()
     drop_outliers: bool = False
+    sections: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
+
+    def of_file(self, path: Path) -> "ColumnMapping":
+        """The mapping for one file: completed by each section whose pattern its name matches, or
+        its path from a folder on, `specimen_a/*`. Raises as `read_mapping`.
+        """
+        mapping = dataclasses.replace(self, sections={})
+        for pattern, content in self.sections.items():
+            if path.match(pattern) or fnmatch.fnmatch(path.name, pattern):
+                mapping = mapping_of_tables(content, f"section '{pattern}'", mapping)
+        return mapping
 
     def with_fields(self, fields: Mapping[str, Any]) -> "ColumnMapping":
         """This mapping with other values of the named fields. Raises ParameterError for a name that
@@ -176,8 +193,14 @@ class ColumnMapping:
         if self.file_name is not None:
             FileNamePattern(self.file_name)  # raises for placeholders that are no quantity
         for column, heading in self.columns.items():
-            if heading and not (
-                parse_heading(heading).known or parse_constant_name(heading) or heading == SPECIMEN
+            if (
+                heading
+                and QUESTION not in heading
+                and not (
+                    parse_heading(heading).known
+                    or parse_constant_name(heading)
+                    or heading == SPECIMEN
+                )
             ):
                 name = heading.partition("[")[0].strip()
                 raise ColumnError(
@@ -220,6 +243,7 @@ def mapping_of_tables(
     """The mapping `base` with what the keys of a TOML table state; tables are merged, and None
     states nothing. `where` begins the messages. Raises as `read_mapping`."""
     entries = {key: value for key, value in content.items() if value is not None}
+    sections = _sections(entries, where, base)
     for key, value in entries.items():
         _check_entry(key, value, where)
     columns = {
@@ -228,6 +252,7 @@ def mapping_of_tables(
     codes = tuple(parse_code(code) for code in entries.pop("missing_codes", base.missing.codes))
     treatment = MISSING_VALUES.get(entries.pop("missing", ""))
     values = {
+        "sections": sections,
         "columns": {**{str(key): heading for key, heading in base.columns.items()}, **columns},
         "units": {**base.units, **entries.pop("units", {})},
         "constants": (
@@ -241,6 +266,7 @@ def mapping_of_tables(
         ),
         "drop_outliers": OUTLIERS.get(entries.pop("outliers", ""), base.drop_outliers),
     }
+    values["columns"], values["units"] = _answered(values["columns"], values["units"])
     try:
         mapping = dataclasses.replace(base, **values, **entries)
     except AirmuscleError as error:
@@ -252,6 +278,81 @@ def mapping_of_tables(
         if not parse_constant_name(name) and (heading := parse_heading(name)).known:
             held_value(heading, value, AMBIENT_PRESSURE, f"{where}: {name}")  # checks it
     return mapping
+
+
+PATTERN_SIGNS = ("*", "?", "[", "/", ".")
+"""Signs of a pattern of names of files, in contrast to a key of a mapping."""
+
+
+def _sections(
+    entries: dict[str, Any], where: str, base: ColumnMapping
+) -> dict[str, dict[str, Any]]:
+    """The sections of a mapping by pattern, which are taken out of `entries`; what remains there
+    has precedence over the sections of `base`, as options have over a file. Raises as
+    `read_mapping` for a section.
+    """
+    patterns = [
+        key
+        for key, value in entries.items()
+        if isinstance(value, Mapping) and any(sign in key for sign in PATTERN_SIGNS)
+    ]
+    sections: dict[str, dict[str, Any]] = {pattern: entries.pop(pattern) for pattern in patterns}
+    for pattern, content in sections.items():
+        mapping_of_tables(content, f"{where}, section '{pattern}'")
+    completed = {pattern: _merged(content, entries) for pattern, content in base.sections.items()}
+    return {**completed, **sections}
+
+
+def _merged(content: Mapping[str, Any], entries: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a mapping with further ones, which have precedence; tables are merged."""
+    merged = dict(content)
+    for key, value in entries.items():
+        before = merged.get(key)
+        if isinstance(before, Mapping) and isinstance(value, Mapping):
+            merged[key] = {**before, **value}
+        else:
+            merged[key] = value
+    return merged
+
+
+def _answered(
+    columns: Mapping[str, str], units: Mapping[str, str]
+) -> tuple[dict[str, str], dict[str, str]]:
+    """The columns and units in which a unit that is stated for a column, or for its quantity,
+    stands in place of its question mark.
+    """
+    remaining = dict(units)
+    answered = dict(columns)
+    for column, heading in columns.items():
+        name = bare_heading(heading)
+        if f"[{QUESTION}]" not in heading:
+            continue
+        quantity = name.rpartition(".")[2]
+        unit = units.get(column, units.get(name, units.get(quantity)))
+        if unit is not None:
+            answered[column] = f"{name} [{unit}]"
+            remaining.pop(column, None)
+    return answered, remaining
+
+
+def check_answered(mapping: ColumnMapping, where: str) -> None:
+    """Raise ColumnError where a mapping contains open questions, with all of them."""
+    open_columns = {
+        str(column): heading for column, heading in mapping.columns.items() if QUESTION in heading
+    }
+    if not open_columns:
+        return
+    texts = [f"'{column}' = '{heading}'" for column, heading in open_columns.items()]
+    raise ColumnError(
+        f"{where}: the mapping has {len(open_columns)} open questions ({listed(texts)}). Write the"
+        f" unit, or quantity and unit, in place of each {QUESTION}.",
+        hint=Hint(
+            "To answer here",
+            "columns",
+            {column: heading.replace(QUESTION, "...") for column, heading in open_columns.items()},
+            "ColumnMapping",
+        ),
+    )
 
 
 def _required_kind(key: str, value: Any) -> str:
@@ -311,9 +412,14 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
 def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
     """The table with the headings of a mapping, and a note for each mapped column. Raises
     ColumnError if the mapping names a column that does not exist."""
+    check_answered(mapping, table.origin)
+    present = mapped_columns(table, mapping)
     mapped = {
-        _column_index(table, str(column)): heading for column, heading in mapping.columns.items()
+        index: heading
+        for column, heading in mapping.columns.items()
+        if (index := _column_index(table, str(column))) is not None
     }
+    absent = [f"'{column}'" for column in map(str, mapping.columns) if column not in present]
     headings = list(table.headings)
     units = list(table.units or ("",) * len(table.headings))
     notes = list(table.notes)
@@ -325,6 +431,8 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
         constant = parse_constant_name(heading)
         if constant[1] if constant else parse_heading(heading).unit is not None:
             units[index] = ""
+    if absent:
+        notes.append(f"Columns of the mapping that are not here: {', '.join(absent)}.")
     changed = dataclasses.replace(
         table, headings=tuple(headings), units=tuple(units) if table.units else None
     )
@@ -378,17 +486,35 @@ def _contradict(unit: str, read_as: Heading) -> bool:
     return of_file.factor != stated.factor or (known and of_file.offset != stated.offset)
 
 
-def _column_index(table: RawTable, column: str) -> int:
+def _column_index(table: RawTable, column: str) -> int | None:
     """The index of a column, by its heading, by its heading without unit, or by its number from
-    1.
+    1; None if the table lacks it.
     """
     for names in (table.headings, tuple(map(bare_heading, table.headings))):
         if names.count(column) == 1:
             return names.index(column)
     numbers = [str(table.number(index)) for index in range(len(table.headings))]
-    if column in numbers:
-        return numbers.index(column)
-    raise ColumnError(
-        f"{table.origin}: the mapping names column '{column}', but the columns are"
-        f" {listed(table.headings)}.{suggestion(column, table.headings)}"
+    return numbers.index(column) if column in numbers else None
+
+
+def mapped_columns(table: RawTable, mapping: ColumnMapping) -> set[str]:
+    """The columns of a mapping that a table has."""
+    return {
+        str(column) for column in mapping.columns if _column_index(table, str(column)) is not None
+    }
+
+
+def _absent(column: str, origin: str, headings: Sequence[str]) -> str:
+    return (
+        f"{origin}: the mapping names column '{column}', but the columns are"
+        f" {listed(headings)}.{suggestion(column, headings)}"
     )
+
+
+def check_mapped_columns(mapping: ColumnMapping, present: Collection[str], table: RawTable) -> None:
+    """Raise ColumnError for a column of a mapping that no file has, as a misspelt one; `present`
+    are those that files have, `table` is one of a file.
+    """
+    for column in map(str, mapping.columns):
+        if column not in present:
+            raise ColumnError(_absent(column, table.origin, table.headings))

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core import FileError, ParameterError, abridged, printable
+from ...core import AirmuscleError, FileError, ParameterError, abridged, printable
 from ...recording.recording import Recording
 from .formats import (
     EXTENSIONS,
@@ -21,7 +21,13 @@ from .formats import (
     read_text_tables,
 )
 from .interpret import interpret
-from .mapping import ColumnMapping, apply_mapping, read_mapping
+from .mapping import (
+    ColumnMapping,
+    apply_mapping,
+    check_mapped_columns,
+    mapped_columns,
+    read_mapping,
+)
 from .tables import Decimation, Downsampling, RawTable, downsample, split_specimens
 
 Source = str | Path | Iterable[str | Path]
@@ -46,8 +52,10 @@ def read_csv(
     and remedy.
     """
     mapping = as_mapping(mapping, fields)
-    table = apply_mapping(read_csv_table(path, mapping.text_format), mapping)
-    return interpret(table, mapping, mapping.constants_of(Path(path)))
+    mapping = mapping.of_file(Path(path))
+    table = read_csv_table(path, mapping.text_format)
+    check_mapped_columns(mapping, mapped_columns(table, mapping), table)
+    return interpret(apply_mapping(table, mapping), mapping, mapping.constants_of(Path(path)))
 
 
 def as_mapping(mapping: str | Path | ColumnMapping, fields: Mapping[str, Any]) -> ColumnMapping:
@@ -70,15 +78,43 @@ def read_file(
     """The recordings in one file, as `read`; what concerns all files of a test rig is done by
     `complete_bench`.
     """
-    return [
-        interpret(part, mapping, mapping.constants_of(path))
-        for table in read_tables(
-            path, mapping, downsampling, progress
-        )  # figures cannot contain every name of a file
-        for part in split_specimens(
-            apply_mapping(dataclasses.replace(table, origin=printable(table.origin)), mapping)
-        )
-    ]
+    return list(read_one(path, mapping, downsampling, progress).recordings)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FileRecordings:
+    """The recordings in one file, the mapped columns that it has, and its first table."""
+
+    recordings: tuple[Recording, ...]
+    present: frozenset[str]
+    table: RawTable
+
+
+def read_one(
+    path: Path,
+    mapping: ColumnMapping,
+    downsampling: Downsampling = Decimation(),
+    progress: Progress | None = None,
+) -> FileRecordings:
+    """The recordings in one file, with the sections of the mapping for its name; mapped columns
+    that it lacks are left out.
+    """
+    mapping = mapping.of_file(path)
+    recordings = list[Recording]()
+    present = set[str]()
+    tables = read_tables(path, mapping, downsampling, progress)
+    for table in tables:
+        # figures cannot contain every name of a file
+        named = dataclasses.replace(table, origin=printable(table.origin))
+        present |= mapped_columns(named, mapping)
+        try:
+            for part in split_specimens(apply_mapping(named, mapping)):
+                recordings.append(interpret(part, mapping, mapping.constants_of(path)))
+        except AirmuscleError:
+            # a misspelt column of the mapping is the first cause
+            check_mapped_columns(mapping, mapped_columns(named, mapping), named)
+            raise
+    return FileRecordings(tuple(recordings), frozenset(present), tables[0])
 
 
 def find_files(source: Source) -> list[Path]:

@@ -15,7 +15,7 @@ from ...core import AirmuscleError, FileError, ParameterError, abridged, atomic_
 from ...recording.columns import split_unit
 from ...recording.recording import Recording, column_heading
 from .interpret import interpret
-from .mapping import ColumnMapping, apply_mapping
+from .mapping import ColumnMapping, apply_mapping, check_mapped_columns, mapped_columns
 from .tables import CONSTANT_UNITS, Channel, import_lab_package, is_number, merge_channels
 
 
@@ -170,6 +170,7 @@ def from_pandas(
         channels.append(Channel(str(column.name), values))
     table = merge_channels(origin, channels, {})
     table = dataclasses.replace(table, rows=np.arange(len(frame)), notes=notes)
+    check_mapped_columns(mapping, mapped_columns(table, mapping), table)
     return interpret(apply_mapping(table, mapping), mapping)
 
 

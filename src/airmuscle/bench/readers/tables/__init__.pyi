@@ -71,4 +71,6 @@ from .time_base import UniformTime as UniformTime
 from .time_base import check_reduced_lengths as check_reduced_lengths
 from .time_base import downsample as downsample
 from .time_base import epoch_unit as epoch_unit
+from .time_base import guessed_time_unit as guessed_time_unit
+from .time_base import is_clock as is_clock
 from .time_base import seconds_from_clock as seconds_from_clock

@@ -57,6 +57,48 @@ def epoch_unit(cells: Cells) -> str | None:
     return next(fits, None)
 
 
+def is_clock(cells: Cells) -> bool:
+    """Whether the first cell of a column is a clock time."""
+    return isinstance(cells, list) and bool(cells) and seconds_from_clock(cells[:1]) is not None
+
+
+USUAL_RATES = (0.5, 2e4)
+USUAL_DURATIONS = (0.5, 86_400.0)
+"""Ranges of the rows per second and of the duration [s] of a record (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class GuessedUnit:
+    """A unit that a file does not state, and the reason for it."""
+
+    unit: str
+    reason: str
+
+
+def guessed_time_unit(cells: Cells) -> GuessedUnit | None:
+    """The unit of times (N,) that rise, if one alone gives a usual rate and duration; None where
+    several do, or none.
+    """
+    if isinstance(cells, list) or len(cells) < 3 or not np.all(np.diff(cells) > 0):
+        return None
+    step = float(np.median(np.diff(cells)))
+    span = float(cells[-1] - cells[0])
+    possible = []
+    for unit, number in _EPOCH_UNITS.items():
+        rate = number / step
+        usual_rate = USUAL_RATES[0] <= rate <= USUAL_RATES[1]
+        if usual_rate and USUAL_DURATIONS[0] <= span / number <= USUAL_DURATIONS[1]:
+            possible.append((unit, rate))
+    if len(possible) != 1:
+        return None
+    ((unit, rate),) = possible
+    return GuessedUnit(
+        unit,
+        f"with a guessed unit, because no other gives a usual record than {rate:.4g} rows per"
+        " second",
+    )
+
+
 def _parse_time(cell: str) -> float | None:
     """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not
     a clock time. Microseconds are exact as floating-point numbers. A time that states its offset
