@@ -22,6 +22,7 @@ from scipy.interpolate import PchipInterpolator
 import airmuscle as am
 from airmuscle.core import STANDARD_GRAVITY
 from airmuscle.design import (
+    GripperRequirement,
     JointRequirement,
     LiftRequirement,
     MuscleChoice,
@@ -40,7 +41,7 @@ from airmuscle.design import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.design.sizing import air_path, static_muscle
+from airmuscle.design.sizing import air_path, working_muscle
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.files import Entry
 from airmuscle.physics import (
@@ -190,6 +191,44 @@ def test_the_extended_muscle_of_a_joint_accelerates_the_inertia():
     assert choice.length > choose(am.load("dmsp-20-300"), JOINT, SIX_BAR).length
 
 
+# Lever and gripper
+
+
+def test_a_lever_is_a_lift_of_its_ratio():
+    """Static: i times the load over the travel divided by i; the mass moves as i^2 m."""
+    slow = dataclasses.replace(SIX_BAR, cycle_time=1e3)
+    lever = LiftRequirement(stroke=0.2, mass=6.0, force=10.0, stiffness=40.0, lever=5.0)
+    direct = LiftRequirement(
+        stroke=0.04, mass=30.0, force=50.0, stiffness=25 * 40.0
+    )  # the spring is 25 times as stiff
+    first, second = (choose(am.load("dmsp-20-300"), each, slow) for each in (lever, direct))
+    assert first.length == pytest.approx(second.length, rel=1e-6)
+    assert first.design.contracted.force == pytest.approx(second.design.contracted.force, rel=1e-9)
+    assert lever.work == pytest.approx(direct.work, rel=1e-12)
+    assert lever.moving_mass == 25 * 6.0
+    quick = dataclasses.replace(SIX_BAR, cycle_time=0.8)
+    fast = choose(am.load("dmsp-20-300"), lever, quick)
+    inertial = lever.moving_mass * 0.5 * lever.travel * (2 * math.pi / 0.8) ** 2
+    needed = 1.5 * (lever.load(0.0) + inertial)
+    assert fast.design.extended.capacity >= needed * (1 - 1e-9)
+
+
+@pytest.mark.parametrize(("lever", "fingers"), [(1.0, 2.0), (2.5, 3.0)])
+def test_a_gripper_holds_its_grip_at_every_position_and_opens(lever: float, fingers: float):
+    """Virtual work: the muscles hold i n G beyond the opening spring, and can yield to it alone."""
+    gripper = GripperRequirement(opening=0.02, grip=40.0, fingers=fingers, lever=lever)
+    choice = choose(am.load("dmsp-20-300"), gripper, SIX_BAR)
+    grip = lever * fingers * 40.0
+    spring = 0.1 * grip
+    ends = np.linspace(choice.design.extended.contraction, choice.design.contracted.contraction, 9)
+    assert ends[-1] - ends[0] == pytest.approx(0.02 / lever / choice.length)
+    for contraction in ends:
+        assert force(choice, 6e5, contraction) >= 1.5 * (spring + grip) * (1 - 1e-9)
+        assert force(choice, choice.muscle.pressure_range[0], contraction) <= spring * (1 + 1e-9)
+    assert choice.design.extended.force == pytest.approx(spring, rel=1e-9)
+    assert choice.design.contracted.force == pytest.approx(spring + grip, rel=1e-9)
+
+
 # Shortest length
 
 
@@ -199,7 +238,7 @@ def some_mounting_suffices(
     """Whether any contraction at the start meets the requirement with this length: independent of
     the search.
     """
-    muscle = static_muscle(
+    muscle = working_muscle(
         am.files.library.scaling.scale_entry(entry, resting_length=length), SIX_BAR
     )
     low, high = muscle.contraction_range

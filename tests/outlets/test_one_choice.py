@@ -19,6 +19,7 @@ from widths import widened
 import airmuscle as am
 from airmuscle.design import (
     SORT_KEYS,
+    GripperRequirement,
     JointRequirement,
     LiftRequirement,
     SizingConditions,
@@ -44,13 +45,16 @@ REQUIREMENTS: dict[str, Any] = {
     "heavy lift": LiftRequirement(stroke=0.040, force=2500.0),
     "spring": LiftRequirement(stroke=0.030, force=80.0, stiffness=4000.0),
     "strong joint": JointRequirement(angle=math.radians(90.0), torque=40.0, inertia=0.2),
+    "lever": LiftRequirement(stroke=0.200, mass=8.0, lever=5.0),
+    "gripper": GripperRequirement(opening=0.020, grip=50.0, lever=2.0),
     "weak joint": JointRequirement(angle=math.radians(20.0), torque=0.3),
 }
 CONDITIONS = SizingConditions(supply=6e5)
 
 
 @pytest.fixture(
-    scope="module", params=widened(REQUIREMENTS, lambda name: name in ("lift", "joint"))
+    scope="module",
+    params=widened(REQUIREMENTS, lambda name: name in ("lift", "joint", "lever", "gripper")),
 )
 def sized(request) -> tuple[SizingResult, Chapter, str]:
     result = size_muscles(REQUIREMENTS[request.param], CONDITIONS)

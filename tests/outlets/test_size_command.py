@@ -16,6 +16,7 @@ from widths import widened
 
 import airmuscle as am
 from airmuscle.design import (
+    GripperRequirement,
     JointRequirement,
     LiftRequirement,
     SizingConditions,
@@ -46,6 +47,8 @@ def simulate(text: str, folder: Path) -> am.Recording:
         (LiftRequirement(stroke=0.04, mass=20.0), 2, "dmsp-10-250"),
         (LiftRequirement(stroke=0.03, force=80.0, stiffness=4000.0), 1, "dmsp-20-300"),
         (LiftRequirement(stroke=0.03, force=150.0), 1, "dmsp-20-300"),
+        (LiftRequirement(stroke=0.08, mass=10.0, lever=2.0), 1, "dmsp-20-300"),
+        (GripperRequirement(opening=0.03, grip=60.0), 1, "dmsp-20-300"),
     ],
 )
 def test_the_lift_of_the_scenario_reaches_both_ends_of_the_stroke(
@@ -56,16 +59,16 @@ def test_the_lift_of_the_scenario_reaches_both_ends_of_the_stroke(
     cycle = CONDITIONS.cycle_time
     position = run["position"] - choice.design.extended.contraction * choice.length
     end_of_rest = np.interp((2 * RESTING + MOVING) * cycle, run["time"], position)
-    assert end_of_rest == pytest.approx(requirement.stroke, rel=0.02)
+    assert end_of_rest == pytest.approx(requirement.travel, rel=0.02)
     assert np.interp(RESTING * cycle, run["time"], position) == pytest.approx(
-        0.0, abs=1e-6 * requirement.stroke
+        0.0, abs=1e-6 * requirement.travel
     )
-    assert position[-1] == pytest.approx(0.0, abs=0.02 * requirement.stroke)
-    assert position.max() < 1.02 * requirement.stroke
+    assert position[-1] == pytest.approx(0.0, abs=0.02 * requirement.travel)
+    assert position.max() < 1.02 * requirement.travel
     warm = simulate(scenario_text(choice).replace("Isothermal", "WallHeatTransfer"), tmp_path)[
         "position"
     ]
-    further = (warm.max() - choice.design.extended.contraction * choice.length) / requirement.stroke
+    further = (warm.max() - choice.design.extended.contraction * choice.length) / requirement.travel
     assert 1.03 < further < 1.06, "as the scenario states of the default gas"
 
 
@@ -280,6 +283,9 @@ def test_a_request_that_cannot_be_met_is_one_line_and_writes_nothing(arguments, 
             "6 bar",
         ),
         ("--stiffness", "2 N/mm", "--torque", "5 N m", "--angle", "60 deg", "--supply", "6 bar"),
+        ("--grip", "50 N", "--supply", "6 bar"),
+        ("--grip", "50 N", "--opening", "2 cm", "--load", "2 kg", "--supply", "6 bar"),
+        ("--torque", "5 N m", "--angle", "60 deg", "--lever", "2", "--supply", "6 bar"),
         (*LIFT[1:], "--sort", "price"),
     ],
 )

@@ -34,11 +34,13 @@ from .control_benchmark import scenario_contender as scenario_contender
 from .control_benchmark import standard_contenders as standard_contenders
 from .sizing import SORT_KEYS as SORT_KEYS
 from .sizing import EndPoint as EndPoint
+from .sizing import GripperRequirement as GripperRequirement
 from .sizing import JointRequirement as JointRequirement
 from .sizing import LawOfProduct as LawOfProduct
 from .sizing import LiftRequirement as LiftRequirement
 from .sizing import MuscleChoice as MuscleChoice
 from .sizing import MuscleDesign as MuscleDesign
+from .sizing import PullRequirement as PullRequirement
 from .sizing import Requirement as Requirement
 from .sizing import SizingConditions as SizingConditions
 from .sizing import SizingResult as SizingResult

@@ -4,10 +4,12 @@ from .laws_of_product import STRENGTHS as STRENGTHS
 from .laws_of_product import LawOfProduct as LawOfProduct
 from .requirement_and_choice import CRITERIA as CRITERIA
 from .requirement_and_choice import SORT_KEYS as SORT_KEYS
+from .requirement_and_choice import GripperRequirement as GripperRequirement
 from .requirement_and_choice import JointRequirement as JointRequirement
 from .requirement_and_choice import LiftRequirement as LiftRequirement
 from .requirement_and_choice import MuscleChoice as MuscleChoice
 from .requirement_and_choice import MuscleDesign as MuscleDesign
+from .requirement_and_choice import PullRequirement as PullRequirement
 from .requirement_and_choice import Requirement as Requirement
 from .requirement_and_choice import SizingConditions as SizingConditions
 from .requirement_and_choice import by_air as by_air
@@ -31,4 +33,4 @@ from .scenario import sizing_scenario as sizing_scenario
 from .search import choose as choose
 from .static_muscle import EndPoint as EndPoint
 from .static_muscle import StaticMuscle as StaticMuscle
-from .working_range import static_muscle as static_muscle
+from .working_range import working_muscle as working_muscle

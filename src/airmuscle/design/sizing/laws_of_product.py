@@ -13,7 +13,7 @@ from ...files.library.entry import GEOMETRIC, MAKERS_TABLE, MEASURED
 from ...physics.muscle.geometry import Braid
 from .requirement_and_choice import MuscleChoice, SizingConditions
 from .static_muscle import StaticMuscle
-from .working_range import static_muscle
+from .working_range import working_muscle
 
 LEAST_COVERAGE = 0.5
 """Part of the working range of a product that a law must cover to come before laws that rest on
@@ -105,7 +105,7 @@ def coverage_of(entry: Entry, conditions: SizingConditions) -> tuple[float, str]
     the reason where the law cannot be used.
     """
     try:
-        muscle = static_muscle(entry, conditions)
+        muscle = working_muscle(entry, conditions)
     except ParameterError as error:
         return 0.0, str(error)
     pressures = _overlap(muscle.pressure_range, _working_pressures(entry, conditions))

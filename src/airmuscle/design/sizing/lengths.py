@@ -12,8 +12,8 @@ import numpy as np
 from ...core import Array, SolveError
 from .requirement_and_choice import (
     JointRequirement,
-    LiftRequirement,
     MuscleDesign,
+    PullRequirement,
     SizingConditions,
 )
 from .static_muscle import EndPoint, StaticMuscle, least_sufficient
@@ -53,7 +53,7 @@ class LiftSearch:
     at rest and in a harmonic motion over the stroke with the cycle time.
     """
 
-    requirement: LiftRequirement
+    requirement: PullRequirement
     conditions: SizingConditions
     count: int
 
@@ -74,7 +74,7 @@ class LiftSearch:
     @property
     def _ends(self) -> tuple[LoadLimits, LoadLimits]:
         """Loads of one muscle [N] at the start and at the end."""
-        start, end = zip(*self._loads(np.array([0.0, self.requirement.stroke])), strict=True)
+        start, end = zip(*self._loads(np.array([0.0, self.requirement.travel])), strict=True)
         return LoadLimits(*start), LoadLimits(*end)
 
     @property
@@ -151,7 +151,7 @@ class LiftSearch:
         there is none.
         """
         low, high = self.end_limits(muscle)
-        used = self.requirement.stroke / length
+        used = self.requirement.travel / length
         if used > (high - low) * (1.0 + ROUNDING):
             return None
         starts = np.unique(np.linspace(low, max(low, high - used), MOUNTINGS))
@@ -169,7 +169,7 @@ class LiftSearch:
         reason.
         """
         low, high = self.end_limits(muscle)
-        shortest = self.requirement.stroke / (high - low)
+        shortest = self.requirement.travel / (high - low)
         length = shortest
         while self.mounting(muscle, length) is None:
             length *= GROWTH
@@ -190,11 +190,11 @@ class LiftSearch:
             return None
         contractions = (
             start,
-            min(start + self.requirement.stroke / length, muscle.contraction_range[1]),
+            min(start + self.requirement.travel / length, muscle.contraction_range[1]),
         )
         extended, contracted = (
             muscle.end_point(eps, self.requirement.load(at) / self.count)
-            for eps, at in zip(contractions, (0.0, self.requirement.stroke), strict=True)
+            for eps, at in zip(contractions, (0.0, self.requirement.travel), strict=True)
         )
         displacement, load = self._path
         along = np.minimum(start + displacement / length, muscle.contraction_range[1])
@@ -204,7 +204,7 @@ class LiftSearch:
     def shortfall(self, muscle: StaticMuscle, length: float) -> str:
         """Reason why a length [m] is not sufficient."""
         low, high = self.end_limits(muscle)
-        needed = low + self.requirement.stroke / length
+        needed = low + self.requirement.travel / length
         highest = muscle.contraction_range[1]
         if needed > highest:
             return (

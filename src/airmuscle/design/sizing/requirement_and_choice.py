@@ -1,13 +1,14 @@
-"""Requirements of a sizing, a lift or a joint, conditions of operation, and choices of muscles that
-meet them.
+"""Requirements of a sizing (lift, gripper, joint), conditions of operation, and choices of muscles
+that meet them.
 """
 
+import abc
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -28,14 +29,80 @@ PATH_POINTS = 33
 """Points of a stroke at which the load is compared with the muscle (chosen)."""
 
 
-@model
-class LiftRequirement:
-    """Lift: muscles in parallel move a load over a stroke; F(s) = m g + F_0 + k s at a displacement
-    s from the start.
+class PullRequirement(abc.ABC):
+    """Requirement of muscles that pull a load in parallel (interface): travel of the muscles, and
+    the load on all of them together, linear in their displacement.
+    """
 
-    m mass, F_0 constant force, k stiffness of a spring that is relaxed at the start. The load must
-    pull at both ends. The mass adds the force of a harmonic motion over the stroke with the cycle
-    time, m (S/2 - s) (2 pi/T)^2.
+    @property
+    @abc.abstractmethod
+    def travel(self) -> float:
+        """Travel of the muscles [m]."""
+
+    @property
+    @abc.abstractmethod
+    def moving_mass(self) -> float:
+        """Mass [kg] that moves with the muscles; 0 where it is not stated."""
+
+    @abc.abstractmethod
+    def load(self, displacement: Any) -> Any:
+        """Force on the muscles at rest [N] at their displacement [m] from the start; arrays as
+        well.
+        """
+
+    @abc.abstractmethod
+    def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
+        """Least and greatest force on the muscles [N] at displacements [m], at rest or moving with
+        a cycle time [s].
+        """
+
+    @abc.abstractmethod
+    def reduced(self, load: float = 1.0, travel: float = 1.0) -> Self:
+        """The requirement with a fraction of the load and of the travel."""
+
+    @abc.abstractmethod
+    def describe(self) -> str:
+        """The requirement as text."""
+
+    def check(self) -> None:
+        """Raise ParameterError unless the load pulls at both ends."""
+        for position, place in ((0.0, "start"), (self.travel, "end")):
+            if not self.load(position) > 0.0:
+                raise ParameterError(
+                    f"{type(self).__name__}: the load at the {place} of the stroke is"
+                    f" {self.load(position):.4g} N; it must be greater than 0, because a muscle"
+                    " only pulls. Give a mass, a force, or a spring with a preload."
+                )
+
+    @property
+    def path(self) -> tuple[Array, Array]:
+        """Displacements [m] of the muscles and loads at rest [N] along the travel, (PATH_POINTS,)
+        each.
+        """
+        displacement = np.linspace(0.0, self.travel, PATH_POINTS)
+        return displacement, np.broadcast_to(self.load(displacement), displacement.shape)
+
+    @property
+    def stiffness_at_muscle(self) -> float:
+        """Growth of the load per displacement of the muscles [N/m]."""
+        return float(self.load(self.travel) - self.load(0.0)) / self.travel
+
+    @property
+    def work(self) -> float:
+        """Work against the load over the travel [J]."""
+        return float(0.5 * (self.load(0.0) + self.load(self.travel)) * self.travel)
+
+
+@model
+class LiftRequirement(PullRequirement):
+    """Lift: muscles in parallel move a load over a stroke, directly or by a lever; F(s) = m g + F_0
+    + k s at a displacement s of the load from the start.
+
+    m mass, F_0 constant force, k stiffness of a spring that is relaxed at the start, i lever ratio:
+    motion of the load over that of the muscles, which is 1 without a lever. The muscles travel S/i
+    and carry i F(s): the arms are at right angles to the forces (chosen). The load must pull at
+    both ends. The mass adds the force of a harmonic motion over the stroke with the cycle time, i m
+    (S/2 - s) (2 pi/T)^2.
     """
 
     from_file: ClassVar[bool] = False
@@ -48,45 +115,29 @@ class LiftRequirement:
     stiffness: float = parameter(
         "N/m", "k", "stiffness of a spring", bounds=(-1e7, 1e7), default=0.0
     )
+    lever: float = parameter(
+        "1", "i", "motion of the load over motion of the muscles", bounds=(0.02, 50.0), default=1.0
+    )
 
-    def check(self) -> None:
-        for position, place in ((0.0, "start"), (self.stroke, "end")):
-            if not self.load(position) > 0.0:
-                raise ParameterError(
-                    f"LiftRequirement: the load at the {place} of the stroke is"
-                    f" {self.load(position):.4g} N; it must be greater than 0, because a muscle"
-                    " only pulls. Give a mass, a force, or a spring with a preload."
-                )
+    @property
+    def travel(self) -> float:
+        return self.stroke / self.lever
+
+    @property
+    def moving_mass(self) -> float:
+        return self.mass * self.lever**2
 
     def load(self, displacement: Any) -> Any:
-        """Force of the load at rest [N] at a displacement [m] from the start of the stroke; arrays
-        as well.
-        """
-        return self.mass * STANDARD_GRAVITY + self.force + self.stiffness * displacement
-
-    @property
-    def path(self) -> tuple[Array, Array]:
-        """Displacements [m] and loads at rest [N] along the stroke, (PATH_POINTS,) each."""
-        displacement = np.linspace(0.0, self.stroke, PATH_POINTS)
-        return displacement, np.broadcast_to(self.load(displacement), displacement.shape)
+        at_load = self.lever * displacement
+        return self.lever * (self.mass * STANDARD_GRAVITY + self.force + self.stiffness * at_load)
 
     def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
-        """Least and greatest force of the load [N] at displacements [m], at rest or moving with a
-        cycle time [s].
-        """
         held = self.load(displacement)
-        moving = (
-            held + self.mass * (0.5 * self.stroke - displacement) * (2 * math.pi / cycle_time) ** 2
-        )
+        acceleration = (0.5 * self.travel - displacement) * (2 * math.pi / cycle_time) ** 2
+        moving = held + self.moving_mass * acceleration
         return np.minimum(held, moving), np.maximum(held, moving)
 
-    @property
-    def work(self) -> float:
-        """Work against the load over the stroke [J]."""
-        return float(0.5 * (self.load(0.0) + self.load(self.stroke)) * self.stroke)
-
     def reduced(self, load: float = 1.0, travel: float = 1.0) -> "LiftRequirement":
-        """The requirement with a fraction of the load and of the stroke."""
         return replace(
             self,
             mass=load * self.mass,
@@ -96,12 +147,86 @@ class LiftRequirement:
         )
 
     def describe(self) -> str:
-        """Load and stroke as text."""
-        first = self.load(0.0)
-        last = self.load(self.stroke)
+        first = self.load(0.0) / self.lever
+        last = self.load(self.travel) / self.lever
         load = f"{first:.4g} N" if math.isclose(first, last) else f"{first:.4g} to {last:.4g} N"
         load = f"{self.mass:.4g} kg ({load})" if self.mass else load
-        return f"{load} over {1e3 * self.stroke:.4g} mm"
+        lever = "" if self.lever == 1.0 else f" by a lever of {self.lever:.4g}"
+        return f"{load} over {1e3 * self.stroke:.4g} mm{lever}"
+
+
+OPENING_SHARE = 0.1
+"""Force of the spring that opens a gripper, without a stated one, relative to the force on the
+muscles of the gripping fingers (chosen)."""
+
+
+@model
+class GripperRequirement(PullRequirement):
+    """Gripper: muscles in parallel close fingers against a spring that opens them, and grip with a
+    force at any position of their travel.
+
+        F(x) = F_o + i n G x/x_S at rest (an elastic object),   F_o <= F <= F_o + i n G at every x
+
+    G grip force of each of n fingers, i lever ratio: motion of a finger over that of the muscles,
+    F_o force of the opening spring on the muscles, x their displacement, x_S = S/i their travel.
+    The mass of the fingers is left out (chosen).
+    """
+
+    from_file: ClassVar[bool] = False
+
+    opening: float = parameter("m", "S", "travel of each finger", bounds=(1e-4, 1.0))
+    grip: float = parameter("N", "G", "grip force of each finger", bounds=(0.1, 1e5))
+    fingers: float = parameter("1", "n", "number of fingers", bounds=(1.0, 20.0), default=2.0)
+    lever: float = parameter(
+        "1", "i", "motion of a finger over motion of the muscles", bounds=(0.02, 50.0), default=1.0
+    )
+    opening_force: float = parameter(
+        "N",
+        "F_o",
+        "force of the opening spring on the muscles; 0 is a tenth of that of the fingers",
+        bounds=(0.0, 1e6),
+        default=0.0,
+    )
+
+    @property
+    def travel(self) -> float:
+        return self.opening / self.lever
+
+    @property
+    def moving_mass(self) -> float:
+        return 0.0
+
+    @property
+    def grip_at_muscle(self) -> float:
+        """Force of all gripping fingers on the muscles [N]."""
+        return self.lever * self.fingers * self.grip
+
+    @property
+    def spring(self) -> float:
+        """Force of the opening spring on the muscles [N]."""
+        return self.opening_force or OPENING_SHARE * self.grip_at_muscle
+
+    def load(self, displacement: Any) -> Any:
+        return self.spring + self.grip_at_muscle * displacement / self.travel
+
+    def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
+        least = np.full(np.shape(displacement), self.spring)
+        return least, least + self.grip_at_muscle
+
+    def reduced(self, load: float = 1.0, travel: float = 1.0) -> "GripperRequirement":
+        return replace(
+            self,
+            grip=load * self.grip,
+            opening_force=load * self.opening_force,
+            opening=travel * self.opening,
+        )
+
+    def describe(self) -> str:
+        lever = "" if self.lever == 1.0 else f" by a lever of {self.lever:.4g}"
+        return (
+            f"a grip of {self.grip:.4g} N at each of {self.fingers:.4g} fingers over"
+            f" {1e3 * self.opening:.4g} mm{lever}"
+        )
 
 
 @model
@@ -205,7 +330,7 @@ class SizingConditions:
             )
 
 
-Requirement = LiftRequirement | JointRequirement
+Requirement = LiftRequirement | GripperRequirement | JointRequirement
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -294,8 +294,9 @@ def size_muscles(
     """
     if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
         raise ParameterError(
-            "size_muscles: give a LiftRequirement or a JointRequirement, and SizingConditions;"
-            f" these are {type(requirement).__name__} and {type(conditions).__name__}."
+            "size_muscles: give a LiftRequirement, a GripperRequirement or a JointRequirement, and"
+            f" SizingConditions; these are {type(requirement).__name__} and"
+            f" {type(conditions).__name__}."
         )
     entries = catalogue() if muscles is None else tuple(muscles)
     if not entries or not all(isinstance(entry, Entry) for entry in entries):

@@ -35,8 +35,8 @@ from ...physics.pneumatics import (
 from ...physics.pneumatics.gas import Isothermal, absolute_pressure
 from .requirement_and_choice import (
     JointRequirement,
-    LiftRequirement,
     MuscleChoice,
+    PullRequirement,
     SizingConditions,
 )
 
@@ -86,9 +86,9 @@ def air_path(choice: MuscleChoice) -> AirPath:
     last = choice.design.contracted
     fraction = np.linspace(0.0, 1.0, STATIONS)
     contractions = first.contraction + fraction * (last.contraction - first.contraction)
-    if isinstance(choice.requirement, LiftRequirement):
+    if isinstance(choice.requirement, PullRequirement):
         loads = [
-            choice.requirement.load(f * choice.requirement.stroke) / choice.count
+            choice.requirement.load(f * choice.requirement.travel) / choice.count
             for f in fraction.tolist()
         ]
         points = zip(contractions.tolist(), loads, strict=True)
@@ -169,7 +169,7 @@ def scenario_text(choice: MuscleChoice) -> str:
     scenario is one pair with its part of torque and inertia. Raises SolveError for a choice without
     a geometry.
     """
-    is_lift = isinstance(choice.requirement, LiftRequirement)
+    is_lift = isinstance(choice.requirement, PullRequirement)
     modelled = plant_muscle(choice)
     build = _lift if is_lift else _joint
     plant, inputs, run, is_inertia_chosen = build(choice, modelled.muscle)
@@ -279,31 +279,31 @@ def _stiffness(choice: MuscleChoice, muscle: Muscle) -> float:
     return max(float(muscle.stiffness(pressure, contraction)), 0.0) / choice.length
 
 
-def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism, float]:
+def _load(choice: MuscleChoice, requirement: PullRequirement) -> tuple[Mechanism, float]:
     """The mechanism of a lift and its moving mass [kg]; the position 0 is that of the muscles at
     rest.
     """
     start = choice.design.extended.contraction * choice.length
     weight = requirement.load(0.0)
-    mass = requirement.mass or FORCE_MASS * weight / STANDARD_GRAVITY
-    if requirement.stiffness < 0.0:
+    stiffness = requirement.stiffness_at_muscle
+    mass = requirement.moving_mass or FORCE_MASS * weight / STANDARD_GRAVITY
+    if stiffness < 0.0:
         raise SolveError(
             "the scenario of a load that decreases over the stroke is not written; give a constant"
             " load."
         )
-    if requirement.stiffness:
-        return (
-            SpringLoad(mass, requirement.stiffness, preload=weight - requirement.stiffness * start),
-            mass,
-        )
-    return Isotonic(weight, mass) if requirement.force else HangingMass(mass), mass
+    if stiffness:
+        return SpringLoad(mass, stiffness, preload=weight - stiffness * start), mass
+    if mass * STANDARD_GRAVITY == weight:
+        return HangingMass(mass), mass
+    return Isotonic(weight, mass), mass
 
 
 def _lift(
     choice: MuscleChoice, muscle: Muscle
 ) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
     """Plant, input signals and run of a lift, and whether its moving mass is chosen."""
-    assert isinstance(choice.requirement, LiftRequirement)
+    assert isinstance(choice.requirement, PullRequirement)
     cycle = choice.conditions.cycle_time
     mechanism, mass = _load(choice, choice.requirement)
     fill, discharge = scenario_valves(choice)
@@ -342,7 +342,7 @@ def _lift(
             "position": start.contraction * choice.length,
         },
     }
-    return plant, inputs, run, mass != choice.requirement.mass
+    return plant, inputs, run, mass != choice.requirement.moving_mass
 
 
 def _joint(

@@ -4,11 +4,11 @@ import numpy as np
 
 from ...core import AirmuscleError, ParameterError, SolveError, check_whole
 from ...files.library import Entry, own_length
-from . import LiftRequirement, MuscleChoice, Requirement, SizingConditions
+from . import MuscleChoice, PullRequirement, Requirement, SizingConditions
 from .laws_of_product import with_volume
 from .lengths import JointSearch, LiftSearch
 from .static_muscle import at_length, least_sufficient, length_range
-from .working_range import static_muscle
+from .working_range import working_muscle
 
 LENGTHS = 49
 """Lengths that are tried for a law that depends on its length, before the shortest is refined
@@ -28,10 +28,10 @@ def choose(
     """
     check_whole("choose", "count", count, 1)
     entry, source = with_volume(entry)
-    kind = LiftSearch if isinstance(requirement, LiftRequirement) else JointSearch
+    kind = LiftSearch if isinstance(requirement, PullRequirement) else JointSearch
     search: Search = kind(requirement, conditions, count)  # type: ignore[arg-type]
     length = _shortest_length(entry, search, length_range(entry, conditions.max_length))
-    muscle = static_muscle(at_length(entry, length), conditions)
+    muscle = working_muscle(at_length(entry, length), conditions)
     design = search.design(muscle, length)
     if design is None:
         raise SolveError(f"{entry.name}: {search.shortfall(muscle, length)}.")
@@ -55,7 +55,7 @@ def _shortest_length(entry: Entry, search: Search, lengths: tuple[float, float])
     low, high = lengths
 
     def needed(length: float) -> float:
-        return search.required_length(static_muscle(at_length(entry, length), search.conditions))
+        return search.required_length(working_muscle(at_length(entry, length), search.conditions))
 
     def suffices(length: float) -> bool:
         try:
@@ -81,7 +81,7 @@ def _depends_on_length(entry: Entry, search: Search, lengths: tuple[float, float
         return False
     try:
         first, second = (
-            static_muscle(at_length(entry, length), search.conditions) for length in lengths
+            working_muscle(at_length(entry, length), search.conditions) for length in lengths
         )
     except ParameterError:  # the law is not defined for the least length
         return True

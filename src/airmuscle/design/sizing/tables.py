@@ -12,7 +12,7 @@ from ...files.library import list_valves, load
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars, isobar_figure
 from ...report.chapter import Plot, Table, TableColumn
-from . import LawOfProduct, LiftRequirement, MuscleChoice
+from . import LawOfProduct, MuscleChoice, PullRequirement
 from .scenario import MOVING, air_path
 
 SHORT_VALVES = 4
@@ -274,7 +274,7 @@ def _draw_motion(axes: Any, choice: MuscleChoice) -> None:
     safety factor.
     """
     names = ("extended", "contracted")
-    if isinstance(choice.requirement, LiftRequirement):
+    if isinstance(choice.requirement, PullRequirement):
         names = ("start", "end")
         displacement, load = choice.requirement.path
         contraction = 100 * (choice.design.extended.contraction + displacement / choice.length)

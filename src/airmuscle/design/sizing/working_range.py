@@ -10,7 +10,7 @@ from .requirement_and_choice import SizingConditions
 from .static_muscle import StaticMuscle
 
 
-def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
+def working_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
     """The static muscle of an entry. Raises ParameterError if it has no working range, with the
     reason.
     """

@@ -1,4 +1,4 @@
-"""`airmuscle size`: muscles of the catalogue for a lift or a joint."""
+"""`airmuscle size`: muscles of the catalogue for a lift, a joint or a gripper."""
 
 from ...core import check_writable
 from ...design.sizing.scenario import sizing_scenario
@@ -14,7 +14,7 @@ SCENARIO_FILE = "scenario.toml"
 def size(
     request: SizeRequest, execution: Execution, out: OptionalFolder = None, json: Json = False
 ) -> None:
-    """Size muscles of the catalogue for a lift or a joint.
+    """Size muscles of the catalogue for a lift, a joint or a gripper.
 
     \b
     For each muscle whose law and permitted values are known: the shortest length that reaches both
@@ -31,6 +31,7 @@ def size(
           length
       airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2" --supply "6 bar"
           --max-count 1
+      airmuscle size --grip "50 N" --opening "20 mm" --lever 2 --supply "6 bar" --out gripper
     """
     if out is not None:
         check_writable(out)

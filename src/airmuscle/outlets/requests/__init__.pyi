@@ -27,5 +27,4 @@ from .fit import problem_of_lengths as problem_of_lengths
 from .fit import read_braid as read_braid
 from .reading import Pairs as Pairs
 from .reading import read_pair as read_pair
-from .size import JOINT as JOINT
-from .size import LIFT as LIFT
+from .size import KINDS as KINDS

@@ -1,10 +1,11 @@
-"""Request of a sizing: a lift or a joint, and the conditions of operation."""
+"""Request of a sizing: a lift, a joint or a gripper, and the conditions of operation."""
 
 import contextlib
 from collections.abc import Callable, Mapping
 
 from ...core import UnitError, quantity
 from ...design.sizing import (
+    GripperRequirement,
     JointRequirement,
     LiftRequirement,
     SizingConditions,
@@ -16,9 +17,12 @@ from ...engine.processes import Workers
 from ...files.library import load_law
 from .declaration import RequestError, Where, many, option, optional, request
 
-LIFT = ("load", "stroke", "stiffness")
-JOINT = ("torque", "angle", "inertia")
-"""Fields of either requirement; the first two are needed."""
+KINDS = {
+    "lift": ("load", "stroke", "stiffness"),
+    "joint": ("torque", "angle", "inertia"),
+    "gripper": ("grip", "opening", "fingers"),
+}
+"""Fields of each kind of requirement; the first two are needed."""
 
 
 def read_load(text: str, where: str) -> dict[str, float]:
@@ -77,6 +81,31 @@ class SizeRequest:
         label="Moment of inertia",
         hint="optional: 0.05 kg m^2",
     )
+    grip: float | None = optional(
+        "Gripper: grip force of each finger, such as '50 N'.",
+        unit="N",
+        label="Grip force of each finger",
+        filled="50 N",
+    )
+    opening: float | None = optional(
+        "Gripper: travel of each finger, such as '20 mm'.",
+        unit="m",
+        label="Travel of each finger",
+        filled="20 mm",
+    )
+    fingers: int | None = optional(
+        "Gripper: number of fingers; 2 by default.",
+        label="Number of fingers",
+        hint="optional: 2",
+        bounds=(1, 20),
+    )
+    lever: float | None = optional(
+        "Lift or gripper: lever ratio, motion of the load or finger over that of the muscles.",
+        unit="1",
+        metavar="RATIO",
+        label="Lever ratio",
+        hint="optional: motion of the load over that of the muscles",
+    )
     safety: float = option(
         "Factor on the load that is held.",
         unit="1",
@@ -131,19 +160,37 @@ class SizeRequest:
     )
 
     def check(self, where: Where) -> None:
-        """Raise RequestError unless a lift or a joint is given."""
-        lift, joint = (
-            [getattr(self, name) is not None for name in names] for names in (LIFT, JOINT)
-        )
-        if (
-            any(lift) == any(joint)
-            or (any(lift) and not all(lift[:2]))
-            or (any(joint) and not all(joint[:2]))
-        ):
-            load, stroke, torque, angle = map(where, (*LIFT[:2], *JOINT[:2]))
-            raise RequestError(
-                f"give {load} and {stroke} for a lift, or {torque} and {angle} for a joint"
+        """Raise RequestError unless one kind of requirement is given."""
+        stated = {
+            kind: [name for name in names if getattr(self, name) is not None]
+            for kind, names in KINDS.items()
+        }
+        kinds = [kind for kind, names in stated.items() if names]
+        complete = [kind for kind in kinds if set(KINDS[kind][:2]) <= set(stated[kind])]
+        if len(kinds) != 1 or not complete:
+            alternatives = ", or ".join(
+                f"{where(names[0])} and {where(names[1])} for a {kind}"
+                for kind, names in KINDS.items()
             )
+            raise RequestError(f"give {alternatives}")
+        if kinds == ["joint"] and self.lever is not None:
+            raise RequestError(
+                f"{where('lever')} is of a lift or a gripper; the pulley of a joint is a result"
+            )
+
+    def _requirement(self) -> Requirement:
+        if self.load is not None and self.stroke is not None:
+            return LiftRequirement(
+                self.stroke,
+                stiffness=self.stiffness or 0.0,
+                lever=self.lever or 1.0,
+                **self.load,
+            )
+        if self.grip is not None and self.opening is not None:
+            return GripperRequirement(
+                self.opening, self.grip, float(self.fingers or 2), self.lever or 1.0
+            )
+        return JointRequirement(self.angle or 0.0, self.torque or 0.0, self.inertia or 0.0)
 
     def evaluate(
         self, progress: Callable[[float], None] | None = None, workers: Workers = 1
@@ -151,13 +198,7 @@ class SizeRequest:
         """The sizing, with at least one choice. Raises ParameterError, and SolveError with what is
         reachable.
         """
-        requirement: Requirement
-        if self.load is not None and self.stroke is not None:
-            requirement = LiftRequirement(self.stroke, stiffness=self.stiffness or 0.0, **self.load)
-        else:
-            requirement = JointRequirement(
-                self.angle or 0.0, self.torque or 0.0, self.inertia or 0.0
-            )
+        requirement = self._requirement()
         limits = {name: getattr(self, name) for name in ("max_length", "max_diameter")}
         limits = {name: limit for name, limit in limits.items() if limit is not None}
         low, high = (1, self.max_count) if self.count is None else (self.count, self.count)

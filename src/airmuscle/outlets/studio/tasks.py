@@ -22,7 +22,7 @@ from ...files.library.loading import build_entry, check_describes_law, load_law
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars
 from ...report.data import as_sheet, csv_text
-from ..requests import JOINT, LIFT, SizeRequest, build, form_fields, options_of
+from ..requests import KINDS, SizeRequest, build, form_fields, options_of
 from .law_sheet import identifier_of, law_sheet
 from .plant_sheet import sheet_of_plant, sheet_of_tables
 from .security import table_of
@@ -143,17 +143,16 @@ curve (chosen).
 
 
 def size_form() -> dict[str, Any]:
-    """The fields of the form of the page: those of a lift, of a joint, and of both."""
+    """The fields of the form of the page: those of each kind of requirement, and of all."""
     fields = {
         option["name"]: option
         for option in form_fields(SizeRequest)
         if option["name"] not in OMITTED
     }
-    common = [option for name, option in fields.items() if name not in (*LIFT, *JOINT)]
+    of_kinds = {name for names in KINDS.values() for name in names}
     return {
-        "lift": [fields[name] for name in LIFT],
-        "joint": [fields[name] for name in JOINT],
-        "all": common,
+        **{kind: [fields[name] for name in names] for kind, names in KINDS.items()},
+        "all": [option for name, option in fields.items() if name not in of_kinds],
     }
 
 
@@ -212,7 +211,7 @@ def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
     grid = np.linspace(*muscle.contraction_range, POINTS)
     points = [point._asdict() for point in (design.extended, design.contracted)]
     shown = None
-    if isinstance(choice.requirement, am.design.LiftRequirement):
+    if isinstance(choice.requirement, am.design.PullRequirement):
         displacement, load = choice.requirement.path
         contractions = design.extended.contraction + displacement / choice.length
         shown = {

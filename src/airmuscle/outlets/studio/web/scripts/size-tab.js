@@ -1,9 +1,11 @@
-/* Tab Size: muscles of the catalogue for a lift or a joint, ranked by the server, with the chart of one of them. */
+/* Tab Size: muscles of the catalogue for a lift, a joint or a gripper, ranked by the server, with the chart of one of them. */
 "use strict";
 
 (() => {
   const { element, chapterTable, complain, source, say, download, shortText, Chart } = airmuscle;
   const COLUMNS = ["muscle", "number", "nominal length [mm]", "pressure, short [bar]", "contraction, short [%]", "reserve [%]"];
+
+  const KINDS = ["lift", "joint", "gripper"];
 
   class SizeTab {
     constructor(host, stateChanged) {
@@ -17,14 +19,14 @@
         input.addEventListener("input", () => this.stateChanged());
         return element("div.quantity", {}, element("label", { for: `size-${name}` }, label), input, hint ? element("span.small.soft", { id: `size-${name}-hint` }, hint) : null);
       };
-      this.kinds = ["lift", "joint"].map((kind) => element("button", { type: "button", onclick: () => this.setKind(kind) }, kind === "lift" ? "Lift" : "Joint"));
-      this.groups = { lift: element("div.stack.tight", {}, ...form.lift.map(field)), joint: element("div.stack.tight", {}, ...form.joint.map(field)) };
+      this.kinds = KINDS.map((kind) => element("button", { type: "button", onclick: () => this.setKind(kind) }, kind[0].toUpperCase() + kind.slice(1)));
+      this.groups = Object.fromEntries(KINDS.map((kind) => [kind, element("div.stack.tight", {}, ...form[kind].map(field))]));
       const { label, offered } = form.all.find(({ name }) => name === "sort");
       this.sort = element("select", { id: "size-sort" }, ...offered.map(([value, text]) => element("option", { value }, text)));
       this.sort.addEventListener("change", () => this.stateChanged());
       this.message = element("p", { role: "alert" });
       this.go = element("button.primary", { type: "submit" }, "Find muscles");
-      this.form = element("form", { novalidate: true }, element("div.row", { role: "group", "aria-label": "Task" }, ...this.kinds), this.groups.lift, this.groups.joint, element("div.stack.tight", {}, ...form.all.filter(({ name }) => name !== "sort").map(field), element("div.quantity", {}, element("label", { for: "size-sort" }, label), this.sort)), element("div.row", {}, this.go), this.message);
+      this.form = element("form", { novalidate: true }, element("div.row", { role: "group", "aria-label": "Task" }, ...this.kinds), ...Object.values(this.groups), element("div.stack.tight", {}, ...form.all.filter(({ name }) => name !== "sort").map(field), element("div.quantity", {}, element("label", { for: "size-sort" }, label), this.sort)), element("div.row", {}, this.go), this.message);
       this.form.addEventListener("submit", (event) => { event.preventDefault(); this.find(); });
       this.summary = element("p");
       this.table = element("div");
@@ -50,7 +52,7 @@
       this.build(this.declared);
       for (const [name, value] of Object.entries(this.wanted.fields ?? {})) if (this.fields[name] && typeof value === "string") this.fields[name].value = value.slice(0, 60);
       if ([...this.sort.options].some(({ value }) => value === this.wanted.sort)) this.sort.value = this.wanted.sort;
-      this.setKind(this.wanted.kind === "joint" ? "joint" : "lift");
+      this.setKind(KINDS.includes(this.wanted.kind) ? this.wanted.kind : "lift");
       this.chosen = Number.isInteger(this.wanted.chosen) ? this.wanted.chosen : 0;
       this.pending = true;
       if (!source.embedded) return;
@@ -66,7 +68,7 @@
 
     setKind(kind) {
       this.kind = kind;
-      this.kinds.forEach((button, i) => button.setAttribute("aria-pressed", String(kind === ["lift", "joint"][i])));
+      this.kinds.forEach((button, i) => button.setAttribute("aria-pressed", String(kind === KINDS[i])));
       for (const [name, group] of Object.entries(this.groups)) group.hidden = name !== kind;
       this.stateChanged();
     }
