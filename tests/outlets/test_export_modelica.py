@@ -159,23 +159,26 @@ def test_the_command_writes_the_package(tmp_path):
     done = airmuscle(*arguments)
     assert done.exit_code == 0, done.output
     text = (tmp_path / "fill_discharge" / "package.mo").read_text(encoding="utf-8")
-    assert 'parameter Real p_mechanism_mass(unit = "kg") = 10.0 "p.mechanism.mass";' in text
+    declared = (
+        'p_mechanism_mass(unit = "kg", min = 0.0001, max = 100000.0) = 10.0 "p.mechanism.mass"'
+    )
+    assert f"parameter Real {declared};" in text
 
 
 def test_units_follow_the_grammar_of_modelica_and_a_fractional_power_has_none(tmp_path):
-    declared = {}
+    declared: dict[str, str] = {}
     for name in ("serres2009", "stop, lagging wall"):
         plant = plants.EXAMPLES[name]
         problem = Problem(plant, Schedule({}), 0.1, plant.state_at(pressure=1e5))
         write_modelica(problem, tmp_path, name="unit_test")
         text = (tmp_path / "unit_test" / "package.mo").read_text()
-        declared |= dict(re.findall(r"parameter Real (\w+)\((.*?)\) =", text))
-    assert declared["p_muscle_contractile_softening"] == 'unit = "N/(m.Pa)"'
+        for word, attributes in re.findall(r"parameter Real (\w+)\((.*?)\) =", text):
+            unit = re.search('unit = "(.*?)"', attributes)
+            declared[word] = unit[1] if unit else ""
+    assert declared["p_muscle_contractile_softening"] == "N/(m.Pa)"
     assert declared["p_muscle_stop_contact_stiffness"] == ""
     factors = r"[A-Za-z]+\d*(\.[A-Za-z]+\d*)*"
-    units = {
-        found[1] for found in map(re.compile('unit = "(.*)"').fullmatch, declared.values()) if found
-    }
+    units = {unit for unit in declared.values() if unit}
     assert len(units) > 8
     assert all(
         re.fullmatch(rf"(1|{factors})(/([A-Za-z]+\d*|\({factors}\)))?", unit) for unit in units

@@ -25,6 +25,7 @@ from .identifiers import (
     filled,
     make_identifiers,
 )
+from .parameter_bounds import ParameterBounds
 from .printed_system import ExportedSystem
 
 PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
@@ -86,6 +87,7 @@ def c_files(
             for kind, texts in names.items()
         },
         "defaults": c_values(system.defaults, 1),
+        **ParameterBounds.of(system.tunable).c_places(name),
         "nominal": c_values(system.compiled.nominal),
         "state_minimum": c_values(known.lower_bounds),
         "input_minimum": c_values(known.input_minimum, 1),

@@ -22,6 +22,7 @@ from ...engine.run.sampled_loop import (
     prepare_loop,
     snapped,
 )
+from .parameter_bounds import ParameterBounds
 from .printed_controller import PrintedController, check_control_law, print_controller
 from .printed_system import ExportedSystem
 
@@ -190,6 +191,7 @@ class ExportedLoop:
             "initial_memory": printed.initial_memory,
             "parameters": printed.paths,
             "parameter_defaults": printed.defaults,
+            **printed.bounds.data,
             "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
             "drivers": {"kinds": table.kinds, "settings": table.settings, "states": table.kept},
         }
@@ -286,6 +288,7 @@ class ExportedRun:
             "units": system.units,
             "parameters": tuple(system.paths),
             "defaults": system.defaults,
+            **ParameterBounds.of(system.tunable).data,
             "nominal": system.compiled.nominal,
             "input_minimum": known.input_minimum,
             "input_maximum": known.input_maximum,

@@ -191,7 +191,6 @@ def _instance(
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n"
         for column, low, high, text in limits
     )
-    bounds = [leaf.declared.bounds for leaf in system.tunable]
     scales = indicators.scales(initial, np.array(inputs), system.defaults, system.compiled.nominal)
     indices = {
         "rows": [row for row, _ in derivatives.places],
@@ -214,8 +213,6 @@ def _instance(
         "minimum": c_values(lowest),
         "start_states": c_values(initial),
         "start_inputs": c_values(inputs, 1),
-        "lowest": c_values([low for low, _ in bounds], 1),
-        "highest": c_values([high for _, high in bounds], 1),
         "scales": c_values(scales, 1),
         **{key: ", ".join(map(str, [*at, 0])) for key, at in indices.items()},
         "start_pressures": c_values([pressure for pressure, *_ in starts.values()], 1),

@@ -66,15 +66,12 @@ def controller_package(problem: Problem, fmi: int, name: str = "", title: str = 
     known = [v.reference for v in variables if v.causality == "input"]
     experiment = {"startTime": problem.start_time, "stopTime": float(prepared.instants[-1])}
     experiment["stepSize"] = loop.sample_time
-    bounds = [leaf.declared.bounds for leaf in printed.tunable]
     places = printed.places | {
         "provenance": block_comment(printed.provenance),
         "token": token,
         "period": c_number(loop.sample_time),
         "start": c_number(problem.start_time),
         "start_inputs": c_values(start, 1),
-        "lowest": c_values([low for low, _ in bounds], 1),
-        "highest": c_values([high for _, high in bounds], 1),
         "functions": printed.sample_in(CLanguage("double", f"{chosen}_")),
     }
     sources = {f"{chosen}_instance.h": filled("controller_instance.h", places, chosen)}

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import AirmuscleError, Array, ParameterError
+from ...core import AirmuscleError, Array, Leaf, ParameterError
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import instructions
@@ -121,6 +121,26 @@ def _model(
     return made
 
 
+def _of_permitted(
+    graph: _Graph, parameters: Sequence[Leaf], rows: Mapping[str, str]
+) -> dict[str, str]:
+    """Rows that are invalid, and NaN, where a parameter is beyond its bounds."""
+    permitted = ""
+    for i, leaf in enumerate(parameters):
+        value = graph.load("p", i)
+        low, high = leaf.declared.bounds
+        for operator, bound in (("GreaterOrEqual", low), ("LessOrEqual", high)):
+            within = graph.node(operator, value, graph.constant(float(bound)))
+            permitted = graph.node("And", permitted, within) if permitted else within
+    missing = graph.constant(float("nan"))
+    numbers = {
+        name: graph.node("Where", permitted, value, missing)
+        for name, value in rows.items()
+        if name != "valid"
+    }
+    return {**numbers, "valid": graph.node("And", rows["valid"], permitted)}
+
+
 NOTE = (
     "The functions are those of the model. The command is held and the length moves at its speed"
     " within a step; the flag says where the validity range of the muscle is left."
@@ -218,7 +238,7 @@ class OnnxStack(Stack):
 
     precision: Precision = Double()
     tunable: bool = False
-    """Whether the parameters are an input."""
+    """Whether the parameters are an input; beyond its bounds one makes its muscle invalid."""
     substeps: int = 1
     """Steps of the integrator in a step of the graph."""
 
@@ -251,6 +271,8 @@ class OnnxStack(Stack):
         observed = step.results["o"]
         valid = step.node("Greater", observed[2], step.constant(0.5))
         rows_out = {"tension": observed[0], "pressure": observed[1], "valid": valid}
+        if self.tunable:
+            rows_out = _of_permitted(step, model.parameters, rows_out)
         stepped = ("state", *driven, "dt")
         low, high = control_range(model.controls)
         facts = {

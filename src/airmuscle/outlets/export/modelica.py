@@ -1,11 +1,13 @@
 """Modelica package of a system: a block of equations."""
 
 import dataclasses
+import math
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ...core import Leaf
 from ...engine.compile.ir.emission import computed
 from ...engine.compile.ir.instructions import instructions
 from ...engine.compile.text.body import TextBody, TextLanguage
@@ -155,7 +157,7 @@ def _variables(program: ExportedRun) -> dict[str, dict[str, str]]:
         ],
         "o": [("output Real", name, "", "") for name in known.output_names],
         "p": [
-            ("parameter Real", f"p.{leaf.path}", "", f" = {float(leaf.value)!r}")
+            ("parameter Real", f"p.{leaf.path}", _bounds(leaf), f" = {float(leaf.value)!r}")
             for leaf in system.tunable
         ],
     }
@@ -174,6 +176,12 @@ def _variables(program: ExportedRun) -> dict[str, dict[str, str]]:
                 f'    {kind} {word}({attributes}){binding} "{_quoted(name)}";'
             )
     return declarations
+
+
+def _bounds(leaf: Leaf) -> str:
+    """The attributes of the bounds of a parameter that are finite, which tools check."""
+    names = zip(("min", "max"), leaf.declared.bounds, strict=True)
+    return ", ".join(f"{name} = {float(bound)!r}" for name, bound in names if math.isfinite(bound))
 
 
 def _quoted(text: str) -> str:

@@ -120,6 +120,13 @@ class MuscleActuator(ShortRepr):
         }
         for path in (path for path, value in config.items() if not math.isfinite(value)):
             raise ParameterError(f"MuscleActuator: {path} is {config[path]}; it must be finite.")
+        for leaf in leaves(self.plant):
+            low, high = leaf.declared.bounds
+            if leaf.path in config and not low <= config[leaf.path] <= high:
+                raise ParameterError(
+                    f"MuscleActuator: {leaf.path} is {config[leaf.path]:.6g}; allowed range:"
+                    f" {low:g} to {high:g} {leaf.declared.unit}."
+                )
         _load(self.plugin_name, self.library)
         if self.plugin_name not in {p.plugin_name for p in spec.plugins}:
             spec.activate_plugin(self.plugin_name)

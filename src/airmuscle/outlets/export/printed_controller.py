@@ -28,6 +28,7 @@ from .identifiers import (
     provenance,
     with_cmake,
 )
+from .parameter_bounds import ParameterBounds
 from .printed_system import find_leaf, make_labels
 
 SINGLE_TOLERANCE = 1e-4
@@ -68,6 +69,11 @@ class PrintedController:
         return np.array([leaf.value for leaf in self.tunable], dtype=float)
 
     @property
+    def bounds(self) -> ParameterBounds:
+        """The bounds of the tunable parameters."""
+        return ParameterBounds.of(self.tunable)
+
+    @property
     def places(self) -> dict[str, str]:
         """The places of a header: numbers of memories, measurements and so on, enumerations,
         provenance.
@@ -94,6 +100,7 @@ class PrintedController:
             "initial_memory": c_values(self.initial_memory, 1, self.number),
             "parameter_values": c_values(self.defaults, 1, self.number),
             "parameter_names": c_strings(self.paths),
+            **self.bounds.c_places(self.name, self.number),
         }
 
     def source_files(self) -> dict[str, str]:

@@ -50,6 +50,7 @@ from .identifiers import (
     template,
     with_cmake,
 )
+from .parameter_bounds import ParameterBounds
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
     (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),
@@ -94,6 +95,11 @@ class PrintedLaw:
     def defaults(self) -> list[float]:
         """The values of the parameters."""
         return [float(leaf.value) for leaf in self.known]
+
+    @property
+    def bounds(self) -> ParameterBounds:
+        """The bounds of the parameters."""
+        return ParameterBounds.of(self.known)
 
     def places(self, language: TargetLanguage) -> dict[str, str]:
         """The places of a template, with `prepare` and the function `evaluate(argument, argument,
@@ -197,6 +203,7 @@ class C99(Target):
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
         constants = {
+            **law.bounds.c_places(law.name),
             "defaults": c_values(law.defaults, 1),
             "parameter_names": c_strings(p.path for p in law.known),
         }
@@ -254,6 +261,7 @@ class JavaScript(Target):
         stated = {
             "parameters": [p.path for p in law.known],
             "defaults": law.defaults,
+            **_camel(law.bounds.data),
             "results": law.results,
         }
         constants = "".join(
@@ -304,6 +312,7 @@ class Octave(Target):
             ),
             "simulate": _simulation(program, "m", MatlabKernels(), steps),
             "loop_help": template("loop_help.m") if loop else "",
+            "check_parameters": template("check_parameters.m"),
             "columns": m_strings(["time", *program.columns]),
             "header": m_string(csv_header(program.columns).strip("\n")),
         }
@@ -317,6 +326,8 @@ class Octave(Target):
         places |= {
             "provenance": line_comment(law.provenance),
             "defaults": m_array(law.defaults),
+            **{key: m_array(values) for key, values in law.bounds.data.items()},
+            "check_parameters": template("check_parameters.m"),
             "names": m_strings(p.path for p in law.known),
             "functions": f"{DEFINITION}\n{places['functions']}",
         }

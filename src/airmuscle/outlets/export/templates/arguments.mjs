@@ -12,6 +12,13 @@ function checkRow(what, row, names) {
     if (!Number.isFinite(row[i])) throw new RangeError(`${what}: ${names[i]} is ${row[i]}; it must be a finite number.`);
 }
 
+/** Throws RangeError for a parameter beyond its bounds. */
+function checkBounds(what, row, names, lowest, highest) {
+  const wrong = names.findIndex((name, i) => !(row[i] >= lowest[i] && row[i] <= highest[i]));
+  if (wrong >= 0)
+    throw new RangeError(`${what}: ${names[wrong]} is ${row[wrong]}; allowed are ${lowest[wrong]} to ${highest[wrong]}.`);
+}
+
 /** All values in their order, or some by name; the others are those of `usual`. */
 function valuesOf(what, given, names, usual) {
   let row = given;

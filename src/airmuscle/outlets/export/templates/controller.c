@@ -9,8 +9,11 @@
 
 const @number@ model_initial_memory[MODEL_MEMORY + 1] = {@initial_memory@};
 @number@ model_parameters[MODEL_PARAMETERS + 1] = {@parameter_values@};
+const @number@ model_parameter_minimum[MODEL_PARAMETERS + 1] = {@parameter_minimum@};
+const @number@ model_parameter_maximum[MODEL_PARAMETERS + 1] = {@parameter_maximum@};
 const char *const model_parameter_names[MODEL_PARAMETERS + 1] = {@parameter_names@};
 
+@check_parameters@
 @functions@
 int model_step(@number@ *memory, const @number@ *measurement, const @number@ *setpoint, @number@ *command)
 {

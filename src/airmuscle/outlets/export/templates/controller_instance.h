@@ -27,8 +27,8 @@
 static const double model_initial_memory[MODEL_MEMORY + 1] = {@initial_memory@};
 static const double model_start_inputs[] = {@start_inputs@};
 static const double model_defaults[MODEL_PARAMETERS + 1] = {@parameter_values@};
-static const double model_lowest[MODEL_PARAMETERS + 1] = {@lowest@};
-static const double model_highest[MODEL_PARAMETERS + 1] = {@highest@};
+static const double model_parameter_minimum[MODEL_PARAMETERS + 1] = {@parameter_minimum@};
+static const double model_parameter_maximum[MODEL_PARAMETERS + 1] = {@parameter_maximum@};
 static const char *const model_parameter_names[MODEL_PARAMETERS + 1] = {@parameter_names@};
 
 static const double model_nominal[1] = {1.0};
@@ -100,8 +100,8 @@ static const char *model_refusal(unsigned v, double value, char *text, size_t si
   const unsigned k = v - MODEL_FIRST_PARAMETER;
   if (v < MODEL_FIRST_PARAMETER || v >= MODEL_END || !isfinite(value))
     return "a variable cannot be set, or its value is not finite";
-  snprintf(text, size, "%.300s is %.6g; allowed are %.6g to %.6g", model_parameter_names[k], value, model_lowest[k],
-           model_highest[k]);
+  snprintf(text, size, "%.300s is %.6g; allowed are %.6g to %.6g", model_parameter_names[k], value, model_parameter_minimum[k],
+           model_parameter_maximum[k]);
   return text;
 }
 
@@ -110,7 +110,7 @@ static int model_set(model_instance *m, unsigned v, double value)
   if (!isfinite(value)) return 1;
   if (v >= MODEL_FIRST_INPUT && v < MODEL_FIRST_COMMAND) m->input[v - MODEL_FIRST_INPUT] = value;
   else if (v >= MODEL_FIRST_PARAMETER && v < MODEL_END) {
-    if (value < model_lowest[v - MODEL_FIRST_PARAMETER] || value > model_highest[v - MODEL_FIRST_PARAMETER]) return 1;
+    if (value < model_parameter_minimum[v - MODEL_FIRST_PARAMETER] || value > model_parameter_maximum[v - MODEL_FIRST_PARAMETER]) return 1;
     m->p[v - MODEL_FIRST_PARAMETER] = value;
   } else return 1;
   return 0;

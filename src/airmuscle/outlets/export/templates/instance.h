@@ -39,8 +39,6 @@ static const char *const model_names[] = {@names@};
 static const double model_minimum[] = {@minimum@};
 static const double model_start_states[MODEL_STATES] = {@start_states@};
 static const double model_start_inputs[MODEL_INPUTS + 1] = {@start_inputs@};
-static const double model_lowest[MODEL_PARAMETERS + 1] = {@lowest@};
-static const double model_highest[MODEL_PARAMETERS + 1] = {@highest@};
 static const double model_scales[MODEL_INDICATORS + 1] = {@scales@};
 static const int model_rows[] = {@rows@};
 static const int model_columns[] = {@columns@};
@@ -185,7 +183,7 @@ static const char *model_refusal(unsigned v, double value, char *text, size_t si
   if (v < MODEL_FIRST_PARAMETER || v >= MODEL_TOLERANCE || !isfinite(value))
     return "a variable cannot be set, or its value is not finite, or a tolerance is not in 0 to 1";
   snprintf(text, size, "%.300s is %.6g; allowed are %.6g to %.6g %.40s", model_parameter_names[k], value,
-           model_lowest[k], model_highest[k], model_parameter_units[k]);
+           model_parameter_minimum[k], model_parameter_maximum[k], model_parameter_units[k]);
   return text;
 }
 
@@ -211,7 +209,7 @@ static int model_set(model_instance *m, unsigned v, double value)
     m->u[i] = limited;
     m->w[i] = 0.0;
   } else if (v >= MODEL_FIRST_PARAMETER && v < MODEL_TOLERANCE) {
-    if (value < model_lowest[v - MODEL_FIRST_PARAMETER] || value > model_highest[v - MODEL_FIRST_PARAMETER]) return 1;
+    if (value < model_parameter_minimum[v - MODEL_FIRST_PARAMETER] || value > model_parameter_maximum[v - MODEL_FIRST_PARAMETER]) return 1;
     m->p[v - MODEL_FIRST_PARAMETER] = value;
     m->unprepared = 1;
   } else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0 && value > 0.0 && value < 1.0) {

@@ -6,6 +6,8 @@ function [value, by_first, by_second] = @file@(@first@, @second@, parameters)
   if nargin < 3
     parameters = @defaults@;
   end
+  names = @names@;
+  check_parameters(parameters, names, @parameter_minimum@, @parameter_maximum@);
   c = prepare(parameters);
   shape = size(@first@ + @second@);
   @first@ = @first@ + zeros(shape);
@@ -21,4 +23,5 @@ function [value, by_first, by_second] = @file@(@first@, @second@, parameters)
   end
 end
 
+@check_parameters@
 @functions@

@@ -8,6 +8,7 @@ function r = simulate(model, changes)
     run = changed(run, changes);
   end
   s = begin_run(model, run);
+  check_parameters(run.controller_parameters, loop.parameters, loop.parameter_minimum, loop.parameter_maximum);
   rows = struct('times', run.times(:), 'next', 1, 'count', 0, 'near', loop.near, 'setpoint', run.setpoint, 'piece', 0);
   rows.start = run.start;
   rows.measured = zeros(size(loop.measured_at, 1), 1);

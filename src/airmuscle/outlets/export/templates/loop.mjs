@@ -10,7 +10,9 @@ export function simulate(changes = {}) {
   checkKeys("simulate", changes, Object.keys(usual));
   const given = {...usual, ...changes}, {setpoint, start, segments, times} = given;
   const numbers = valuesOf("parameters", given.parameters, parameters, defaults);
+  checkBounds("parameters", numbers, parameters, parameterMinimum, parameterMaximum);
   const ofController = valuesOf("controllerParameters", given.controllerParameters, loop.parameters, loop.parameterDefaults);
+  checkBounds("controllerParameters", ofController, loop.parameters, loop.parameterMinimum, loop.parameterMaximum);
   const initial = valuesOf("initial", given.initial, states, run.initial);
   checkSegments("segments", segments, inputs);
   checkSegments("setpoint", setpoint, loop.setpoints);

@@ -33,8 +33,10 @@ extern const char *const model_output_units[MODEL_OUTPUTS + 1];
 extern const char *const model_parameter_names[MODEL_PARAMETERS + 1];
 extern const char *const model_parameter_units[MODEL_PARAMETERS + 1];
 
-/* Values of the parameters, the scale of each state for absolute tolerances, limits of the states and of the inputs. */
+/* Values of the parameters and their bounds, the scale of each state for absolute tolerances, limits of the states and of the inputs. */
 extern const double model_defaults[MODEL_PARAMETERS + 1];
+extern const double model_parameter_minimum[MODEL_PARAMETERS + 1];
+extern const double model_parameter_maximum[MODEL_PARAMETERS + 1];
 extern const double model_nominal[MODEL_STATES];
 extern const double model_state_minimum[MODEL_STATES];
 extern const double model_input_minimum[MODEL_INPUTS + 1];
@@ -49,6 +51,9 @@ typedef struct {
   int moving, done, refusal;
 } model_solver;
 
+/* The index of the first of p[MODEL_PARAMETERS + 1] that is not finite or beyond its bounds; -1 if there is none. No
+   other function checks parameters: call it first for values that are not constants of your program. */
+int model_check_parameters(const double *p);
 /* c[MODEL_PRECOMPUTED + 1]: all that the functions need of the parameters p[MODEL_PARAMETERS + 1]; call it first. */
 void model_prepare(const double *p, double *c);
 /* f[MODEL_STATES]: rates of the states x under the inputs u. */

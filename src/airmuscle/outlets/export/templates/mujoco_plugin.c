@@ -85,6 +85,13 @@ static int init(const mjModel *m, mjData *d, int instance)
       free(made);
       return -1;
     }
+  i = model_check_parameters(made->p);
+  if (i >= 0) {
+    mju_warning("@name@: %s is %.6g; allowed are %.6g to %.6g", model_parameter_names[i], made->p[i],
+                model_parameter_minimum[i], model_parameter_maximum[i]);
+    free(made);
+    return -1;
+  }
   d->plugin_data[instance] = (uintptr_t)made;
   return 0;
 }

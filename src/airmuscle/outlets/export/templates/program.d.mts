@@ -38,6 +38,9 @@ export const outputs: readonly Output[];
 export const units: Record<State | Input | Output, string>;
 export const parameters: readonly Parameter[];
 export const defaults: readonly number[];
+/** Bounds of the parameters, which `simulate` checks; `prepare` takes any numbers. */
+export const parameterMinimum: readonly number[];
+export const parameterMaximum: readonly number[];
 export const nominal: readonly number[];
 export const inputMinimum: readonly number[];
 export const inputMaximum: readonly number[];

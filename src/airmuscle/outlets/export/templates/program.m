@@ -1,7 +1,7 @@
 function model = @file@()
 @provenance@%
 % model = @file@() describes the system: names, units and defaults of its arrays, and its functions
-%   c = model.prepare(p)          what the functions need of the parameters p
+%   c = model.prepare(p)          what the functions need of the parameters p, which only simulate checks
 %   f = model.rates(x, u, c)      rates of the states x under the inputs u
 %   o = model.outputs(x, u, c)    outputs
 %   r = model.simulate(changes)   a run: columns r.data with the names r.names, r.status (0: complete), r.steps
@@ -21,6 +21,7 @@ end
 end
 
 function s = begin_run(model, run)
+  check_parameters(run.parameters, model.parameters, model.parameter_minimum, model.parameter_maximum);
   s.c = prepare(run.parameters);
   s.n = numel(model.states);
   s.nominal = model.nominal;
@@ -73,6 +74,7 @@ function u = inputs_at(s, time)
   u = s.u + (time - s.start) * s.w;
 end
 
+@check_parameters@
 % Solver
 @solver@
 % Printed functions: J the distinct non-zeros of df/dx, A the LU factors of d I - J

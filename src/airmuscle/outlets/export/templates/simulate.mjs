@@ -1,13 +1,14 @@
 /**
  * Run from `initial` at `start` through `segments` {ends, values, slopes}; rows at `times`. Every argument is optional:
  * by default the exported run. `parameters` and `initial` are arrays, or objects of some values by name. Throws
- * RangeError for unknown names, wrong lengths and numbers that are not finite. Returns {columns: {time, ...}, status, time, steps, rejected}.
+ * RangeError for unknown names, wrong lengths, numbers that are not finite and parameters beyond their bounds. Returns {columns: {time, ...}, status, time, steps, rejected}.
  */
 export function simulate(changes = {}) {
   const usual = {parameters: defaults, ...run};
   checkKeys("simulate", changes, Object.keys(usual));
   const given = {...usual, ...changes}, {start, segments, times} = given;
   const numbers = valuesOf("parameters", given.parameters, parameters, defaults);
+  checkBounds("parameters", numbers, parameters, parameterMinimum, parameterMaximum);
   const initial = valuesOf("initial", given.initial, states, run.initial);
   checkSegments("segments", segments, inputs);
   const names = ["time", ...states, ...inputs, ...outputs];
