@@ -264,6 +264,7 @@ ARGUMENTS = {
     "rmse": "root mean square error",
     "rows_censored": "number of saturated rows",
     "rows_dropped": "number of omitted rows",
+    "findings": "what rules find in a fit and its data, or the examination that gives it",
     "remarks": "notes on a fit and scatter of its data, or the examination that gives them",
     "rubber": "relation between hoop stress and strain of the rubber",
     "rubber_integral": "path of integration of the hoop stress, axis or arc",

@@ -23,6 +23,7 @@ FACES = {
     "airmuscle.bench.diagnosis": "Diagnoses of data and fits",
     "airmuscle.bench.estimation": "Estimation",
     "airmuscle.bench.statics": "Static identification",
+    "airmuscle.bench.comparison": "Comparison of laws",
     "airmuscle.bench.dynamics": "Dynamic identification",
     "airmuscle.bench.hysteresis": "Identification of hysteresis and creep",
     "airmuscle.bench.prediction": "Prediction of further records",

@@ -46,13 +46,13 @@ from airmuscle.bench import (
     read,
 )
 from airmuscle.bench.campaign import fit_static_stage
-from airmuscle.bench.diagnosis.data_checks import check_data
+from airmuscle.bench.diagnosis import examine_recordings
 from airmuscle.bench.statics import blank_surface
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import Braid, CreepElements, NoFriction, TonduLopez2000
 from airmuscle.recording import Recording
 
-EXAMINED = "airmuscle.bench.statics.fit_points.check_data"
+EXAMINED = "airmuscle.bench.statics.fit_points.examine_recordings"
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
 
@@ -64,7 +64,7 @@ def read_all(folder: Path, tables: dict[str, Table]) -> tuple[Recording, ...]:
 
 
 def notes_of(folder: Path, tables: dict[str, Table]) -> str:
-    return "\n".join(check_data(read_all(folder, tables)).notes)
+    return "\n".join(examine_recordings(read_all(folder, tables)).notes)
 
 
 def fitted(folder: Path, tables: dict[str, Table]) -> Fit:
@@ -131,7 +131,7 @@ def group_notes(*parts: dict[str, float]) -> str:
         recordings.append(
             Recording(columns, f"{pressure / 1e3:.0f}.csv", {"resting_length": RESTING_LENGTH})
         )
-    return "\n".join(note for note in check_data(recordings).notes if "two groups" in note)
+    return "\n".join(note for note in examine_recordings(recordings).notes if "two groups" in note)
 
 
 def test_two_muscles_in_files_without_a_column_are_named():
@@ -209,7 +209,7 @@ def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):
     assert [run.constants["specimen"] for run in found] == ["A", "B"]
     assert [run.origin for run in found] == ["both.csv, specimen A", "both.csv, specimen B"]
     assert found[1]["force"].max() > 1.3 * found[0]["force"].max()
-    assert check_data(found).notes == (), "two specimens do not contradict each other"
+    assert examine_recordings(found).notes == (), "two specimens do not contradict each other"
 
 
 def test_two_muscles_in_two_files_of_one_specimen_contradict_each_other(tmp_path):
@@ -307,7 +307,7 @@ def test_the_data_of_a_fit_are_examined_when_its_notes_are_first_read(tmp_path, 
 
 @pytest.mark.parametrize(("column", "code"), [(FORCE, -999.0), (FORCE, 9999.0), (PRESSURE, 9999.0)])
 def test_a_code_for_missing_values_is_named_and_nothing_else_is_blamed(tmp_path, column, code):
-    (note,) = check_data(read_all(tmp_path, with_code(sweeps(), column, code))).notes
+    (note,) = examine_recordings(read_all(tmp_path, with_code(sweeps(), column, code))).notes
     assert f"is {code:g} in 72 rows" in note
     assert "a code for a missing value" in note
     assert f"use missing=DropMissing(codes=({code},)) of ColumnMapping" in note

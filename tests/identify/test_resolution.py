@@ -12,7 +12,7 @@ import pytest
 from airmuscle.bench import inspection
 from airmuscle.bench.diagnosis import contradictions, data_checks, matched_rows
 from airmuscle.bench.dynamics import regulator_fit
-from airmuscle.bench.estimation import LevelSplit, cross_validation, levels_of, problem, weighting
+from airmuscle.bench.estimation import LevelSplit, cross_validation, levels_of, weighting
 from airmuscle.bench.hysteresis import find_holds, find_loops, loop_data
 from airmuscle.bench.joint import episode_inspection
 from airmuscle.recording import Recording
@@ -194,7 +194,7 @@ def repeated_rows(jitter):
     recordings = [isometric("none"), isometric(jitter)]
     return [
         (r.recording, r.rows)
-        for r in contradictions.find_repeated_rows(recordings, problem.POINT_COLUMNS)
+        for r in contradictions.find_repeated_rows(recordings, inspection.POINT_COLUMNS)
     ]
 
 

@@ -22,8 +22,10 @@ from .comparison import LawSelection as LawSelection
 from .comparison import compare as compare
 from .comparison import select_for_both as select_for_both
 from .diagnosis import DataUse as DataUse
+from .diagnosis import Diagnosis as Diagnosis
 from .diagnosis import LevelRecord as LevelRecord
 from .diagnosis import Support as Support
+from .diagnosis import diagnose as diagnose
 from .diagnosis import level_record as level_record
 from .diagnosis import read as read
 from .diagnosis import support_of as support_of

@@ -19,7 +19,7 @@ from ..comparison import (
     odd_specimen_notes,
     ranked_specimen_errors,
 )
-from ..diagnosis import check_data, support_of
+from ..diagnosis import examine_recordings, support_of
 from ..prediction import creep_force, friction_along
 from ..statics import FORCE_MARGIN, Fit, FitPoints, refit
 from .record import CampaignRecord, RecordKind, slow_rows, static_levels
@@ -292,7 +292,7 @@ def fit_static_stage(
         )
     progress(1.0)
     odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
-    notes = (*check_data([record.recording for record in used]).notes, *odd)
+    notes = (*examine_recordings([record.recording for record in used]).notes, *odd)
     return StaticStage(comparison, points, bands, notes, isometric_band)
 
 

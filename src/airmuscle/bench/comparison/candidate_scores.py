@@ -212,7 +212,7 @@ def score_candidates(
     with process_pool(workers, one_thread_each=True) as pool:
         if pool is not None:
             for split in splits:
-                _ = split.points.checks  # before they are sent
+                _ = split.points.findings  # before they are sent
         distribution = DistributedCalls(pool, _score_tasks, (tuple(splits), loss))
         for indices in (early, late):
             lowest = [

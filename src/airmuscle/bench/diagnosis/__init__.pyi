@@ -6,18 +6,22 @@ from .branch_residuals import find_delay as find_delay
 from .checked_reading import check_bench as check_bench
 from .checked_reading import complete_bench as complete_bench
 from .checked_reading import read as read
-from .data_checks import Scatter as Scatter
 from .level_records import LevelRecord as LevelRecord
 from .level_records import level_record as level_record
 from .level_records import level_tables as level_tables
 from .misfit import MAX_ACCEPTED as MAX_ACCEPTED
 from .misfit import LawMisfit as LawMisfit
 from .misfit import misfit_warning as misfit_warning
+from .recording_rules import RECORDING_RULES as RECORDING_RULES
+from .recording_rules import Findings as Findings
+from .recording_rules import diagnose as diagnose
+from .rules import Diagnosis as Diagnosis
+from .rules import DiagnosisRule as DiagnosisRule
+from .rules import Subject as Subject
+from .scatter import Scatter as Scatter
 from .support import DataUse as DataUse
 from .support import Support as Support
 from .support import support_of as support_of
-from .suspicious_values import find_suspicious as find_suspicious
-from .suspicious_values import warn_of_suspicious_values as warn_of_suspicious_values
 
 # isort: split
 # For the other rooms, not in __all__
@@ -27,8 +31,11 @@ from .contractions import MAX_CONTRACTION as MAX_CONTRACTION
 from .contradictions import RepeatedRows as RepeatedRows
 from .contradictions import find_repeated_rows as find_repeated_rows
 from .data_checks import HELD as HELD
-from .data_checks import Remarks as Remarks
-from .data_checks import check_data as check_data
-from .data_checks import force_noise as force_noise
 from .data_checks import level_text as level_text
 from .matched_rows import match_rows as match_rows
+from .recording_rules import VALUE_RULES as VALUE_RULES
+from .recording_rules import bench_data as bench_data
+from .recording_rules import examine_recordings as examine_recordings
+from .recording_rules import warn_of_suspicious_values as warn_of_suspicious_values
+from .rules import apply_rules as apply_rules
+from .scatter import force_noise as force_noise

@@ -16,10 +16,12 @@ from .exponential_surface import SurfaceProblem as SurfaceProblem
 from .exponential_surface import conditioning as conditioning
 from .exponential_surface import fit_linearised as fit_linearised
 from .exponential_surface import fit_nonlinear as fit_nonlinear
+from .fit_points import POINT_RULES as POINT_RULES
 from .fit_points import FitPoints as FitPoints
 from .fit_problem import count_levels as count_levels
 from .fit_problem import fitted_quantity_of as fitted_quantity_of
 from .fit_problem import make_problem as make_problem
+from .fit_rules import FIT_RULES as FIT_RULES
 from .intervals import Band as Band
 from .intervals import ProfileLikelihood as ProfileLikelihood
 from .intervals import confidence_band as confidence_band

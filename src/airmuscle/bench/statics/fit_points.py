@@ -11,7 +11,16 @@ import numpy.typing as npt
 from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording, resting_length_of
-from ..diagnosis import Remarks, RepeatedRows, check_data, find_repeated_rows
+from ..diagnosis import (
+    Diagnosis,
+    DiagnosisRule,
+    Findings,
+    RepeatedRows,
+    Subject,
+    apply_rules,
+    examine_recordings,
+    find_repeated_rows,
+)
 from ..estimation import Censoring, Runs, force_limits, sensor_deviations, specimen_name
 from ..inspection import (
     ISOBARIC,
@@ -134,9 +143,16 @@ class FitPoints:
         return places
 
     @functools.cached_property
-    def checks(self) -> Remarks:
-        """Contradictions, suspicious values and scatter of the recordings."""
-        return check_data(self.recordings)
+    def findings(self) -> Findings:
+        """Contradictions, suspicious values and scatter of the recordings. Raises ColumnError for
+        those of no muscle.
+        """
+        return examine_recordings(self.recordings)
+
+    @property
+    def diagnoses(self) -> tuple[Diagnosis, ...]:
+        """The findings of the rules of recordings and of points."""
+        return (*self.findings.diagnoses, *apply_rules(POINT_RULES, self))
 
     def deviations(self, quantity: str) -> Array | None:
         """The standard deviations of the sensors by recording; None unless they differ."""
@@ -273,3 +289,20 @@ def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.Arr
         raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
     weights = 1.0 / deviations
     return np.asarray(weights / np.sqrt(np.mean(weights**2)))
+
+
+POINT_RULES = (
+    DiagnosisRule(
+        "rows that another recording has already",
+        Subject.POINTS,
+        lambda points: map(str, points.repeated),
+        "give each row once",
+    ),
+    DiagnosisRule(
+        "slack rows after a jump of the pressure",
+        Subject.POINTS,
+        lambda points: find_lagging_rows(points.recordings).notes(),
+        "record at a slower change of the pressure",
+    ),
+)
+"""The rules of the points of a fit."""

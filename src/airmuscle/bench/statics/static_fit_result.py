@@ -15,7 +15,7 @@ from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.shown import BRIEF_ROWS, estimate_table
-from ..diagnosis import LawMisfit, Remarks, Scatter
+from ..diagnosis import Diagnosis, Findings, LawMisfit, Scatter
 from ..estimation import CorrelationIndex, Estimate, Loss, ParameterCovariance
 from ..reported import Reported
 from .fit_problem import FORCE, FitProblem, FittedQuantity, evaluate
@@ -67,9 +67,9 @@ class Fit(Reported):
     problem: FitProblem
     """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
-    remarks: "Remarks | Callable[[Fit], Remarks]"
-    """The remarks, or the examination of the data that gives them, which is made when they are
-    first read.
+    findings: "Findings | Callable[[Fit], Findings]"
+    """What the rules find in the fit and its data, or the examination that gives it, which is made
+    when a finding is first asked for.
     """
     effects: SpecimenEffects | None = None
     """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its
@@ -77,32 +77,37 @@ class Fit(Reported):
     """
 
     @functools.cached_property
-    def _remarks(self) -> Remarks:
-        return self.remarks if isinstance(self.remarks, Remarks) else self.remarks(self)
+    def _findings(self) -> Findings:
+        return self.findings if isinstance(self.findings, Findings) else self.findings(self)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "remarks": self._remarks}
+        return {**self.__dict__, "findings": self._findings}
+
+    @property
+    def diagnoses(self) -> tuple[Diagnosis, ...]:
+        """The findings of the rules of recordings, points and fits."""
+        return self._findings.diagnoses
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks on the fit and its data, as sentences; the data are examined when they are first
+        """The texts of the diagnoses, as sentences; the data are examined when they are first
         read.
         """
-        return self._remarks.notes
+        return self._findings.notes
 
     @property
     def misfit(self) -> LawMisfit | None:
         """That the law does not follow the data, with the causes; None if it does. Its text is
         among the notes.
         """
-        return self._remarks.misfit
+        return self._findings.misfit
 
     @property
     def scatter(self) -> Scatter | None:
         """Noise and repeatability of the measured force; None for laws that give contraction or
         pressure.
         """
-        return self._remarks.scatter if self.fitted_quantity == FORCE else None
+        return self._findings.scatter if self.fitted_quantity == FORCE else None
 
     @property
     def degrees_of_freedom(self) -> int:
