@@ -101,7 +101,7 @@ def test_a_kept_recorder_gives_what_a_new_one_gives(monkeypatch):
     start = plant.state_at(pressure=1e5)
     bound = []
     bind = record.bind
-    monkeypatch.setattr(record, "bind", lambda *given: bound.append(1) or bind(*given))
+    monkeypatch.setattr(record, "bind", lambda **given: bound.append(1) or bind(**given))
     long = simulate(plant, signal, duration=1.0, initial_state=start)
     simulate(plant, signal, duration=0.2, initial_state=start, output_times=0.1)
     again = simulate(plant, signal, duration=1.0, initial_state=start)

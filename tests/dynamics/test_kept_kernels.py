@@ -9,8 +9,11 @@ import concurrent.futures
 import copy
 import ctypes
 import dataclasses
+import inspect
 import math
 import os
+import pathlib
+import re
 import sys
 import warnings
 
@@ -32,6 +35,7 @@ from airmuscle.errors import AirmuscleWarning
 
 CASE = lifting_run(1)
 READY = compile_system(CASE.system)
+SOURCE = pathlib.Path(kernels.__file__).parents[3]
 kept_found = kept.load
 ROWS = 7
 
@@ -41,19 +45,19 @@ def arguments(rows=ROWS):
     seeds = np.random.default_rng(1)
     states = CASE.vector * seeds.uniform(0.9, 1.1, (rows, CASE.vector.size))
     inputs = seeds.uniform(0.0, 1.0, (rows, len(CASE.system.inputs)))
-    return (
-        READY.address["outputs"],
-        READY.precomputed,
-        states,
-        inputs,
-        np.zeros((rows, READY.sizes.outputs)),
-    )
+    return {
+        "function": READY.address["outputs"],
+        "c": READY.precomputed,
+        "states": states,
+        "inputs": inputs,
+        "results": np.zeros((rows, READY.sizes.outputs)),
+    }
 
 
 def expected():
     given = arguments()
-    Kernel("evaluate").numba(*given)
-    return given[-1]
+    Kernel("evaluate").numba(**given)
+    return given["results"]
 
 
 @pytest.fixture
@@ -102,11 +106,33 @@ def test_a_run_is_bit_for_bit_that_of_numba(method, monkeypatch):
     assert all(np.array_equal(by_code[name], by_numba[name]) for name in by_numba.columns)
 
 
+def all_kernels():
+    """Every kernel that a file of the program names."""
+    made = re.compile(r'Kernel\("(\w+)"(?:, "(\w+)")?\)')
+    texts = (path.read_text(encoding="utf-8") for path in SOURCE.rglob("*.py"))
+    return [Kernel(name, module) for text in texts for name, module in made.findall(text)]
+
+
+def test_callers_name_the_arguments_that_the_function_of_a_kernel_declares():
+    found = all_kernels()
+    assert len(found) >= 19
+    for kernel in found:
+        declared = inspect.signature(kernel.numba.py_func).parameters
+        assert list(kernel.places) == list(declared), kernel.name
+
+
+def test_an_argument_that_a_kernel_lacks_or_does_not_know_is_an_error():
+    given = arguments()
+    given["result"] = given.pop("results")
+    with pytest.raises(TypeError, match=r"missing \['results'\], unknown \['result'\]"):
+        Kernel("evaluate").bind(**given)
+
+
 def test_made_once_it_is_found_again(empty, without_numba, capsys):
     for words in ("compiling evaluate, once on this machine (some seconds) ...\n", ""):
         given = arguments()
-        Kernel("evaluate")(*given)
-        assert np.array_equal(given[-1], expected())
+        Kernel("evaluate")(**given)
+        assert np.array_equal(given["results"], expected())
         assert capsys.readouterr().err == words
         assert len(files(empty)) == 1
 
@@ -121,68 +147,72 @@ def test_made_once_it_is_found_again(empty, without_numba, capsys):
     ids=["every second", "by columns", "read-only"],
 )
 def test_an_array_that_is_not_contiguous_and_writeable_is_an_error(other):
-    given = list(arguments())
-    given[2] = other(given[2])
+    given = arguments()
+    given["states"] = other(given["states"])
     with pytest.raises((TypeError, ValueError, BufferError)):
-        Kernel("evaluate")(*given)
+        Kernel("evaluate")(**given)
 
 
 def test_an_input_may_be_read_only_but_must_be_contiguous_and_of_its_kind(without_numba):
-    bound = Kernel("evaluate").bind(*arguments())
+    bound = Kernel("evaluate").bind(**arguments())
     second = arguments()
-    for index in (1, 2, 3):
-        given = second[index].copy()
+    for name in ("c", "states", "inputs"):
+        given = second[name].copy()
         given.setflags(write=False)
-        bound.replace_input(index, given)
-    bound.replace(4, second[4])
+        bound.replace_input(name, given)
+    bound.replace("results", second["results"])
     bound()
-    assert np.array_equal(second[-1], expected())
-    for wrong in (np.asfortranarray(second[2]), second[2].astype(np.float32), second[1].copy()):
+    assert np.array_equal(second["results"], expected())
+    for wrong in (
+        np.asfortranarray(second["states"]),
+        second["states"].astype(np.float32),
+        second["c"].copy(),
+    ):
         wrong.setflags(write=False)
-        with pytest.raises(TypeError, match="argument 2"):
-            bound.replace_input(2, wrong)
+        with pytest.raises(TypeError, match="argument states"):
+            bound.replace_input("states", wrong)
 
 
 def test_replaced_arguments_are_those_that_count(without_numba):
-    bound = Kernel("evaluate").bind(*arguments())
+    bound = Kernel("evaluate").bind(**arguments())
     second = arguments()
     bound()
-    for index in (1, 2, 3, 4):
-        bound.replace(index, second[index])
+    for name in ("c", "states", "inputs", "results"):
+        bound.replace(name, second[name])
     bound()
-    assert np.array_equal(second[-1], expected())
+    assert np.array_equal(second["results"], expected())
 
 
 def test_a_view_of_a_live_array_is_pointed_at(without_numba):
     given = arguments()
-    bound = Kernel("evaluate").bind(*given)
-    width = given[2].shape[1]
-    bound.point(
-        2,
-        (given[2].ctypes.data + 8 * width * 2, given[3].ctypes.data + 8 * given[3].shape[1] * 2),
-        3,
-    )
+    bound = Kernel("evaluate").bind(**given)
+    addresses = {
+        name: given[name].ctypes.data + 2 * 8 * given[name].shape[1]
+        for name in ("states", "inputs")
+    }
+    bound.point(addresses, 3)
     bound()
-    assert np.array_equal(given[-1][:3], expected()[2:5])
-    assert not given[-1][3:].any()
+    assert np.array_equal(given["results"][:3], expected()[2:5])
+    assert not given["results"][3:].any()
 
 
 def test_a_view_of_a_live_array_is_pointed_at_by_numba_too(monkeypatch):
     monkeypatch.setattr(Kernel, "entry", lambda self, kinds: None)
     given = arguments()
-    bound = Kernel("evaluate").bind(*given)
-    items = [8 * table.shape[1] for table in given[2:5]]
-    bound.point(
-        2, [table.ctypes.data + 2 * size for table, size in zip(given[2:5], items, strict=True)], 3
-    )
+    bound = Kernel("evaluate").bind(**given)
+    addresses = {
+        name: given[name].ctypes.data + 2 * 8 * given[name].shape[1]
+        for name in ("states", "inputs", "results")
+    }
+    bound.point(addresses, 3)
     bound()
-    assert np.array_equal(given[-1][2:5], expected()[2:5])
-    assert not given[-1][:2].any()
-    assert not given[-1][5:].any()
+    assert np.array_equal(given["results"][2:5], expected()[2:5])
+    assert not given["results"][:2].any()
+    assert not given["results"][5:].any()
 
 
 def test_no_row_is_no_work(without_numba):
-    assert Kernel("evaluate")(*arguments(0)) == 0
+    assert Kernel("evaluate")(**arguments(0)) == 0
 
 
 @pytest.mark.parametrize(
@@ -197,15 +227,15 @@ def test_no_row_is_no_work(without_numba):
     ids=["cut short", "without code", "empty", "one bit", "of other sources"],
 )
 def test_a_spoilt_file_is_made_anew(spoil, empty, without_numba, capsys):
-    Kernel("evaluate")(*arguments())
+    Kernel("evaluate")(**arguments())
     (file,) = files(empty)
     file.write_bytes(spoil(file.read_bytes()))
     capsys.readouterr()
     given = arguments()
-    Kernel("evaluate")(*given)
+    Kernel("evaluate")(**given)
     assert "compiling evaluate" in capsys.readouterr().err
-    assert np.array_equal(given[-1], expected())
-    Kernel("evaluate")(*arguments())
+    assert np.array_equal(given["results"], expected())
+    Kernel("evaluate")(**arguments())
     assert capsys.readouterr().err == ""
 
 
@@ -250,8 +280,8 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(
         assert kept.load("evaluate", ("q",)) is None
     assert len(caught) == 1
     given = arguments()
-    Kernel("evaluate")(*given)
-    assert np.array_equal(given[-1], expected())
+    Kernel("evaluate")(**given)
+    assert np.array_equal(given["results"], expected())
     kept.warn_not_stored.cache_clear()
 
 
@@ -342,8 +372,8 @@ def test_threads_that_ask_at_once_get_one_machine_code(empty, without_numba, mon
 
     def found(_):
         given = arguments()
-        kernel(*given)
-        return given[-1]
+        kernel(**given)
+        return given["results"]
 
     with concurrent.futures.ThreadPoolExecutor(8) as pool:
         assert all(np.array_equal(results, right) for results in pool.map(found, range(64)))

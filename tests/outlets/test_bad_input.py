@@ -637,7 +637,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(
         encoding="utf-8",
     )
     bind = fixed_step.bind
-    monkeypatch.setattr(fixed_step, "bind", lambda *arguments: Interrupted(bind(*arguments)))
+    monkeypatch.setattr(fixed_step, "bind", lambda **arguments: Interrupted(bind(**arguments)))
     monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 100)
     result = airmuscle("simulate", tmp_path / "run.toml", "--out", tmp_path / "run")
     assert result.exit_code == 130

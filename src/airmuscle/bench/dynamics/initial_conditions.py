@@ -228,9 +228,19 @@ def solve_initial_state(
     values = np.empty(n)
     by_state = np.empty((n, n))
     by_leaf = np.empty((n, leaves.size))
-    workspace = np.zeros((n, n)), np.zeros(n)
     status = Status(
-        newton(function.address, leaves, target, nominal, x, values, by_state, by_leaf, *workspace)
+        newton(
+            function=function.address,
+            p=leaves,
+            target=target,
+            sizes=nominal,
+            x=x,
+            values=values,
+            by_x=by_state,
+            by_p=by_leaf,
+            a=np.zeros((n, n)),
+            b=np.zeros(n),
+        )
     )
     if status != Status.DONE:
         conditions = [

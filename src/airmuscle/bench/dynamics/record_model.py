@@ -167,7 +167,13 @@ class RecordModel:
             bound.rebind(self.method.binding(system))
         rows, steps = self._integrate(bound, system, full_state, grid, max_steps)
         outputs = np.empty((grid.times.size, system.sizes.outputs))
-        evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, outputs)
+        evaluate(
+            function=system.address["outputs"],
+            c=system.precomputed,
+            states=rows,
+            inputs=grid.inputs,
+            results=outputs,
+        )
         self._idle.append(
             bound
         )  # only now: another thread that takes it overwrites the precomputed values

@@ -4,7 +4,7 @@ bounds.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -258,17 +258,18 @@ def least_squares(
     )
     w = np.zeros(size)
     if len(matrix):
-        spare: list[Any] = [np.zeros(size) for _ in range(3)]
         status = _shortest(
-            np.ascontiguousarray(matrix),
-            lower,
-            upper,
-            np.array(TOLERANCES),
-            np.zeros(len(matrix)),
-            np.zeros(size, dtype=np.int64),
-            np.zeros((size, size)),
-            *spare,
-            w,
+            m=np.ascontiguousarray(matrix),
+            lower=lower,
+            upper=upper,
+            tolerances=np.array(TOLERANCES),
+            active=np.zeros(len(matrix)),
+            order=np.zeros(size, dtype=np.int64),
+            factor=np.zeros((size, size)),
+            multipliers=np.zeros(size),
+            change=np.zeros(size),
+            rest=np.zeros(size),
+            w=w,
         )
         if status != Status.DONE:
             return None

@@ -212,7 +212,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
         """The status of the program and the memory after a sample, of scaled deviations."""
         if not self._idle:
             arrays = self.arrays()
-            self._idle.append((arrays, _sample.bind(*arrays.values())))
+            self._idle.append((arrays, _sample.bind(**arrays)))
         arrays, run = self._idle.pop()
         for name, value in {
             "y": y,
@@ -263,7 +263,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
 
     @functools.cached_property
     def constants(self) -> dict[str, Array]:
-        """The constant arrays of `predictive_sample`, in the order of its arguments.
+        """The constant arrays of `predictive_sample`, by the names of its arguments.
 
         The program is the shortest vector w = L^T z + L^-1 f e with limits of its rows, H = L L^T.
         """
@@ -287,41 +287,23 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
         scale = 1.0 / length[used]
         matrix = matrix[used] * scale[:, None]
         held = np.linalg.inv(factor.T)[:count]
-        arrays = (
-            model.output_matrix,
-            model.gain,
-            model.transition,
-            model.input_matrix,
-            rest,
-            matrix,
-            of_input[used],
-            scale,
-            np.maximum(low[used] * scale, -UNLIMITED),
-            np.minimum(high[used] * scale, UNLIMITED),
-            shift[used] * scale[:, None] + matrix @ free,
-            problem.moves @ held,
-            np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free,
-            np.array(TOLERANCES),
-        )
-        names = (
-            "by_output",
-            "gain",
-            "transition",
-            "by_input",
-            "rest",
-            "m",
-            "of_input",
-            "scale",
-            "fixed_low",
-            "fixed_high",
-            "by_point",
-            "plan_by_w",
-            "plan_by_point",
-            "tolerances",
-        )
-        return {
-            name: np.ascontiguousarray(array) for name, array in zip(names, arrays, strict=True)
+        arrays = {
+            "by_output": model.output_matrix,
+            "gain": model.gain,
+            "transition": model.transition,
+            "by_input": model.input_matrix,
+            "rest": rest,
+            "m": matrix,
+            "of_input": of_input[used],
+            "scale": scale,
+            "fixed_low": np.maximum(low[used] * scale, -UNLIMITED),
+            "fixed_high": np.minimum(high[used] * scale, UNLIMITED),
+            "by_point": shift[used] * scale[:, None] + matrix @ free,
+            "plan_by_w": problem.moves @ held,
+            "plan_by_point": np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free,
+            "tolerances": np.array(TOLERANCES),
         }
+        return {name: np.ascontiguousarray(array) for name, array in arrays.items()}
 
     def _limits(self, error: Array, at_rest: Array) -> tuple[Array, Array, Array, Array, Array]:
         """All rows (r, z), what the point adds to their limits (r, N), the limits (r,), and their

@@ -121,11 +121,11 @@ def states_and_outputs(
     """
     values = np.empty((len(states), outputs))
     evaluate(
-        functions.outputs,
-        functions.constants,
-        np.ascontiguousarray(states),
-        np.ascontiguousarray(inputs),
-        values,
+        function=functions.outputs,
+        c=functions.constants,
+        states=np.ascontiguousarray(states),
+        inputs=np.ascontiguousarray(inputs),
+        results=values,
     )
     return np.hstack([states[:, :count], values])
 

@@ -19,6 +19,8 @@ from .compiled_law import compiled_sample, parameters_of
 from .integrators import INTERRUPT_CHECK_STEPS, MAX_STEPS, Integrator, RawSolution
 from .sampled_loop import CalledController, DriverTable, SampledLoop, are_called, max_capacity
 
+BUFFERS = ("new_ends", "new_values", "new_slopes", "times", "rows")
+"""The arguments of the kernel that take the segments of all inputs, and the rows of the run."""
 FIRST_SEGMENTS = 4096
 """Segments and rows that the buffers of driven inputs hold at first."""
 _PAUSED = Status.PAUSED.value
@@ -40,7 +42,6 @@ class CompiledLoop:
             (controller if isinstance(controller, ControlLaw) else None),
         )
         self._function = compiled_sample(self.law) if self.law is not None else None
-        self.sample_address = 0 if self._function is None else self._function.address
         self.parameters = parameters_of(self.law) if self.law is not None else np.zeros(1)
         self.called_drivers = bool(loop.drivers) and are_called(prepared)
         pieces = int(np.diff(prepared.first_segments).max())
@@ -56,18 +57,23 @@ class CompiledLoop:
             [prepared.ranges[name] for name in controller.inputs], dtype=float
         ).reshape(-1, 2)
         self.edges = edges = prepared.instants
-        self.measuring = compiled.address["outputs"], measured_at
-        self.commanding = (
-            np.array([loop.sample_time]),
-            *map(np.ascontiguousarray, limits.T),
-            commanded_at,
-        )
-        self.intervals = (
-            edges,
-            np.spacing(np.abs(edges)),
-            0 if prepared.sampled else 1,
-            prepared.setpoint_values,
-        )
+        self.arguments: dict[str, Any] = {
+            "outputs": compiled.address["outputs"],
+            "measured_at": measured_at,
+            "sample": 0 if self._function is None else self._function.address,
+            "period": np.array([loop.sample_time]),
+            "low": np.ascontiguousarray(limits[:, 0]),
+            "high": np.ascontiguousarray(limits[:, 1]),
+            "commanded_at": commanded_at,
+            "edges": edges,
+            "ulps": np.spacing(np.abs(edges)),
+            "first_sample": 0 if prepared.sampled else 1,
+            "setpoints": prepared.setpoint_values,
+            "first": prepared.first_segments,
+            "grid": prepared.times,
+            "grid_row": prepared.first_rows,
+        }
+        """The arguments of the kernel that are the same in all runs, by name."""
 
 
 class CompiledRun:
@@ -99,12 +105,7 @@ class CompiledRun:
         )
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
         self._parameters = loop.parameters.copy() if parameters is None else parameters
-        arguments = self._arguments(compiled, self._parameters)
-        self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
-        self._columns = next(
-            i for i, argument in enumerate(arguments) if argument is self._drivers.columns
-        )
-        self._kernel = kernel.sampled_loop.bind(*arguments)
+        self._kernel = kernel.sampled_loop.bind(**self._arguments(compiled, self._parameters))
         self._controller = None if loop.law is not None else CalledController(loop.prepared)
         self._begin(initial_state, control_state)
 
@@ -124,7 +125,7 @@ class CompiledRun:
         self.bound.rebind(self._integrator.binding(compiled))
         self._precomputed[:] = compiled.precomputed
         self._parameters[:] = parameters
-        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        self._kernel.replace("budget", INTERRUPT_CHECK_STEPS)
         self._drivers.restart()
         self._begin(initial_state, control_state or self._begin_state)
 
@@ -175,54 +176,51 @@ class CompiledRun:
             self._times = np.empty(FIRST_SEGMENTS + 2 * changes)
         self._rows = np.empty((self._times.size, n))
 
-    def _arguments(self, compiled: CompiledSystem, parameters: Array) -> tuple[Any, ...]:
-        loop = self.loop
-        prepared = self.prepared
+    def _arguments(self, compiled: CompiledSystem, parameters: Array) -> dict[str, Any]:
+        """All arguments of the kernel, by name."""
         bound = self.bound
         drivers = self._drivers
-        outputs, measured_at = loop.measuring
-        return (
-            bound.entry_address or 0,
-            bound.slots,
-            bound.places,
-            bound.clock,
-            bound.count,
-            bound.state,
-            outputs,
-            compiled.precomputed,
-            np.empty(max(compiled.sizes.outputs, 1)),
-            measured_at,
-            loop.sample_address,
-            parameters,
-            *loop.commanding,
-            *loop.intervals,
-            *self._inputs,
-            prepared.first_segments,
-            prepared.times,
-            prepared.first_rows,
-            drivers.kinds,
-            drivers.settings,
-            drivers.states,
-            drivers.columns,
-            drivers.counts,
-            drivers.scratch,
-            drivers.begins,
-            compiled.description.lower_bounds,
-            self._applied,
-            self._memory,
-            self._measured,
-            self._command,
-            self.state,
-            self._kept_inputs,
-            drivers.kept,
-            *self._segments,
-            self._times,
-            self._rows,
-            self._samples,
-            self._commands,
-            self.progress,
-            INTERRUPT_CHECK_STEPS,
-        )
+        ends, values, slopes = self._inputs
+        new_ends, new_values, new_slopes = self._segments
+        return {
+            **self.loop.arguments,
+            "integrate": bound.entry_address or 0,
+            "slots": bound.slots,
+            "places": bound.places,
+            "clock": bound.clock,
+            "count": bound.count,
+            "y": bound.state,
+            "c": compiled.precomputed,
+            "o": np.empty(max(compiled.sizes.outputs, 1)),
+            "parameters": parameters,
+            "ends": ends,
+            "values": values,
+            "slopes": slopes,
+            "kinds": drivers.kinds,
+            "settings": drivers.settings,
+            "states": drivers.states,
+            "columns": drivers.columns,
+            "counts": drivers.counts,
+            "scratch": drivers.scratch,
+            "begins": drivers.begins,
+            "bounds": compiled.description.lower_bounds,
+            "applied": self._applied,
+            "memory": self._memory,
+            "measured": self._measured,
+            "command": self._command,
+            "kept": self.state,
+            "kept_applied": self._kept_inputs,
+            "kept_states": drivers.kept,
+            "new_ends": new_ends,
+            "new_values": new_values,
+            "new_slopes": new_slopes,
+            "times": self._times,
+            "rows": self._rows,
+            "samples": self._samples,
+            "commands": self._commands,
+            "progress": self.progress,
+            "budget": INTERRUPT_CHECK_STEPS,
+        }
 
     def integrate(self) -> None:
         """Run the loop until its end, or until an interval fails or the user stops it."""
@@ -268,7 +266,7 @@ class CompiledRun:
             progress = self.progress
             drivers = self._drivers
             count = drivers.call(interval, float(self.loop.edges[interval]))
-            self._kernel.replace(self._columns, drivers.columns)
+            self._kernel.replace("columns", drivers.columns)
             segments = progress[Progress.SEGMENTS] + count
             rows = (
                 progress[Progress.ROWS]
@@ -287,8 +285,8 @@ class CompiledRun:
             for buffer in (*self._segments, self._times, self._rows)
         ]
         *self._segments, self._times, self._rows = buffers
-        for i, array in enumerate(buffers, self._first_buffer):
-            self._kernel.replace(i, array)
+        for name, array in zip(BUFFERS, buffers, strict=True):
+            self._kernel.replace(name, array)
         self.progress[Progress.FULL] = 0
 
     def _discard_interval(self) -> None:

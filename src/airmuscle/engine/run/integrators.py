@@ -5,7 +5,7 @@ An integrator is bound to a compiled system: its kernel with all arguments, run 
 """
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -47,14 +47,17 @@ class RawSolution(NamedTuple):
 
 
 class Binding(NamedTuple):
-    """Binding of an integrator to a system: kernel, arguments before and after those of a run,
-    workspace size.
+    """Binding of an integrator to a system: kernel, its arguments but for those of a run, and the
+    size of its workspace.
     """
 
     kernel: Kernel
-    leading: tuple[Any, ...]
-    trailing: tuple[Any, ...]
+    arguments: Mapping[str, Any]
     work: int
+
+
+OF_A_RUN = ("ends", "values", "slopes", "times", "rows")
+"""The arguments of an integrator's kernel that are others in each run: segments, then rows."""
 
 
 class BoundIntegrator:
@@ -74,34 +77,37 @@ class BoundIntegrator:
         )
         self.held: Array = inputs[0]
         """The inputs (m,) of `proceed`."""
-        no_rows = np.zeros(0), np.zeros((0, sizes.states))
-        work = np.zeros(max(binding.work, 1))
-        run = (self.state, self._end, inputs, slopes, *no_rows)
-        end = (self.clock, self.count, INTERRUPT_CHECK_STEPS, work)
-        self._bound_values = (*binding.leading, *binding.trailing)
-        self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
-        self._run, self._first = self._kernel.runner, len(binding.leading) + 1
-        self._clock_view, self._count_view = flat_view(self.clock), flat_view(self.count)
-        self.places = np.array(
-            [self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64
+        self._bound_values = binding.arguments
+        self._kernel = binding.kernel.bind(
+            **binding.arguments,
+            y=self.state,
+            ends=self._end,
+            values=inputs,
+            slopes=slopes,
+            times=np.zeros(0),
+            rows=np.zeros((0, sizes.states)),
+            clock=self.clock,
+            count=self.count,
+            budget=INTERRUPT_CHECK_STEPS,
+            work=np.zeros(max(binding.work, 1)),
         )
+        self._run = self._kernel.runner
+        self._clock_view, self._count_view = flat_view(self.clock), flat_view(self.count)
+        self.places = np.array([self._kernel.slot_of(name) for name in OF_A_RUN], dtype=np.int64)
         """The places in the slots of ends, values and slopes of segments, and of times and rows
         (5,).
         """
         self.slots: Any = self._kernel.slots
         """The slots of the kernel's arguments."""
         self._words = None if self._kernel.entry_address is None else flat_view(self.slots)
-        self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def rebind(self, binding: Binding) -> None:
         """Take the values of the same integrator at a system of the same structure with other
         parameters.
         """
-        for bound_value, new_value in zip(
-            self._bound_values, (*binding.leading, *binding.trailing), strict=True
-        ):
+        for name, bound_value in self._bound_values.items():
             if isinstance(bound_value, np.ndarray):
-                bound_value[...] = new_value
+                bound_value[...] = binding.arguments[name]
 
     def run(
         self,
@@ -121,11 +127,11 @@ class BoundIntegrator:
         """
         rows = np.empty((times.size, self.state.size))
         self.state[:] = state
-        for i, argument in enumerate(
-            (segments.ends, segments.values, segments.slopes, times), self._first
-        ):
-            self._kernel.replace_input(i, argument)
-        self._kernel.replace(self._first + 4, rows)
+        self._kernel.replace_input("ends", segments.ends)
+        self._kernel.replace_input("values", segments.values)
+        self._kernel.replace_input("slopes", segments.slopes)
+        self._kernel.replace_input("times", times)
+        self._kernel.replace("rows", rows)
         clock = self._clock_view
         count = self._count_view
         clock[0] = start
@@ -133,14 +139,14 @@ class BoundIntegrator:
         clock[2] = start
         count[0] = count[1] = count[2] = count[3] = 0
         if max_steps < INTERRUPT_CHECK_STEPS:
-            self._kernel.replace(self._budget, max_steps)
+            self._kernel.replace("budget", max_steps)
         try:
             status = self._kernel()
             if status == _PAUSED:
                 status = self._continue(status, max_steps, check)
         except KeyboardInterrupt:
             status = Status.INTERRUPTED.value
-        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        self._kernel.replace("budget", INTERRUPT_CHECK_STEPS)
         reached = count[1]
         ended = Status.DONE if status == 0 else Status(status)
         if reached < len(rows):
@@ -163,16 +169,17 @@ class BoundIntegrator:
         """Go on through the segments and rows in the slots, for a kernel that cannot call this one
         itself.
         """
-        a, b, c, d, e = self.places.tolist()
         if self._words is None:
             slots = self.slots.tolist()
-            self._kernel.point(self._first, (slots[a], slots[b], slots[c]), slots[a + 1])
-            self._kernel.point(self._first + 3, (slots[d], slots[e]), slots[d + 1])
+            place = dict(zip(OF_A_RUN, self.places.tolist(), strict=True))
+            for names in (OF_A_RUN[:3], OF_A_RUN[3:]):
+                addresses = {name: slots[place[name]] for name in names}
+                self._kernel.point(addresses, slots[place[names[0]] + 1])
         before = self._count_view[2]
         status = self._run()
         if status == _PAUSED:
             status = self._continue(status, before + MAX_STEPS)
-            self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+            self._kernel.replace("budget", INTERRUPT_CHECK_STEPS)
         return Status(status)
 
     @property
@@ -197,7 +204,7 @@ class BoundIntegrator:
             left = max_steps - int(self.count[2])
             if left <= 0:
                 return _TOO_MANY
-            self._kernel.replace(self._budget, min(INTERRUPT_CHECK_STEPS, left))
+            self._kernel.replace("budget", min(INTERRUPT_CHECK_STEPS, left))
             status = self._kernel()
         return status
 
@@ -252,20 +259,18 @@ class Rodas4(Integrator):
     def binding(self, compiled: CompiledSystem) -> Binding:
         sizes = compiled.sizes
         at = compiled.address
-        addresses = (
-            at["stage"],
-            at["jac"],
-            at["factor"],
-            at["solve"],
-            at["df_dt"],
-            sizes.jacobian,
-            sizes.factors,
-        )
+        functions = {name: at[name] for name in ("stage", "jac", "factor", "solve", "df_dt")}
         work = 11 * sizes.states + 2 * sizes.inputs + sizes.jacobian + sizes.factors
         return Binding(
             rodas4,
-            (*addresses, compiled.precomputed),
-            (self.rtol, self.rtol * compiled.nominal),
+            {
+                **functions,
+                "jacobian_size": sizes.jacobian,
+                "factor_size": sizes.factors,
+                "c": compiled.precomputed,
+                "relative": self.rtol,
+                "absolute": self.rtol * compiled.nominal,
+            },
             work,
         )
 
@@ -285,7 +290,8 @@ class ExplicitRungeKutta(Integrator):
     def binding(self, compiled: CompiledSystem) -> Binding:
         address, precomputed = compiled.program.step(self.tableau(), compiled.parameters)
         work = compiled.sizes.states + compiled.sizes.inputs
-        return Binding(fixed_step, (address, precomputed), (self.step,), work)
+        arguments = {"step": address, "c": precomputed, "length": self.step}
+        return Binding(fixed_step, arguments, work)
 
 
 _DEFAULT = Rodas4()

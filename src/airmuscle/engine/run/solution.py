@@ -62,32 +62,30 @@ class RowRecorder:
         columns = compiled.description.ranged_columns
         sizes = self.sizes
         self._ranges = np.empty((2, columns.size))
-        states, inputs, outputs = (
-            np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs)
-        )
-        none = np.empty(0)
-        nothing = np.empty((0, sizes.inputs))
         function, width = compiled.program.outputs_at_rows
-        work = (np.zeros((width, count)) for count in (sizes.states, sizes.inputs, sizes.outputs))
+        no_inputs = np.empty((0, sizes.inputs))
         self._kernel = record.bind(
-            function,
-            compiled.precomputed,
-            states,
-            none,
-            0.0,
-            none,
-            nothing,
-            nothing,
-            inputs,
-            outputs,
-            columns,
-            *self._ranges,
-            *work,
+            function=function,
+            c=compiled.precomputed,
+            states=np.empty((0, sizes.states)),
+            times=np.empty(0),
+            begin=0.0,
+            ends=np.empty(0),
+            values=no_inputs,
+            slopes=no_inputs,
+            inputs=np.empty((0, sizes.inputs)),
+            outputs=np.empty((0, sizes.outputs)),
+            columns=columns,
+            lower=self._ranges[0],
+            upper=self._ranges[1],
+            x=np.zeros((width, sizes.states)),
+            u=np.zeros((width, sizes.inputs)),
+            o=np.zeros((width, sizes.outputs)),
         )
 
     def adopt(self, compiled: CompiledSystem) -> None:
         """Take another compiled system of the same structure."""
-        self._kernel.replace(1, compiled.precomputed)
+        self._kernel.replace("c", compiled.precomputed)
 
     def evaluate(
         self, states: Array, times: Array, segments: PiecewiseLinear, start: float
@@ -99,13 +97,14 @@ class RowRecorder:
         inputs = np.empty((count, self.sizes.inputs))
         outputs = np.empty((count, self.sizes.outputs))
         kernel = self._kernel
-        kernel.replace(2, states)
-        kernel.replace_input(3, times)
-        kernel.replace(4, start)
-        for i, argument in enumerate((segments.ends, segments.values, segments.slopes), 5):
-            kernel.replace_input(i, argument)
-        kernel.replace(8, inputs)
-        kernel.replace(9, outputs)
+        kernel.replace("states", states)
+        kernel.replace_input("times", times)
+        kernel.replace("begin", start)
+        kernel.replace_input("ends", segments.ends)
+        kernel.replace_input("values", segments.values)
+        kernel.replace_input("slopes", segments.slopes)
+        kernel.replace("inputs", inputs)
+        kernel.replace("outputs", outputs)
         first = self._kernel()
         lower, upper = self._ranges.tolist()
         return RowTable(inputs, outputs, lower, upper, first)

@@ -261,19 +261,23 @@ class Stepper:
         self._given = self._bound.held
         known = compiled.description
         begin = begin_step.bind(
-            self._given, known.input_lower_limits, known.input_upper_limits, self.state, self._next
+            given=self._given,
+            lower=known.input_lower_limits,
+            upper=known.input_upper_limits,
+            state=self.state,
+            start=self._next,
         )
         end = end_step.bind(
-            compiled.address["outputs"],
-            compiled.precomputed,
-            self._next,
-            self._given,
-            self._found,
-            *self._limits.arrays,
-            self.state,
-            self.inputs,
-            self.outputs,
-            self._always,
+            function=compiled.address["outputs"],
+            c=compiled.precomputed,
+            end=self._next,
+            given=self._given,
+            values=self._found,
+            **self._limits.arrays,
+            state=self.state,
+            inputs=self.inputs,
+            outputs=self.outputs,
+            always=self._always,
         )
         self._kernels = (begin, end)
         self._begin = begin.runner
@@ -306,7 +310,13 @@ class _Limits:
         for limit in compiled.system.column_limits if check_validity else ():
             if limit.column in self.names:
                 self._narrow(self.names.index(limit.column), limit)
-        self.arrays = self.lower[:n], self.upper[:n], self.lower[n:], self.upper[n:]
+        self.arrays = {
+            "lower": self.lower[:n],
+            "upper": self.upper[:n],
+            "low": self.lower[n:],
+            "high": self.upper[n:],
+        }
+        """The limits of states and of outputs, as the kernel `end_step` calls them."""
 
     def _narrow(self, i: int, limit: ColumnLimit) -> None:
         """Take over a limit of validity of column `i` where it is narrower, with a slack for

@@ -225,22 +225,27 @@ def general_candidates(
     padded = np.append(levels, np.full(-levels.size % LANES, levels[-1])).reshape(-1, LANES)
     counts = np.zeros(angle.size, dtype=np.int64)
     room = ROOM
-    work = *(aligned_array((size, LANES)) for size in (3, 5, 5)), np.zeros((2, 3, 2, CELLS))
-    cells = np.zeros(CELLS**2 + LANES, dtype=np.int64)
-    points = [np.array(v) for v in (angle, torque, stiffness)]
+    work = {
+        "arguments": aligned_array((3, LANES)),
+        "values": aligned_array((5, LANES)),
+        "other_values": aligned_array((5, LANES)),
+        "ends": np.zeros((2, 3, 2, CELLS)),
+        "cells": np.zeros(CELLS**2 + LANES, dtype=np.int64),
+    }
     while True:
         pairs = np.full((angle.size, room, 2), np.nan)
         pair_solutions(
-            first.address,
-            second.address,
-            float(pressures[0]),
-            float(pressures[1]),
-            *points,
-            padded,
-            pairs,
-            counts,
-            *work,
-            cells,
+            first=first.address,
+            second=second.address,
+            low=float(pressures[0]),
+            high=float(pressures[1]),
+            point=np.array(angle),
+            wanted_q=np.array(torque),
+            wanted_k=np.array(stiffness),
+            levels=padded,
+            solutions=pairs,
+            counts=counts,
+            **work,
         )
         most = int(counts.max(initial=1))
         if most <= room:

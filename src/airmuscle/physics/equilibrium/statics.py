@@ -287,7 +287,11 @@ class Statics:
         rates = np.empty_like(states)
         if states.size:
             evaluate_rates(
-                self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates
+                function=self.compiled.address["rhs"],
+                precomputed=self.precomputed,
+                inputs=self.inputs,
+                states=states,
+                rates=rates,
             )
         accelerations = rates[
             ..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]

@@ -11,9 +11,11 @@ import functools
 import importlib
 import itertools
 import math
+import pathlib
+import re
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ import numpy as np
 from ..llvm.jit import build, engine_of, slot_count
 from . import store
 
+_KERNELS = pathlib.Path(__file__).parents[1] / "kernels"
 _ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
 _KINDS = {
     (dtype, dimensions): f"{item}{dimensions}"
@@ -63,22 +66,41 @@ def _kind(argument: Any) -> str:
 
 
 class Kernel:
-    """A kernel that returns a status, by its name and that of its module in `compile.kernels`."""
+    """A kernel that returns a status, by its name and that of its module in `compile.kernels`.
+
+    Callers name its arguments as its function declares them.
+    """
 
     def __init__(self, name: str, module: str = "") -> None:
         self.name = name
         self.module = module or name
         self._entries: dict[tuple[str, ...], Any] = {}
 
-    def bind(self, *arguments: Any) -> "BoundKernel":
-        """The kernel with its arguments: integers, floats, and C-contiguous arrays of int64,
-        float64 or float32.
-        """
-        return BoundKernel(self, arguments)
+    @functools.cached_property
+    def places(self) -> dict[str, int]:
+        """The arguments by name, in the order in which the kernel's function declares them.
 
-    def __call__(self, *arguments: Any) -> int:
+        They are read from its source: to import the function takes numba.
+        """
+        text = (_KERNELS / f"{self.module}.py").read_text(encoding="utf-8")
+        declared = re.search(rf"^def {self.name}\(([^)]*)\)", text, re.MULTILINE)
+        assert declared is not None, f"{self.module}.py defines no {self.name}"
+        names = [name.strip() for name in declared[1].split(",")]
+        return {name: place for place, name in enumerate(filter(None, names))}
+
+    def bind(self, **arguments: Any) -> "BoundKernel":
+        """The kernel with its arguments by name: integers, floats, and C-contiguous arrays of
+        int64, float64 or float32. Raises TypeError for an argument that is unknown or missing.
+        """
+        if arguments.keys() != self.places.keys():
+            missing = [name for name in self.places if name not in arguments]
+            unknown = [name for name in arguments if name not in self.places]
+            raise TypeError(f"kernel {self.name}: missing {missing}, unknown {unknown}")
+        return BoundKernel(self, tuple([arguments[name] for name in self.places]))
+
+    def __call__(self, **arguments: Any) -> int:
         """Run it once."""
-        return self.bind(*arguments)()
+        return self.bind(**arguments)()
 
     @property
     def numba(self) -> Any:
@@ -118,7 +140,7 @@ class BoundKernel:
     """A kernel with its arguments, for many runs; arrays are passed by address and referenced.
 
     Between two runs the contents of arrays may change, and arguments may be replaced by others of
-    their kind.
+    their kind; they are named as in `Kernel.bind`.
     """
 
     __slots__ = (
@@ -129,6 +151,7 @@ class BoundKernel:
         "_kinds",
         "_numba",
         "_offsets",
+        "_places",
         "_run",
         "_slots",
     )
@@ -141,6 +164,7 @@ class BoundKernel:
         self._floats = (ctypes.c_double * count).from_buffer(self._slots)
         self._address = ctypes.addressof(self._slots)
         self._arguments = list(arguments)
+        self._places = kernel.places
         for kind, offset, argument in zip(self._kinds, self._offsets, arguments, strict=True):
             self._set(kind, offset, argument)
         self._kernel = kernel  # its machine code must live as long
@@ -148,23 +172,23 @@ class BoundKernel:
         self._run: Any = entry
         self._numba: Any = None if entry else kernel.numba
 
-    def replace(self, index: int, argument: Any) -> None:
-        """Take another argument of the same kind in place of number `index`."""
+    def replace(self, name: str, argument: Any) -> None:
+        """Take another argument of the same kind."""
+        index = self._places[name]
         if self._arguments[index] is not argument:
             self._arguments[index] = argument
             self._set(self._kinds[index], self._offsets[index], argument)
 
-    def replace_input(self, index: int, array: Any) -> None:
-        """Take another array in place of number `index`, which the kernel only reads; it may be
-        read-only.
-        """
+    def replace_input(self, name: str, array: Any) -> None:
+        """Take another array that the kernel only reads; it may be read-only."""
+        index = self._places[name]
         if self._arguments[index] is array:
             return
         if array.flags.writeable:
-            self.replace(index, array)
+            self.replace(name, array)
         elif not array.flags.c_contiguous or _kind(array) != self._kinds[index]:
             raise TypeError(
-                f"argument {index} must be a C-contiguous array of kind {self._kinds[index]}"
+                f"argument {name} must be a C-contiguous array of kind {self._kinds[index]}"
             )
         else:
             self._arguments[index], offset = array, self._offsets[index]
@@ -183,21 +207,17 @@ class BoundKernel:
                 offset += 1
                 slots[offset] = length
 
-    def point(self, index: int, addresses: Sequence[int], length: int) -> None:
-        """Set the addresses of the arrays from number `index` on, within live arrays, and their
-        first dimension.
-        """
-        slots = self._slots
-        offsets = self._offsets
+    def point(self, addresses: Mapping[str, int], length: int) -> None:
+        """Set the addresses of arrays, within live arrays, and their first dimension."""
         arguments = self._arguments
-        for i, address in enumerate(addresses, index):
-            offset = offsets[i]
-            slots[offset] = address
-            slots[offset + 1] = length
-        if self._numba is None:
-            arguments[index : index + len(addresses)] = addresses
-            return
-        for i, address in enumerate(addresses, index):
+        for name, address in addresses.items():
+            i = self._places[name]
+            offset = self._offsets[i]
+            self._slots[offset] = address
+            self._slots[offset + 1] = length
+            if self._numba is None:
+                arguments[i] = address
+                continue
             shape = length, *arguments[i].shape[1:]
             count = math.prod(shape)
             numbers = (
@@ -219,9 +239,9 @@ class BoundKernel:
         """The slots of the arguments as an array of int64 that shares their memory."""
         return np.frombuffer(memoryview(self._slots), dtype=np.int64)
 
-    def slot_of(self, index: int) -> int:
-        """The place in the slots of argument number `index`."""
-        return self._offsets[index]
+    def slot_of(self, name: str) -> int:
+        """The place in the slots of an argument."""
+        return self._offsets[self._places[name]]
 
     @property
     def runner(self) -> Callable[[], int]:

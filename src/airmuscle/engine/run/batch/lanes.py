@@ -7,7 +7,7 @@ Plants are computed in single or double precision, loops in double precision.
 import abc
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -75,11 +75,10 @@ class LaneArrays(abc.ABC):
     """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their
     addresses.
 
-    more  sizes of further arrays after those of the step: parameters, what it needs of them, states
-          (two), inputs, their start and slopes, length, outputs
+    more  lengths of further arrays beside those of the step, by the name of the kernel's argument
     """
 
-    def __init__(self, job: BatchJob, precision: Precision, more: tuple[int, ...] = ()) -> None:
+    def __init__(self, job: BatchJob, precision: Precision, more: Mapping[str, int]) -> None:
         number = precision.number
         sizes = job.compiled.sizes
         integrator = job.integrator
@@ -87,12 +86,28 @@ class LaneArrays(abc.ABC):
         self.job = job
         self.step = integrator.step
         self.width = number.lanes
-        self.addresses, prepared_numbers = job.compiled.program.lanes(integrator.tableau(), number)
-        n = sizes.states
-        m = sizes.inputs
-        lengths = (sizes.parameters, prepared_numbers, n, n, m, m, m, 1, sizes.outputs, *more)
-        self.arrays = [aligned_array((length, self.width), precision.dtype) for length in lengths]
-        self.arrays[0][:] = job.compiled.parameters[:, None]
+        addresses, prepared_numbers = job.compiled.program.lanes(integrator.tableau(), number)
+        self.addresses = dict(zip(("prepare", "step", "outputs"), addresses, strict=True))
+        lengths = {
+            "p": sizes.parameters,
+            "c": prepared_numbers,
+            "y": sizes.states,
+            "other": sizes.states,
+            "u": sizes.inputs,
+            "base": sizes.inputs,
+            "w": sizes.inputs,
+            "h": 1,
+            "o": sizes.outputs,
+            **more,
+        }
+        self.arrays = {
+            name: aligned_array((length, self.width), precision.dtype)
+            for name, length in lengths.items()
+        }
+        """The arrays in lanes by the names of the kernel's arguments: parameters, what the step
+        needs of them, states (two), inputs, their start and slopes, length, outputs, and more.
+        """
+        self.arrays["p"][:] = job.compiled.parameters[:, None]
         self.status = np.empty(self.width, dtype=np.int64)
 
     @property
@@ -113,8 +128,8 @@ class LaneArrays(abc.ABC):
     def load(self, lane: Plants) -> None:
         """Take over the parameters that differ, and the initial states, of one plant a lane."""
         job = self.job
-        self.arrays[0][job.variations.places] = job.variations.values[lane].T
-        self.arrays[2][:] = job.initial_states[lane].T
+        self.arrays["p"][job.variations.places] = job.variations.values[lane].T
+        self.arrays["y"][:] = job.initial_states[lane].T
 
     def finish(self, plants: Plants, final: npt.NDArray[Any]) -> None:
         """Write the final states (W, n) and the status of plants.
@@ -148,7 +163,7 @@ class LaneBlock(LaneArrays):
     def __init__(
         self, job: BatchJob, precision: Precision, table: "SegmentTable", stop: Flag
     ) -> None:
-        super().__init__(job, precision)
+        super().__init__(job, precision, {})
         self.table = table
         self.stop = stop
         width = self.width
@@ -158,33 +173,32 @@ class LaneBlock(LaneArrays):
         self.kept = np.concatenate([job.kept, self.bounded])
         self.rows = np.empty((self.kept.size, width, job.times.size), dtype)
         self.final = np.empty((width, job.compiled.sizes.states), dtype)
-        self.counters = (
-            np.empty(width, np.int64),
-            np.empty(width, np.int64),
-            *(np.empty(width) for _ in range(3)),
-        )
-
-        self.first, self.last = np.empty(width, np.int64), np.empty(width, np.int64)
+        self.first = np.empty(width, np.int64)
+        self.last = np.empty(width, np.int64)
 
     @functools.cached_property
     def kernel(self) -> BoundKernel:
         return lanes.bind(
-            *self.addresses,
-            *self.arrays,
-            self.table.ends,
-            self.table.values,
-            self.table.slopes,
-            self.first,
-            self.last,
-            self.job.start_time,
-            self.step,
-            self.job.times,
-            self.kept,
-            self.rows,
-            self.final,
-            self.status,
-            self.stop,
-            *self.counters,
+            **self.addresses,
+            **self.arrays,
+            ends=self.table.ends,
+            values=self.table.values,
+            slopes=self.table.slopes,
+            first=self.first,
+            last=self.last,
+            begin=self.job.start_time,
+            length=self.step,
+            times=self.job.times,
+            chosen=self.kept,
+            rows=self.rows,
+            final=self.final,
+            status=self.status,
+            stop=self.stop,
+            segment=np.empty(self.width, np.int64),
+            ended=np.empty(self.width, np.int64),
+            done=np.empty(self.width),
+            total=np.empty(self.width),
+            start=np.empty(self.width),
         )
 
     def load(self, lane: Plants) -> None:
@@ -214,7 +228,18 @@ class LoopLaneBlock(LaneArrays):
         k = len(law.measured_columns)
         s = len(law.setpoints)
         c = len(law.inputs)
-        super().__init__(job, Double(), (first.parameters.size, memory, memory, k, s, c, c, c, 1))
+        lengths = {
+            "parameters": first.parameters.size,
+            "memory": memory,
+            "later": memory,
+            "measured": k,
+            "setpoint": s,
+            "command": c,
+            "low": c,
+            "high": c,
+            "period": 1,
+        }
+        super().__init__(job, Double(), lengths)
         self.first = first
         self.stop = stop
         self.prepared = first.prepared
@@ -243,8 +268,8 @@ class LoopLaneBlock(LaneArrays):
             for i, plant in enumerate(lane.tolist()):
                 self._load_loop(job.loop_of(plant), slice(i, i + 1))
         if job.laws is not None:
-            self.arrays[9][job.laws.places] = job.laws.values[lane].T
-        self.arrays[4][:] = self.values[0]
+            self.arrays["parameters"][job.laws.places] = job.laws.values[lane].T
+        self.arrays["u"][:] = self.values[0]
 
     def _load_loop(self, loop: CompiledLoop, places: slice) -> None:
         """Take over one loop into these lanes."""
@@ -252,44 +277,42 @@ class LoopLaneBlock(LaneArrays):
         assert law is not None
         prepared = loop.prepared
         inputs = prepared.inputs
-        sample_time, lowest, highest, _ = loop.commanding
+        arrays = self.arrays
         initial_memory = np.array(list(law.initial_memory.values()))
-        parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
-        parameters[:, places] = loop.parameters[:, None]
-        memory[:, places] = initial_memory[:, None]
+        arrays["parameters"][:, places] = loop.parameters[:, None]
+        arrays["memory"][:, places] = initial_memory[:, None]
         self.setpoints[:, :, places] = prepared.setpoint_values[..., None]
         self.values[:, :, places] = inputs.values[..., None]
         self.slopes[:, :, places] = inputs.slopes[..., None]
-        period[:, places] = sample_time
-        low[:, places] = lowest[:, None]
-        high[:, places] = highest[:, None]
+        for name in ("period", "low", "high"):
+            arrays[name][:, places] = loop.arguments[name][:, None]
 
     @functools.cached_property
     def kernel(self) -> BoundKernel:
         prepared = self.prepared
         return loop_lanes.bind(
-            *self.addresses,
-            self.sample.address,
-            *self.arrays,
-            prepared.instants,
-            self.setpoints,
-            prepared.first_segments,
-            self.starts,
-            prepared.inputs.ends,
-            self.values,
-            self.slopes,
-            self.step,
-            self.first.measuring[1],
-            self.first.commanding[3],
-            self.job.lower_bounds,
-            self.job.times,
-            self.row_segment,
-            self.kept,
-            self.rows,
-            self.samples,
-            self.commands,
-            self.status,
-            self.stop,
+            **self.addresses,
+            **self.arrays,
+            sample=self.sample.address,
+            edges=prepared.instants,
+            setpoints=self.setpoints,
+            first=prepared.first_segments,
+            starts=self.starts,
+            ends=prepared.inputs.ends,
+            values=self.values,
+            slopes=self.slopes,
+            length=self.step,
+            measured_at=self.first.arguments["measured_at"],
+            commanded_at=self.first.arguments["commanded_at"],
+            bounds=self.job.lower_bounds,
+            times=self.job.times,
+            row_segment=self.row_segment,
+            chosen=self.kept,
+            rows=self.rows,
+            samples=self.samples,
+            commands=self.commands,
+            status=self.status,
+            stop=self.stop,
         )
 
     def write(self, plants: Plants) -> None:
@@ -301,7 +324,7 @@ class LoopLaneBlock(LaneArrays):
                 if place < job.own
                 else self._of_loop(name, plants)
             )
-        self.finish(plants, self.arrays[2].T)
+        self.finish(plants, self.arrays["y"].T)
 
     def _of_loop(self, name: str, plants: Plants) -> Array:
         """A column (R, T) of the set points, measurements or commands of plants."""

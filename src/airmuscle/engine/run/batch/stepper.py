@@ -123,17 +123,19 @@ class BatchStepper:
         h = self._columns(1, 1)[0]
         next_states = self._columns(n, 1)[0]
         h[:] = length
+        step, outputs = functions
         return lane_blocks.bind(
-            *functions,
-            self.states,
-            self.inputs,
-            self._held,
-            still,
-            h,
-            next_states,
-            self.outputs,
-            span,
-            self._steps,
+            step=step,
+            outputs=outputs,
+            x=self.states,
+            u=self.inputs,
+            c=self._held,
+            w=still,
+            h=h,
+            other=next_states,
+            o=self.outputs,
+            span=span,
+            steps=self._steps,
         )
 
     def prepare(self, blocks: npt.NDArray[np.intp] | None = None) -> None:
