@@ -95,6 +95,7 @@ NAMES = (
     "plan",
     "fit-live",
     "size",
+    "body",
     "simulate",
     "study",
     "tune",

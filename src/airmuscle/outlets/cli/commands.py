@@ -105,6 +105,12 @@ COMMANDS = (
         "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
     ),
     CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
+    CommandRow(
+        "body",
+        "body",
+        "body",
+        "Study the routes of muscles on a robot's body.",
+    ),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),

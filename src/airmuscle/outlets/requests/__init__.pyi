@@ -1,3 +1,4 @@
+from .body import BodyRequest as BodyRequest
 from .declaration import Option as Option
 from .declaration import RequestError as RequestError
 from .declaration import build as build
