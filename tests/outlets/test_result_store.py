@@ -11,6 +11,7 @@ import dataclasses
 import json
 import math
 import os
+import pickle
 import random
 import signal
 import subprocess
@@ -76,6 +77,11 @@ def test_arrays_keep_their_order_in_memory_and_whether_they_can_be_written_to():
     assert columns.flags.f_contiguous
     assert not columns.flags.c_contiguous
     assert (rows.flags.writeable, still.flags.writeable) == (True, False)
+
+
+def test_a_constant_that_a_worker_process_sent_is_the_constant():
+    sent = pickle.loads(pickle.dumps(dataclasses.MISSING))
+    assert decode(encode(sent)) is dataclasses.MISSING
 
 
 def test_what_occurs_twice_is_one_object():

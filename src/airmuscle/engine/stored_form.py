@@ -24,7 +24,7 @@ _PLAIN = (bool, int, str, type(None))
 _ARRAY_KINDS = "biufcSU"
 """Kinds of the arrays that are stored: numbers, truth values and texts."""
 _CONSTANTS = {"missing": dataclasses.MISSING, "ellipsis": ...}
-"""Objects of which there is one, in declarations of parameters."""
+"""Constants in declarations of parameters, by their classes: pickle copies the first of them."""
 
 
 class NotStorableError(AirmuscleError):
@@ -196,7 +196,7 @@ class _Decoder:
 
 def _name_of_constant(value: Any) -> str | None:
     for name, known in _CONSTANTS.items():
-        if value is known:
+        if type(value) is type(known):
             return name
     return None
 
