@@ -366,7 +366,10 @@ def test_partial_pooling_refuses_what_it_cannot_use():
 
 def test_partial_pooling_is_compared_where_three_specimens_are_measured():
     names = [c.name for c in standard_candidates(runs())]
-    assert "pooled, ln L0, degree 3, change of degree 1, effects of degree 2" in names
+    assert (
+        "surface of degree 3 + length correction ln L0 of degree 1 + muscle effects of degree 2"
+        in names
+    )
     assert not any(c.name.startswith("pooled") for c in standard_candidates(runs()[:8]))
 
 

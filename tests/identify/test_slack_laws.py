@@ -39,7 +39,7 @@ from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
 
-NAME = "pooled, ln L0, degree 3, change of degree 1, effects of degree 3"
+NAME = "surface of degree 3 + length correction ln L0 of degree 1 + muscle effects of degree 3"
 MUSCLES = ((0.083, 5.2e-3, 25.5, 1.25), (0.182, 5.3e-3, 24.6, 1.15), (0.382, 5.4e-3, 24.2, 1.08))
 """Resting length [m], radius [m], braid angle [degrees] and end correction (chosen)."""
 
@@ -115,7 +115,7 @@ def test_the_law_of_a_specimen_does_not_pull_where_its_rows_imply_that_it_is_sla
         run.rows((run["force"] > 0) | (run["pressure"] > 6e4) | (run["contraction"] < 0.04))
         for run in measured
     ]
-    name = "pooled, ln L0, degree 3, change of degree 1, effects of degree 2"
+    name = "surface of degree 3 + length correction ln L0 of degree 1 + muscle effects of degree 2"
     (law,) = [each.law for each in standard_candidates(recorded) if each.name == name]
     found = fit(law, recorded).model
     pressure, contraction = (

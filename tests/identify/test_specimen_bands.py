@@ -23,7 +23,7 @@ from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
 
 LENGTHS = {3: (0.1, 0.2, 0.4), 4: (0.1, 0.16, 0.25, 0.4), 6: (0.1, 0.13, 0.18, 0.24, 0.31, 0.4)}
-LAW = "pooled, ln L0, degree 2, change of degree 1, effects of degree 2"
+LAW = "surface of degree 2 + length correction ln L0 of degree 1 + muscle effects of degree 2"
 NOISE = 1.0
 
 

@@ -65,6 +65,7 @@ class Table(ShortRepr):
     shown    whether the page has it
     series   whether it is a long series, which only its file has
     folded   whether the page shows its title alone until the reader unfolds it
+    head     rows that the page shows before the reader unfolds the others; 0 for all
     brief    rows of the brief view: the first ones, or the indices of some; 0 for none
     key      name in JSON, by default `name`; several chapters of a report may have a table of the
              same key
@@ -78,6 +79,7 @@ class Table(ShortRepr):
     shown: bool = True
     series: bool = False
     folded: bool = False
+    head: int = 0
     brief: int | Sequence[int] = 0
     key: str = ""
 
@@ -188,6 +190,8 @@ class Chapter(ShortRepr):
     """Commands that evaluate a model of the chapter with other parameters, each with what it
     shows.
     """
+    opening: bool = False
+    """Whether the page begins with it, before the contents: figure and values side by side."""
 
     @property
     def paragraphs(self) -> tuple[str, ...]:

@@ -118,6 +118,7 @@ _FORMULA_WITH_PUNCTUATION = re.compile(r"([(\[]*)\\\((.+?)\\\)([)\],.;:%]*)")
 _NO_WRAP = '<span class="nowrap">{}</span>'
 """Browsers break lines between a formula and the punctuation next to it."""
 _NAME = re.compile(r"(?P<base>[A-Za-z]+)(?:_(?P<index>[A-Za-z0-9]+(?:_[A-Za-z0-9]+)*))?")
+_CODE = re.compile(r"`([^`<>]+)`")
 _UNIT_SPACE = re.compile(r"(?<=\d) (?=%|(?:k?N|[kM]?Pa|[mc]?m|k?g|m?s|bar|K|rad|Hz)\b)")
 _GREEK = {
     name: rf"\{name}"
@@ -169,8 +170,11 @@ def to_mathml(text: str) -> str:
 
 
 def _escape(text: str) -> str:
-    """Return HTML with a no-break space between a number and its unit."""
-    return _UNIT_SPACE.sub("\N{NO-BREAK SPACE}", html.escape(text))
+    """Return HTML with a no-break space between a number and its unit, and code between
+    backticks.
+    """
+    escaped = _UNIT_SPACE.sub("\N{NO-BREAK SPACE}", html.escape(text))
+    return _CODE.sub(r"<code>\1</code>", escaped)
 
 
 def to_plain(text: str) -> str:

@@ -172,6 +172,8 @@ def excess_error(model: RankedModel, best: RankedModel) -> float:
 
 MAX_LIMITED = 0.01
 """Fraction of the rows above which limited residuals are no outliers (chosen)."""
+RANKED_ON_PAGE = 6
+"""Laws of the ranking that a page shows before the others are unfolded (chosen)."""
 MAX_LISTED = 10
 SHORT_LISTED = 4
 """Maximum numbers of ranked laws, besides the recommended one, and of excluded laws in the brief
@@ -282,7 +284,12 @@ class Comparison(Reported):
         recommended = next(i for i, m in enumerate(models) if m is self.recommended)
         rows = sorted({*range(min(MAX_LISTED, len(models))), recommended})
         return Table(
-            "ranking", "Ranking by cross-validation error", columns, _SLACK_NOTE, brief=rows
+            "ranking",
+            "Ranking by cross-validation error",
+            columns,
+            _SLACK_NOTE,
+            brief=rows,
+            head=RANKED_ON_PAGE,
         )
 
 

@@ -183,8 +183,8 @@ def started_candidates(
         population = LogarithmicLength(*surfaces, scales.resting_length, scales.resting_length)
         for effects in (2, 3):
             name = (
-                f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree"
-                f" {effects}"
+                f"surface of degree {degree} + length correction ln L0 of degree {change}"
+                f" + muscle effects of degree {effects}"
             )
             candidates.append(
                 Candidate(name, PooledLengthLaw(population, (blank_surface(effects),)))

@@ -3,6 +3,7 @@
 import dataclasses
 import functools
 import math
+import string
 from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
@@ -195,9 +196,7 @@ class FitProblem(LeastSquaresProblem):
         """A short label for each free parameter: its term in a polynomial, else its symbol, else
         its path.
         """
-        terms = getattr(self.law, "term_labels", ())
-        fields = getattr(self.law, "linear_in", ())
-        texts = {f"{field}[{i}]": f"a({term})" for field in fields for i, term in enumerate(terms)}
+        texts = _term_labels(self.law, [leaf.path for leaf in self.leaves])
         symbols = [leaf.declared.symbol for leaf in self.free_leaves]
         paths = [leaf.path for leaf in self.free_leaves]
         names = (
@@ -403,3 +402,25 @@ def _check_row_count(law: Characteristic, data: Recording, free: int, measured: 
             hint=Hint("To fix parameters", "fixed"),
             cause=f"{free} parameters, but {measured} measured values",
         )
+
+
+def _term_labels(law: Any, paths: Sequence[str]) -> dict[str, str]:
+    """Labels of the coefficients of all polynomials in a law by their paths: a(term) of the first
+    one, b(term) of the second, and so on.
+    """
+    labels = dict[str, str]()
+    letters = iter(string.ascii_lowercase)
+    for owner in dict.fromkeys(path.rpartition(".")[0] for path in paths):
+        part = functools.reduce(getattr, owner.split("."), law) if _is_plain(owner) else None
+        part = part if owner else law
+        terms = getattr(part, "term_labels", ())
+        for field in getattr(part, "linear_in", ()) if terms else ():
+            letter = next(letters)
+            prefix = f"{owner}.{field}" if owner else field
+            labels |= {f"{prefix}[{i}]": f"{letter}({term})" for i, term in enumerate(terms)}
+    return labels
+
+
+def _is_plain(path: str) -> bool:
+    """Whether a path consists of fields alone, without the index of a sequence."""
+    return bool(path) and "[" not in path

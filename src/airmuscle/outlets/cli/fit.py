@@ -78,7 +78,7 @@ def fit(
             request, files, recordings, lambda _, fraction: show("", fraction), executor
         )
     muscle = {} if fitted.refusal else {"muscle.toml": to_toml(fitted.entry)}
-    deliver("fit", fitted.chapters, json=json, out=out, title="Fit", files=muscle)
+    deliver("fit", fitted.chapters, json=json, out=out, title="Fitted muscle", files=muscle)
 
 
 @request

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ...bench.comparison.comparison_chapter import LawSelection, compare_chapters, select_law
+from ...bench.comparison.result_chapter import result_chapter, without_opening_figures
 from ...bench.comparison.specimen_errors import (
     odd_specimen_notes,
     ranked_specimen_errors,
@@ -27,7 +28,7 @@ from ...bench.statics.uncertainty import Uncertainty
 from ...core import ParameterError
 from ...engine.processes import Workers
 from ...files.library import Entry, find_initial_law, missing_geometry, resting_lengths
-from ...files.library.fitted_entry import fitted_entry, left_out_ratio
+from ...files.library.fitted_entry import fitted_entry, left_out_ratio, list_files
 from ...physics import ContractileSurface, Geometry
 from ...recording import Recording
 from ...report.chapter import Chapter, Table
@@ -75,9 +76,14 @@ def fit_requested(
     refusal = "" if misfit is None or request.accept_misfit else misfit.refusal
     if not refusal:
         return found
-    first, *others = found.chapters
-    first = dataclasses.replace(first, problems=(*first.problems, refusal))
-    return dataclasses.replace(found, chapters=[first, *others], refusal=refusal)
+    shown = next(chapter for chapter in found.chapters if chapter.brief)
+    chapters = [
+        dataclasses.replace(chapter, problems=(*chapter.problems, refusal))
+        if chapter.opening or chapter is shown
+        else chapter
+        for chapter in found.chapters
+    ]
+    return dataclasses.replace(found, chapters=chapters, refusal=refusal)
 
 
 def _fit_named(
@@ -109,7 +115,9 @@ def _fit_named(
     chapter = fit_chapter(
         fitted, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings)
     )
-    return FittedMuscle(fitted, entry, [chapter, *chapters], odd)
+    result = result_chapter(_measured_in(names), fitted, chapter, recordings)
+    chapter = without_opening_figures(chapter, result)
+    return FittedMuscle(fitted, entry, [result, chapter, *chapters], odd)
 
 
 def _compare(
@@ -162,7 +170,9 @@ def _compare(
     fitted = dataclasses.replace(
         fit_chapter(best.fit, entry, (), _notes_of(recordings)), brief=False
     )
-    return FittedMuscle(best.fit, entry, [*comparisons, fitted, *more], [*odd, *unused], selection)
+    result = result_chapter(_measured_in(names), best.fit, fitted, recordings, selection)
+    chapters = [result, without_opening_figures(fitted, result), *comparisons, *more]
+    return FittedMuscle(best.fit, entry, chapters, [*odd, *unused], selection)
 
 
 def _more(
@@ -248,6 +258,11 @@ def _shortened(chapter: Chapter, table: Table, first: bool) -> Table:
     return dataclasses.replace(
         table, brief=sorted({*table.brief[:RANKED], laws.index(recommended)})
     )
+
+
+def _measured_in(names: Sequence[Path]) -> str:
+    """The heading of a report: what was measured."""
+    return f"Muscle measured in {list_files([name.name for name in names])}"
 
 
 def _notes_of(recordings: Sequence[Recording]) -> tuple[str, ...]:

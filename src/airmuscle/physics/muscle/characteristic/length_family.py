@@ -98,7 +98,9 @@ class EffectiveLength(LengthLaw):
     ) -> dict[str, Characteristic]:
         length = DataScales.of(data).check_lengths().resting_length
         return {
-            f"effective length, degree {n}": cls(surface(n), length, dead_length=0.005)
+            f"surface of degree {n} at an effective length": cls(
+                surface(n), length, dead_length=0.005
+            )
             for n in range(2, 6)
         }
 
@@ -163,7 +165,7 @@ class LengthFamily(LengthLaw):
     ) -> dict[str, Characteristic]:
         length = DataScales.of(data).check_lengths().resting_length
         return {
-            f"term in {cls.term}, degree {n}, change of degree {k}": cls(
+            f"surface of degree {n} + length correction {cls.term} of degree {k}": cls(
                 surface(n), surface(k), length, length
             )
             for n in range(2, 6)
