@@ -7,6 +7,7 @@ from .model_selection import compare as compare
 from .model_selection import eligible_models as eligible_models
 from .model_selection import excess_error as excess_error
 from .model_selection import recommend as recommend
+from .result_chapter import error_interval as error_interval
 from .specimen_errors import SpecimenErrors as SpecimenErrors
 from .specimen_errors import odd_specimen_notes as odd_specimen_notes
 from .specimen_errors import specimens_of as specimens_of
