@@ -91,48 +91,10 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str 
                 )
             case "pattern" if isinstance(value, str):
                 found += [] if re.search(given, value) else [f"{where}: no number with a unit"]
-            case "minItems" | "maxItems" if isinstance(value, list):
-                found += (
-                    []
-                    if (len(value) >= given if keyword == "minItems" else len(value) <= given)
-                    else [where]
-                )
-            case "prefixItems" if isinstance(value, list):
-                pairs = zip(value, given, strict=False)
-                found += [
-                    f
-                    for i, (item, s) in enumerate(pairs)
-                    for f in faults(item, s, root, f"{where}[{i}]")
-                ]
-            case "items" if isinstance(value, list):
-                found += [
-                    f
-                    for i, item in enumerate(value)
-                    for f in faults(item, given, root, f"{where}[{i}]")
-                ]
-            case "required" if isinstance(value, dict):
-                found += [f"{where}: lacks {key}" for key in given if key not in value]
-            case "properties" if isinstance(value, dict):
-                here = [key for key in given if key in value]
-                found += [
-                    f
-                    for key in here
-                    for f in faults(value[key], given[key], root, f"{where}.{key}")
-                ]
-            case "additionalProperties" if isinstance(value, dict):
-                rest = {
-                    key: item
-                    for key, item in value.items()
-                    if key not in schema.get("properties", {})
-                }
-                if given is False:
-                    found += [f"{where}: {key} is not known" for key in rest]
-                else:
-                    found += [
-                        f
-                        for key, item in rest.items()
-                        for f in faults(item, given, root, f"{where}.{key}")
-                    ]
+            case _ if keyword in OF_LISTS and isinstance(value, list):
+                found += faults_of_list(value, keyword, given, root, where)
+            case _ if keyword in OF_TABLES and isinstance(value, dict):
+                found += faults_of_table(value, keyword, schema, root, where)
             case _ if keyword in ABOUT or keyword in JUDGED:
                 continue
             case _:
@@ -140,6 +102,43 @@ def faults(value: Any, schema: dict[str, Any], root: dict[str, Any], where: str 
     return found
 
 
+def faults_of_list(
+    value: list[Any], keyword: str, given: Any, root: dict[str, Any], where: str
+) -> list[str]:
+    """What a list has against a keyword of lists."""
+    if keyword in ("minItems", "maxItems"):
+        allowed = len(value) >= given if keyword == "minItems" else len(value) <= given
+        return [] if allowed else [where]
+    schemas = given if keyword == "prefixItems" else [given] * len(value)
+    found = []
+    for i, (item, schema) in enumerate(zip(value, schemas, strict=False)):
+        found += faults(item, schema, root, f"{where}[{i}]")
+    return found
+
+
+def faults_of_table(
+    value: dict[str, Any], keyword: str, schema: dict[str, Any], root: dict[str, Any], where: str
+) -> list[str]:
+    """What a table has against a keyword of tables."""
+    given = schema[keyword]
+    if keyword == "required":
+        return [f"{where}: lacks {key}" for key in given if key not in value]
+    known = schema.get("properties", {})
+    if keyword == "additionalProperties":
+        further = [key for key in value if key not in known]
+        if given is False:
+            return [f"{where}: {key} is not known" for key in further]
+        schemas = dict.fromkeys(further, given)
+    else:
+        schemas = {key: known[key] for key in known if key in value}
+    found = []
+    for key, of_key in schemas.items():
+        found += faults(value[key], of_key, root, f"{where}.{key}")
+    return found
+
+
+OF_LISTS = ("minItems", "maxItems", "prefixItems", "items")
+OF_TABLES = ("required", "properties", "additionalProperties")
 JUDGED = {
     "minimum",
     "maximum",

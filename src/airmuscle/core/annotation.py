@@ -73,16 +73,21 @@ def _conforms_to_parts(value: Any, kind: Any, arguments: tuple[Any, ...], *, lis
     if kind is tuple:
         kinds = (tuple, list) if lists else (tuple,)
         return isinstance(value, kinds) and _conform(value, arguments, lists=lists)
-    if kind is Sequence:
-        is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-        return is_sequence and _conform(value, (arguments[0], ...), lists=lists)
-    if kind in (Collection, Iterable):
-        if isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
-            return all(conforms(item, arguments[0], lists=lists) for item in value)
-        return isinstance(value, kind) and not isinstance(value, np.ndarray)
     if kind is Callable:
         return callable(value) and _takes(value, arguments[0])
+    if kind in (Sequence, Collection, Iterable):
+        return _conforms_to_collection(value, kind, arguments[0], lists=lists)
     return True
+
+
+def _conforms_to_collection(value: Any, kind: Any, of_item: Any, *, lists: bool) -> bool:
+    """Whether a value conforms to a sequence, a collection or an iterable of items."""
+    if kind is Sequence:
+        is_sequence = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+        return is_sequence and _conform(value, (of_item, ...), lists=lists)
+    if isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
+        return all(conforms(item, of_item, lists=lists) for item in value)
+    return isinstance(value, kind) and not isinstance(value, np.ndarray)
 
 
 def _conform(items: Sequence[Any], arguments: tuple[Any, ...], *, lists: bool) -> bool:

@@ -206,13 +206,8 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     unit = "" if declared.unit == "1" else f" {declared.unit}"
     label = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
     allowed = f"allowed range: {low:g} to {high:g}{unit}."
-    if isinstance(value, str) and is_known_unit(declared.unit):
-        value = quantity(value, declared.unit, where=label)
-    if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
-        in_unit = f" in{unit}" if unit else ""
-        raise ParameterError(f"{label} is {abridged(value)}; it must be a number{in_unit}.")
     try:
-        value = value if isinstance(value, AbsolutePressure) else float(value)
+        value = _as_number(declared.unit, label, value)
     except OverflowError:
         raise ParameterError(f"{label} is too large a number; {allowed}") from None
     if not math.isfinite(value):
@@ -229,6 +224,18 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
             stacklevel=5,
         )
     return value
+
+
+def _as_number(unit: str, label: str, value: Any) -> Any:
+    """A number as float or AbsolutePressure, a text with a unit in SI units. Raises ParameterError
+    for anything else, OverflowError for a number that is too large.
+    """
+    if isinstance(value, str) and is_known_unit(unit):
+        value = quantity(value, unit, where=label)
+    if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
+        in_unit = "" if unit == "1" else f" in {unit}"
+        raise ParameterError(f"{label} is {abridged(value)}; it must be a number{in_unit}.")
+    return value if isinstance(value, AbsolutePressure) else float(value)
 
 
 def _is_plausible(declared: Parameter, value: float) -> bool:

@@ -319,50 +319,82 @@ def _line(node: Node, texts: Sequence[str], of_arrays: bool) -> str:
 
 
 def _printed(function: Recorded, beside: set[int]) -> Callable[[Sequence[Vector]], Sequence[Any]]:
-    """The function as Python text.
+    """The function as Python text."""
+    return _Text(function, beside).compiled()
+
+
+class _Text:
+    """The text of a recorded function.
 
     The name of a value is used again after its last use: its array is freed while it is cached.
     """
-    last: dict[int, int] = {}
-    for node in function.ordered:
-        last.update((id(x), id(node)) for x in node.arguments)
-    for root in function.roots:
-        last.pop(id(root), None)
-    names: dict[int, str] = {}
-    constants: dict[float, str] = {}
-    free: list[str] = []
-    lines: list[str] = []
-    count = 0
-    for node in function.ordered:
-        if not node.arguments:
-            argument, element = function.place[id(node)]
-            names[id(node)] = f"x{argument}[{element}]"
-            continue
-        of_arrays = id(node) in beside
-        texts = [_text(x, names) for x in node.arguments]
-        if _form_of_constants(node, of_arrays) is np.array:
-            for position, operand in enumerate(node.arguments):
-                if operand.operation == CONSTANT:
-                    name = constants.setdefault(operand.value, f"c{len(constants)}")
-                    texts[position] = name
-        text = _line(node, texts, of_arrays)
+
+    def __init__(self, function: Recorded, beside: set[int]) -> None:
+        self._function = function
+        self._beside = beside
+        self._names: dict[int, str] = {}
+        self._constants: dict[float, str] = {}
+        self._free: list[str] = []
+        self._lines: list[str] = []
+        self._variables = 0
+        self._last = self._last_uses()
+
+    def _last_uses(self) -> dict[int, int]:
+        """The node that reads each node last; of a result, none."""
+        last: dict[int, int] = {}
+        for node in self._function.ordered:
+            last.update((id(argument), id(node)) for argument in node.arguments)
+        for root in self._function.roots:
+            last.pop(id(root), None)
+        return last
+
+    def compiled(self) -> Callable[[Sequence[Vector]], Sequence[Any]]:
+        """The function of the text."""
+        source = self._source()
+        space = dict(_names())
+        for value, name in self._constants.items():
+            space[name] = np.array(value)
+        exec(compile(source, "<recorded function>", "exec"), space)
+        evaluate: Callable[[Sequence[Vector]], Sequence[Any]] = space["evaluate"]
+        return evaluate
+
+    def _source(self) -> str:
+        function = self._function
+        for node in function.ordered:
+            if node.arguments:
+                self._append(node)
+            else:
+                argument, element = function.place[id(node)]
+                self._names[id(node)] = f"x{argument}[{element}]"
+        head = ["def evaluate(vectors):"]
+        if function.inputs:
+            vectors = "".join(f"x{i}, " for i in range(len(function.inputs)))
+            head.append(f"    {vectors} = vectors")
+        results = "".join(f"{_text(root, self._names)}, " for root in function.roots)
+        return "\n".join([*head, *self._lines, f"    return ({results})"])
+
+    def _append(self, node: Node) -> None:
+        """Append the assignment of a node."""
+        of_arrays = id(node) in self._beside
+        form = _form_of_constants(node, of_arrays)
+        texts = [self._operand(argument, form) for argument in node.arguments]
+        self._release(node)
+        name = self._free.pop() if self._free else self._new_name()
+        self._names[id(node)] = name
+        self._lines.append(f"    {name} = {_line(node, texts, of_arrays)}")
+
+    def _release(self, node: Node) -> None:
+        """Let the names of the values that a node is the last to read be used again."""
         for identity in {id(argument) for argument in node.arguments}:
-            name = names.get(identity, "")
-            if last.get(identity) == id(node) and name.startswith("v"):
-                free.append(name)
-        if free:
-            name = free.pop()
-        else:
-            name = f"v{count}"
-            count += 1
-        names[id(node)] = name
-        lines.append(f"    {name} = {text}")
-    arguments = "".join(f"x{i}, " for i in range(len(function.inputs)))
-    results = "".join(f"{_text(root, names)}, " for root in function.roots)
-    unpack = [f"    {arguments} = vectors"] if arguments else []
-    source = "\n".join(["def evaluate(vectors):", *unpack, *lines, f"    return ({results})"])
-    space = dict(_names())
-    space.update((name, np.array(value)) for value, name in constants.items())
-    exec(compile(source, "<recorded function>", "exec"), space)
-    evaluate: Callable[[Sequence[Vector]], Sequence[Any]] = space["evaluate"]
-    return evaluate
+            name = self._names.get(identity, "")
+            if self._last.get(identity) == id(node) and name.startswith("v"):
+                self._free.append(name)
+
+    def _operand(self, argument: Node, form: Callable[[float], Any]) -> str:
+        if argument.operation == CONSTANT and form is np.array:
+            return self._constants.setdefault(argument.value, f"c{len(self._constants)}")
+        return _text(argument, self._names)
+
+    def _new_name(self) -> str:
+        self._variables += 1
+        return f"v{self._variables - 1}"

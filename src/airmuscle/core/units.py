@@ -295,16 +295,7 @@ def conversion(
     the prefix of error messages. Raises UnitError for a unit that is unknown or of another
     dimension.
     """
-    if not (isinstance(unit, str) and isinstance(target, str) and isinstance(where, str)):
-        raise UnitError(
-            f"a unit is a text, such as 'mm', 'kPa' or 'N'; given are {abridged(unit)} and"
-            f" {abridged(target)}."
-        )
-    if (length := max(len(unit), len(target))) > _MAX_CHARACTERS:
-        raise UnitError(
-            f"{where}{': ' if where else ''}a text of {length} characters is not a unit; at most"
-            f" {_MAX_CHARACTERS} are allowed. Write it like 'mm', 'kPa' or 'N'."
-        )
+    _check_texts(unit, target, where)
     if target == ABSOLUTE:
         return _to_absolute(unit, where)
     unit = unit.strip()
@@ -328,6 +319,21 @@ def conversion(
         unit or "dimensionless", "dimensionless" if target == "1" else target, where
     )
     return dataclasses.replace(to_target, assumed_gauge=target == "Pa")
+
+
+def _check_texts(unit: Any, target: Any, where: Any) -> None:
+    """Raise UnitError unless two units are texts of a length that a unit can have."""
+    if not (isinstance(unit, str) and isinstance(target, str) and isinstance(where, str)):
+        raise UnitError(
+            f"a unit is a text, such as 'mm', 'kPa' or 'N'; given are {abridged(unit)} and"
+            f" {abridged(target)}."
+        )
+    length = max(len(unit), len(target))
+    if length > _MAX_CHARACTERS:
+        raise UnitError(
+            f"{where}{': ' if where else ''}a text of {length} characters is not a unit; at most"
+            f" {_MAX_CHARACTERS} are allowed. Write it like 'mm', 'kPa' or 'N'."
+        )
 
 
 def _to_absolute(unit: str, where: str) -> UnitConversion:

@@ -11,7 +11,7 @@ import importlib
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,15 @@ class _Encoder:
         self.blocks: list[bytes] = []
         self._places: dict[int, dict[str, int]] = {}
         self._alive: list[Any] = []
+        self._forms: dict[type, tuple[str, Callable[[Any], Any]]] = {
+            tuple: ("tuple", self._nodes),
+            AbsolutePressure: ("absolute", lambda value: [value.absolute, value.ambient]),
+            HintedText: ("hinted", lambda value: self._nodes(value.parts)),
+            Counter: ("counts", self._pairs),
+            dict: ("table", self._pairs),
+            range: ("range", lambda value: [value.start, value.stop, value.step]),
+        }
+        """The name of the form of a type, and its contents."""
 
     def node(self, value: Any) -> Any:
         """The JSON of a value."""
@@ -71,21 +80,15 @@ class _Encoder:
             return value
         if kind is list:
             return self._nodes(value)
-        if kind is tuple:
-            return {"tuple": self._nodes(value)}
-        if kind is AbsolutePressure:
-            return {"absolute": [value.absolute, value.ambient]}
-        if kind is HintedText:
-            return {"hinted": self._nodes(value.parts)}
         constant = _name_of_constant(value)
         if constant:
             return {"constant": constant}
-        if kind is Counter:
-            return {"counts": self._pairs(value)}
-        if kind is dict or (isinstance(value, Mapping) and kind.__module__ == "builtins"):
+        form = self._forms.get(kind)
+        if form is not None:
+            name, contents = form
+            return {name: contents(value)}
+        if isinstance(value, Mapping) and kind.__module__ == "builtins":
             return {"table": self._pairs(value)}
-        if kind is range:
-            return {"range": [value.start, value.stop, value.step]}
         if isinstance(value, np.generic):
             return {"number": self._array(np.asarray(value))}
         if isinstance(value, enum.Enum):

@@ -247,13 +247,23 @@ class CallingFunction:
     def _call(self, call: Call, layout: Layout) -> None:
         """Append a call; the values that it returns are known from then on."""
         name = self._functions.name_of(call.pattern, layout, self._attributes)
-        firsts = [self._place_of(call.inputs[piece.anchor]) for piece in layout.read_pieces]
-        firsts += [self._stored[call.results[piece.anchor]] for piece in layout.written_pieces]
-        addresses = [self._block.address(*place) for place in firsts if place is not None]
         values = [self._values.value_of(call.inputs[j]) for j in layout.passed]
+        addresses = self._addresses(call, layout)
         results = self._block.call_part(name, addresses, values, len(layout.returned))
         for r, value in zip(layout.returned, results, strict=True):
             self._values.values[call.results[r]] = value
+
+    def _addresses(self, call: Call, layout: Layout) -> list[str]:
+        """Where the pieces of arrays of a call begin."""
+        addresses = []
+        for piece in layout.read_pieces:
+            place = self._place_of(call.inputs[piece.anchor])
+            assert place is not None
+            addresses.append(self._block.address(*place))
+        for piece in layout.written_pieces:
+            place = self._stored[call.results[piece.anchor]]
+            addresses.append(self._block.address(*place))
+        return addresses
 
 
 def _calls(divided: Sequence[Section]) -> Iterable[Call]:

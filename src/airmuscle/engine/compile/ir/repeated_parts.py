@@ -171,11 +171,12 @@ class _Groups:
         """The shape of each root, and where regular instructions read it."""
         graph = self._graph
         uses: dict[int, list[tuple[int, int]]] = {root: [] for root in self._roots}
-        for k, sources in enumerate(graph.sources):
-            if graph.is_regular[k]:
-                for place, source in enumerate(sources):
-                    if source in uses:
-                        uses[source].append((int(graph.code.body[k].operation), place))
+        regular = (k for k, is_regular in enumerate(graph.is_regular) if is_regular)
+        for k in regular:
+            operation = int(graph.code.body[k].operation)
+            for place, source in enumerate(graph.sources[k]):
+                if source in uses:
+                    uses[source].append((operation, place))
         return {root: (graph.shapes[root], *sorted(several)) for root, several in uses.items()}
 
     def _reached(self) -> list[int]:
@@ -296,6 +297,25 @@ class _Parts:
 
     def _calls(self) -> dict[int, list[Call]]:
         """The calls of all patterns that occur often enough, by the section that they end."""
+        calls: dict[int, list[Call]] = defaultdict(list)
+        for (lines, kinds, names), parts in self._alike().items():
+            if len(parts) < LEAST_CALLS:
+                continue
+            outputs = tuple((0, place, name) for place, name in enumerate(names))
+            pattern = Pattern(Code(lines, outputs), kinds)
+            for part in parts:
+                self._called.update(part.numbers)
+                section = self._section[part.numbers[0]]
+                calls[section].append(self._call(pattern, part))
+        return calls
+
+    def _call(self, pattern: Pattern, part: _Part) -> Call:
+        body = self._graph.code.body
+        results = [body[k].result for k in part.results]
+        return Call(pattern, tuple(part.inputs), tuple(results))
+
+    def _alike(self) -> dict[_Signature, list[_Part]]:
+        """All parts that are long enough, by what equal ones have in common."""
         members: dict[int, list[int]] = defaultdict(list)
         for k, group in enumerate(self._groups.of_instruction):
             if group >= 0:
@@ -303,22 +323,12 @@ class _Parts:
         is_result = self._results()
         alike: dict[_Signature, list[_Part]] = defaultdict(list)
         for numbers in members.values():
-            if len(numbers) >= LEAST_LENGTH:
-                part = self._part(numbers, is_result)
-                kinds = tuple(map(self._kind, part.inputs))
-                alike[tuple(part.lines), kinds, tuple(part.names)].append(part)
-        calls: dict[int, list[Call]] = defaultdict(list)
-        for (lines, kinds, names), parts in alike.items():
-            if len(parts) < LEAST_CALLS:
+            if len(numbers) < LEAST_LENGTH:
                 continue
-            outputs = tuple((0, place, name) for place, name in enumerate(names))
-            pattern = Pattern(Code(lines, outputs), kinds)
-            for part in parts:
-                self._called.update(part.numbers)
-                results = tuple(self._graph.code.body[k].result for k in part.results)
-                call = Call(pattern, tuple(part.inputs), results)
-                calls[self._section[part.numbers[0]]].append(call)
-        return calls
+            part = self._part(numbers, is_result)
+            kinds = tuple(map(self._kind, part.inputs))
+            alike[tuple(part.lines), kinds, tuple(part.names)].append(part)
+        return alike
 
     def _kind(self, operand: Operand) -> InputKind:
         array = None if operand in self._graph.number else self._graph.array_of(operand)
