@@ -6,7 +6,7 @@ from typing import Any
 
 from docutils import nodes
 
-from airmuscle.report.formatting import to_display_mathml, to_mathml
+from airmuscle.report.formulas import to_display_mathml, to_mathml
 
 
 def set_up_mathml(app: Any) -> None:

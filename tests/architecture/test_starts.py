@@ -45,6 +45,10 @@ STARTS = {
         SIMULATION,
         {*HEAVY, *FITS, "numpy.ma", "airmuscle.engine.compile.kernels.rodas4"},
     ),
+    "airmuscle list": (
+        "from airmuscle.outlets.cli import app\napp(['list'], standalone_mode=False)",
+        {*HEAVY, "llvmlite", "numpy", "airmuscle.physics", "airmuscle.core.units"},
+    ),
     "airmuscle evaluate": (
         (
             "from airmuscle.outlets.cli import app\napp(['evaluate', 'chou-hannaford',"

@@ -30,6 +30,7 @@ SHARED_LAWS = {
     "base",
     "beyond_range",
     "calls",
+    "data_scales",
     "modes",
     "rubber",
     "sampling",
@@ -337,7 +338,16 @@ def test_options_of_commands_are_declared_in_requests():
     for the parser.
     """
     files = {path.stem for path in FILES if "CommandOption(" in path.read_text(encoding="utf-8")}
-    assert files <= {"parser", "options", "commands", "library", "simulate", "fit", "tune"}
+    assert files <= {
+        "parser",
+        "requested",
+        "options",
+        "commands",
+        "library",
+        "simulate",
+        "fit",
+        "tune",
+    }
 
 
 # Code for users

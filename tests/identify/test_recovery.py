@@ -14,12 +14,12 @@ import warnings
 import numpy as np
 import pytest
 
+from airmuscle import files
 from airmuscle.bench import UNCENSORED, confidence_band, fit, weakly_determined
 from airmuscle.bench.statics import fitted_quantity_of
 from airmuscle.core import tree
 from airmuscle.errors import AirmuscleWarning, IdentificationError
 from airmuscle.files import library
-from airmuscle.files.library import files
 from airmuscle.physics import Clamped, ContractionLaw, ForceLaw, Tabulated, ValidityRange
 from airmuscle.recording import Recording
 

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from airmuscle import files
 from airmuscle.core import autodiff
 from airmuscle.errors import AirmuscleWarning, ParameterError, SolveError
 from airmuscle.files import Entry, library
-from airmuscle.files.library import files
 from airmuscle.physics import Characteristic, ContractionLaw, ForceLaw, PressureLaw, ValidityRange
 from airmuscle.physics.muscle.characteristic.solve import find_first_root
 

@@ -105,7 +105,7 @@ def test_a_file_whose_name_is_as_long_as_the_system_allows_is_written(tmp_path: 
 
 SECOND = """
 import sys
-from airmuscle.core.atomic_output import check_writable, exclusive_folders
+from airmuscle.core import check_writable, exclusive_folders
 from airmuscle.errors import FileError
 try:
     with exclusive_folders():

@@ -835,7 +835,7 @@ main()
             (
                 "click",
                 "airmuscle.outlets.cli.commands",
-                "airmuscle.outlets.cli.library",
+                "airmuscle.outlets.cli.evaluate",
                 "airmuscle.report.text",
             )
         )

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from airmuscle import files
 from airmuscle.bench import fit
 from airmuscle.core import cite
 from airmuscle.errors import (
@@ -26,7 +27,7 @@ from airmuscle.errors import (
     UnknownNameError,
 )
 from airmuscle.files import Entry, library
-from airmuscle.files.library import PLANT_READER, Location, files, model_class, model_names, write
+from airmuscle.files.library import PLANT_READER, Location, model_class, model_names, write
 from airmuscle.physics import (
     BoucWen,
     Braid,

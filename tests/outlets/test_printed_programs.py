@@ -16,6 +16,7 @@ import numpy as np
 import plants
 import printed
 import pytest
+from operation_points import Operations, states_and_values
 
 from airmuscle.engine.compile import compile_system, derivatives, functions
 from airmuscle.engine.compile.ir.instructions import Operation
@@ -78,6 +79,15 @@ def c_values(plant, states, inputs, folder, kind=np.float64):
         printed.call(library.jac, x, np.append(u, 0.0), c, f, j, kind=kind)
         rows.append(np.concatenate([f, j[: sizes.jacobian]]))
     return np.array(rows, dtype=float)
+
+
+def test_c_gives_the_values_of_every_operation(tmp_path):
+    states, values = states_and_values()
+    inputs = np.zeros((len(states), 0))
+    expected = printed.library_values(Operations(), states, inputs)
+    found = c_values(Operations(), states, inputs, tmp_path)
+    assert printed.deviation(found, expected) < 1e-14
+    assert np.allclose(found[:, : states.shape[1]], values, rtol=1e-14, atol=0.0)
 
 
 @pytest.mark.parametrize("name", ALL)

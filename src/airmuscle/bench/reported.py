@@ -6,7 +6,7 @@ import abc
 import shutil
 from collections.abc import Sequence
 
-from ..recording.columns import display_scale, quantity_of
+from .. import recording
 from ..recording.notebook import Card, NotebookDisplay
 from ..report.chapter import Chapter, TableColumn
 from ..report.shown import shown_columns, value_cells
@@ -51,8 +51,8 @@ def unit_column(names: Sequence[str]) -> TableColumn:
     """The column "unit" of a table each row of which has a value of another quantity, by the names
     of columns.
     """
-    known = [quantity_of(name) for name in names]
-    shown = [display_scale(name)[1].removesuffix("-") for name in names]
+    known = [recording.quantity_of(name) for name in names]
+    shown = [recording.display_scale(name)[1].removesuffix("-") for name in names]
     return TableColumn(
         ["" if quantity is None else quantity.unit for quantity in known], shown=shown
     )

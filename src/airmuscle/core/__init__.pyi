@@ -7,7 +7,6 @@ from .arrays import Array as Array
 from .atomic_output import atomic_file as atomic_file
 from .atomic_output import atomic_folder as atomic_folder
 from .atomic_output import check_writable as check_writable
-from .atomic_output import exclusive_folders as exclusive_folders
 from .atomic_output import temporary_folder as temporary_folder
 from .declaration import Parameter as Parameter
 from .declaration import model as model
@@ -19,6 +18,7 @@ from .diagnostics import DiagnosticCode as DiagnosticCode
 from .errors import Hint as Hint
 from .errors import HintedText as HintedText
 from .errors import printable as printable
+from .folder_locks import exclusive_folders as exclusive_folders
 from .plotting import given_axes as given_axes
 from .plotting import new_figure as new_figure
 from .reference import Reference as Reference

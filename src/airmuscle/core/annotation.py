@@ -231,8 +231,10 @@ def check_field_types(obj: Any) -> None:
     """
     hints = type_hints(type(obj))
     for field in dataclasses.fields(obj):
-        hint = hints.get(field.name)
         value: Any = getattr(obj, field.name, None)
+        if value is None and field.default is None:
+            continue
+        hint = hints.get(field.name)
         if type(value) is hint and (
             hint is not int or abs(value) < _MAX_INTEGER
         ):  # most often so, and fast

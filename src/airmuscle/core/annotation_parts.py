@@ -6,8 +6,11 @@ field may be annotated with an alias of Python 3.12 (`type Lengths = tuple[float
 """
 
 import functools
+import inspect
+import sys
 import types
 import typing
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy.typing as npt
@@ -17,15 +20,21 @@ class AnyArray:
     """NumPy's `ArrayLike` among the alternatives of an annotation."""
 
 
+_PROGRAM = __name__.partition(".")[0]
 _UNIONS = (typing.Union, types.UnionType)
 _ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))
 """Members of `ArrayLike` where it is a union; empty where it is an alias."""
 
 
-def type_hints(cls: Any) -> dict[str, Any]:
+def type_hints(cls: Any) -> Mapping[str, Any]:
     """The annotations of a class or function as types; empty if they contain names imported for
     type checking only.
+
+    Those of a class of this package are evaluated one by one when they are asked for, so that the
+    classes in a quoted annotation are imported for the fields that are in use.
     """
+    if isinstance(cls, type) and cls.__module__.startswith(f"{_PROGRAM}."):
+        return _deferred(cls)
     try:
         return _resolved(cls)
     except NameError:
@@ -35,6 +44,34 @@ def type_hints(cls: Any) -> dict[str, Any]:
 @functools.cache
 def _resolved(cls: Any) -> dict[str, Any]:
     return {name: unaliased(hint) for name, hint in typing.get_type_hints(cls).items()}
+
+
+class DeferredHints(Mapping[str, Any]):
+    """The annotations of a class, each of which is evaluated when it is asked for."""
+
+    def __init__(self, cls: type[Any]) -> None:
+        self._written = {
+            name: (vars(sys.modules[base.__module__]), hint)
+            for base in reversed(cls.__mro__)
+            for name, hint in inspect.get_annotations(base).items()
+        }
+        self._evaluated: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._evaluated:
+            namespace, hint = self._written[name]
+            value = eval(hint, namespace) if isinstance(hint, str) else hint
+            self._evaluated[name] = unaliased(type(None) if value is None else value)
+        return self._evaluated[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._written)
+
+    def __len__(self) -> int:
+        return len(self._written)
+
+
+_deferred = functools.cache(DeferredHints)
 
 
 def unaliased(hint: Any) -> Any:

@@ -8,15 +8,10 @@ import shutil
 import socket
 import tempfile
 import threading
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import FileError, FolderInUseError
-
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
+from .folder_locks import FULL, hold, raise_file_errors, remove_empty_folders
 
 _MAX_NAME = 100
 """Number of characters of the name of a file that its temporary file has (chosen); file systems
@@ -31,12 +26,6 @@ follow the name of the file.
 """
 _searched: set[Path] = set()
 """Folders in which this process has removed what killed ones have left."""
-
-
-_held: dict[Path, tuple[int, list[Path]]] | None = None
-"""Descriptors of the folders that are kept from other processes, and the folders that were created
-for it.
-"""
 
 
 @contextlib.contextmanager
@@ -91,9 +80,6 @@ process follows.
 """
 _TEMPORARY = f"airmuscle-{socket.gethostname().replace('/', '')}-"
 """The same for a folder in that of the system."""
-FULL = (errno.ENOSPC, errno.EDQUOT)
-"""Numbers of the errors of a full disk and of an exhausted quota."""
-REMEDY_WHERE_FULL = "Free space there, or specify another folder."
 
 
 @contextlib.contextmanager
@@ -121,7 +107,7 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
         finally:
             shutil.rmtree(staging, ignore_errors=True)
     except BaseException:
-        _remove_empty_folders(created)
+        remove_empty_folders(created)
         raise
 
 
@@ -176,86 +162,16 @@ def check_writable(folder: Path | str, *, shared: bool = False) -> None:
     try:
         with atomic_folder(target):
             pass
-        if _held is not None and not shared:
-            _hold(target, created)
+        if not shared and hold(target, created):
             created = []
         created = [] if shared else created
     finally:
-        _remove_empty_folders(created)
-
-
-@contextlib.contextmanager
-def exclusive_folders() -> Iterator[None]:
-    """Keep other processes from the folders that `check_writable` checks in the block, so that no
-    files are mixed.
-
-    The lock is that of the operating system, which also ends with the process; Windows has none for
-    folders.
-    """
-    global _held  # noqa: PLW0603
-    outer = _held
-    _held = {}
-    try:
-        yield
-    finally:
-        released = _held
-        _held = outer
-        for descriptor, created in released.values():
-            os.close(descriptor)
-            _remove_empty_folders(created)
-
-
-def _hold(target: Path, created: list[Path]) -> None:
-    """Lock a folder until the end of the block; `created` are removed then, where they are
-    empty.
-    """
-    if fcntl is None or _held is None or target.resolve() in _held:
-        return
-    with raise_file_errors(target):
-        target.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(target, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        raise FolderInUseError(
-            f"{target}: another command is writing to this folder. Wait until it ends, or specify"
-            " another folder."
-        ) from None
-    except OSError:  # a file system without locks
-        os.close(descriptor)
-        return
-    _held[target.resolve()] = descriptor, created
-
-
-@contextlib.contextmanager
-def raise_file_errors(target: Path, numbers: Collection[int] = ()) -> Iterator[None]:
-    """Raise FileError for an error of the operating system; of these numbers alone, if some are
-    given.
-    """
-    try:
-        yield
-    except OSError as error:
-        if numbers and error.errno not in numbers:
-            raise
-        at = f" ({error.filename})" if error.filename and Path(error.filename) != target else ""
-        remedy = (
-            REMEDY_WHERE_FULL if error.errno in FULL else "Specify a folder with write permission."
-        )
-        raise FileError(
-            f"{target}: cannot be written to: {error.strerror or error}{at}. {remedy}"
-        ) from error
+        remove_empty_folders(created)
 
 
 def _missing_folders(folder: Path) -> list[Path]:
     """Return the folders that `mkdir(parents=True)` would create, innermost first."""
     return [path for path in (folder, *folder.parents) if not path.exists()]
-
-
-def _remove_empty_folders(folders: list[Path]) -> None:
-    for folder in folders:
-        with contextlib.suppress(OSError):  # not created, or no longer empty
-            folder.rmdir()
 
 
 def _move_files(staging: Path, target: Path) -> None:

@@ -593,6 +593,40 @@ arcsin = _elementary(Operation.ASIN)
 arccos = _elementary(Operation.ACOS)
 arctan = _elementary(Operation.ATAN)
 arcsinh = _elementary(Operation.ASINH)
+sign = _elementary(Operation.SIGN)
+
+
+def ceil(x: Any) -> Node:
+    """The least integer that is not below x."""
+    return negative(floor(-as_node(x)))
+
+
+def log2(x: Any) -> Node:
+    """The logarithm to the base 2."""
+    return multiply(constant(1.0 / math.log(2.0)), log(x))
+
+
+def log10(x: Any) -> Node:
+    """The decimal logarithm."""
+    return multiply(constant(1.0 / math.log(10.0)), log(x))
+
+
+def arccosh(x: Any) -> Node:
+    """The inverse hyperbolic cosine, accurate near 1."""
+    above = as_node(x) - 1.0
+    return log1p(above + sqrt(above * (above + 2.0)))
+
+
+def arctanh(x: Any) -> Node:
+    """The inverse hyperbolic tangent, accurate near 0."""
+    value = as_node(x)
+    return multiply(constant(0.5), log1p(2.0 * value / (1.0 - value)))
+
+
+def logical_not(condition: Any) -> Node:
+    """Logical negation of a condition."""
+    return negated(as_node(condition))
+
 
 _MAKERS: dict[Operation, Callable[..., Node]] = {
     NEGATE: negative,

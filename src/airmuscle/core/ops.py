@@ -2,19 +2,21 @@
 
 Each function selects the library by the type of its operands: floats and NumPy arrays are evaluated
 at once, symbols are recorded (`nodes`), JAX arrays are passed to jax.numpy and expressions of
-CasADi to casadi. Models are written with these functions and + - * / **.
+CasADi to casadi. Models are written with these functions and + - * / **. The functions have the
+names of NumPy; `absolute_value`, `both` and `either` are those of `abs`, `logical_and` and
+`logical_or`. `dir(ops)` lists them.
 """
 
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import nodes
-from .errors import ParameterError
+from .errors import ParameterError, suggestion
 
 Value = Any
 """A float, a NumPy array, a symbol, a JAX array or an expression of CasADi."""
@@ -32,12 +34,15 @@ _SMALLEST = sys.float_info.min
 _LARGEST = sys.float_info.max
 _DOMAINS = {
     **dict.fromkeys(
-        ("sin", "cos", "tan", "arctan", "arcsinh", "tanh", "floor"), (-_LARGEST, _LARGEST)
+        ("sin", "cos", "tan", "arctan", "arcsinh", "tanh", "floor", "ceil", "sign"),
+        (-_LARGEST, _LARGEST),
     ),
     **dict.fromkeys(("exp", "expm1", "sinh", "cosh"), (-700.0, 700.0)),
     **dict.fromkeys(("arcsin", "arccos"), (-1.0, 1.0)),
     "sqrt": (0.0, _LARGEST),
-    "log": (_SMALLEST, _LARGEST),
+    **dict.fromkeys(("log", "log2", "log10"), (_SMALLEST, _LARGEST)),
+    "arccosh": (1.0, _LARGEST),
+    "arctanh": (math.nextafter(-1.0, 0.0), math.nextafter(1.0, 0.0)),
     "log1p": (math.nextafter(-1.0, 0.0), _LARGEST),
 }
 """Numbers for which a function is certain to have a finite value."""
@@ -159,6 +164,52 @@ def either(a: Value, b: Value) -> Value:
     return library.logical_or(a, b) if hasattr(library, "logical_or") else library.logic_or(a, b)
 
 
+def negation(condition: Value) -> Value:
+    """Logical negation of a condition."""
+    library = _library(condition)
+    if library is None:
+        return not condition
+    negate = library.logical_not if hasattr(library, "logical_not") else library.logic_not
+    return negate(condition)
+
+
+abs = absolute_value
+logical_and = both
+logical_or = either
+logical_not = negation
+
+
+def square(x: Value) -> Value:
+    """x^2."""
+    return x * x
+
+
+def power(x: Value, exponent: Value) -> Value:
+    """x raised to an exponent; NaN for a negative number and a fraction."""
+    if _library(x, exponent) not in (None, np):
+        return x**exponent
+    with np.errstate(all="ignore"):
+        value = np.power(np.asarray(x, dtype=float), exponent)
+    return value if np.ndim(value) else float(value)
+
+
+def arctan2(y: Value, x: Value) -> Value:
+    """The angle of the point (x, y), from -pi to pi; 0 at the origin, whose sign of zero counts for
+    numbers alone.
+    """
+    library = _library(y, x)
+    if library is None:
+        return math.atan2(y, x)
+    if library is not nodes:
+        return library.arctan2(y, x)
+    is_flat = absolute_value(x) >= absolute_value(y)
+    larger = where(is_flat, x, y)
+    ratio = where(is_flat, y, x) / where(larger == 0.0, 1.0, larger)
+    angle = arctan(ratio)
+    behind = where(x < 0.0, where(y >= 0.0, pi, -pi), 0.0)
+    return where(is_flat, angle + behind, where(y >= 0.0, 0.5 * pi, -0.5 * pi) - angle)
+
+
 def hypot(x: Value, y: Value) -> Value:
     """Square root of x^2 + y^2; v/hypot(v, v_0) is a smooth sign of a speed v whose transition is
     v_0 wide.
@@ -204,8 +255,12 @@ def sqrt(x: Value) -> Value:
 
 _general_sqrt = _elementary("sqrt", "Square root of any operand.")
 floor = _elementary("floor", "Greatest integer that is not above `x`; its derivative is 0.")
+ceil = _elementary("ceil", "Least integer that is not below `x`; its derivative is 0.")
+sign = _elementary("sign", "-1, 0 or 1; its derivative is 0.")
 exp = _elementary("exp", "Exponential function.")
 log = _elementary("log", "Natural logarithm; NaN below zero.")
+log2 = _elementary("log2", "Logarithm to the base 2; NaN below zero.")
+log10 = _elementary("log10", "Decimal logarithm; NaN below zero.")
 expm1 = _elementary("expm1", "exp(x) - 1, accurate for small `x`.")
 log1p = _elementary("log1p", "Natural logarithm of 1 + x, accurate for small `x`; NaN below -1.")
 sin = _elementary("sin", "Sine of an angle in radians.")
@@ -218,3 +273,73 @@ arcsin = _elementary("arcsin", "Inverse sine, in radians; NaN outside of -1 to 1
 arccos = _elementary("arccos", "Inverse cosine, in radians; NaN outside of -1 to 1.")
 arctan = _elementary("arctan", "Inverse tangent, in radians.")
 arcsinh = _elementary("arcsinh", "Inverse hyperbolic sine.")
+arccosh = _elementary("arccosh", "Inverse hyperbolic cosine; NaN below 1.")
+arctanh = _elementary("arctanh", "Inverse hyperbolic tangent; NaN outside of -1 to 1.")
+
+__all__ = [
+    "abs",
+    "absolute_value",
+    "arccos",
+    "arccosh",
+    "arcsin",
+    "arcsinh",
+    "arctan",
+    "arctan2",
+    "arctanh",
+    "both",
+    "ceil",
+    "clip",
+    "cos",
+    "cosh",
+    "either",
+    "exp",
+    "expm1",
+    "floor",
+    "hypot",
+    "log",
+    "log1p",
+    "log2",
+    "log10",
+    "logical_and",
+    "logical_not",
+    "logical_or",
+    "maximum",
+    "minimum",
+    "pi",
+    "polynomial",
+    "power",
+    "sign",
+    "sin",
+    "sinh",
+    "sqrt",
+    "square",
+    "tan",
+    "tanh",
+    "where",
+]
+_NAMES_ELSEWHERE = {
+    **{name: f"arc{name[1:]}" for name in ("asin", "acos", "atan", "asinh", "acosh", "atanh")},
+    "atan2": "arctan2",
+    "ln": "log",
+    "pow": "power",
+    **dict.fromkeys(("absolute", "fabs"), "abs"),
+    **dict.fromkeys(("max", "fmax", "amax"), "maximum"),
+    **dict.fromkeys(("min", "fmin", "amin"), "minimum"),
+    **dict.fromkeys(("if_else", "select", "piecewise"), "where"),
+    "polyval": "polynomial",
+}
+"""Names that other libraries give to these functions."""
+
+
+def __dir__() -> list[str]:
+    return list(__all__)
+
+
+if not TYPE_CHECKING:  # a type checker itself names an attribute that is missing
+
+    def __getattr__(name: str) -> Any:
+        known = _NAMES_ELSEWHERE.get(name)
+        hint = f" Did you mean '{known}'?" if known else suggestion(name, __all__)
+        raise AttributeError(
+            f"module '{__name__}' has no operation '{name}'; dir(ops) lists them.{hint}"
+        )

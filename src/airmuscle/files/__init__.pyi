@@ -15,6 +15,8 @@ from .library import list_valves as list_valves
 from .library import load as load
 from .library import load_data as load_data
 from .library import load_law as load_law
+from .library import load_muscle as load_muscle
+from .library import load_plant as load_plant
 from .library import load_product as load_product
 from .library import load_valve as load_valve
 from .library import save as save

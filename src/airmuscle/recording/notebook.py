@@ -9,7 +9,8 @@ import html
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..core import AirmuscleError, ShortRepr, rendered
+from .. import core
+from ..core import AirmuscleError, ShortRepr
 
 MAX_ROWS = 14
 MAX_NOTES = 5
@@ -105,7 +106,7 @@ def _chart(card: Card) -> str:
         return f'<p style="margin: 0.3em 0; font-size: 90%">no chart: {_text(error)}</p>'
     content = b""
     for resolution in RESOLUTIONS:
-        content = rendered(figure, ("png",), dots_per_inch=resolution)["png"]
+        content = core.rendered(figure, ("png",), dots_per_inch=resolution)["png"]
         if len(content) <= MAX_CHART:
             break
     data = base64.b64encode(content).decode("ascii")

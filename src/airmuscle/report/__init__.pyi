@@ -24,14 +24,14 @@ from .claims import format_published as format_published
 from .claims import format_reproduced as format_reproduced
 from .claims import statements as statements
 from .data import as_data as as_data
-from .data import as_json as as_json
 from .data import as_sheet as as_sheet
 from .equation.source_code import EXAMPLE as EXAMPLE
 from .equation.source_code import source_codes as source_codes
 from .formatting import format_number as format_number
-from .formatting import to_display_mathml as to_display_mathml
 from .formatting import to_mathtext as to_mathtext
 from .formatting import to_plain as to_plain
+from .formulas import to_display_mathml as to_display_mathml
+from .json_text import as_json as as_json
 from .shown import shown_columns as shown_columns
 from .text import as_text as as_text
 from .write import MAX_SVG_BYTES as MAX_SVG_BYTES
@@ -40,3 +40,9 @@ from .write import render_header as render_header
 from .write import render_page as render_page
 from .write import save_table as save_table
 from .write import write_report as write_report
+
+# isort: split
+# For the outlets, not in __all__
+from .formulas import plain_formula as plain_formula
+from .write import rendered_figure as rendered_figure
+from .write import write_into as write_into

@@ -11,8 +11,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from .. import report
 from ..core import Reference, ShortRepr
-from .claims import Claim
 from .formatting import DIGITS
 
 BY_ROW = "by row"
@@ -171,7 +171,7 @@ class Chapter(ShortRepr):
     name: str
     title: str
     summary: str | tuple[str, ...]
-    claims: tuple[Claim, ...] = ()
+    claims: "tuple[report.Claim, ...]" = ()
     tables: tuple[Table, ...] = ()
     plots: tuple[Plot, ...] = ()
     references: tuple[Reference, ...] = ()

@@ -14,13 +14,10 @@ import csv
 import dataclasses
 import functools
 import io
-import json
 import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any
-
-import numpy as np
 
 from ..core import printable
 from .chapter import Chapter, Table
@@ -70,23 +67,6 @@ def _rows(table: Table) -> list[dict[str, Any]]:
 
 def _key(name: str) -> str:
     return re.sub(r"[^\w.\[\]]+", "_", to_plain(name)).strip("_")
-
-
-def as_json(content: Any) -> str:
-    """Return standard JSON: NumPy values become plain ones, values that are not finite become
-    null.
-    """
-    return json.dumps(_json_value(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _json_value(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _json_value(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_json_value(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def in_words(chapter: Chapter, words: Callable[[str], str]) -> Chapter:

@@ -16,16 +16,10 @@ from typing import Any
 from ..core import FileError, atomic_folder, plotting
 from . import claims as claiming
 from .chapter import Chapter, Plot, Table
-from .data import as_json, csv_text
-from .formatting import (
-    format_cell,
-    format_unit,
-    symbol_formula,
-    to_display_mathml,
-    to_mathml,
-    to_plain,
-    typographic,
-)
+from .data import csv_text
+from .formatting import format_cell, format_unit, to_plain, typographic
+from .formulas import symbol_formula, to_display_mathml, to_mathml
+from .json_text import as_json
 from .shown import SYMBOL, ShownColumn, shown_columns, value_table
 
 MAX_SVG_BYTES = 600_000

@@ -17,7 +17,8 @@ from ...engine.processes import Workers
 from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter, Plot, Table, TableColumn
-from ...report.formatting import symbol_formula, to_mathtext
+from ...report.formatting import to_mathtext
+from ...report.formulas import symbol_formula
 from ..diagnosis import DataUse, support_of
 from ..estimation import (
     GroupSplit,

@@ -13,7 +13,8 @@ from ...engine.compile import System
 from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ...report.shown import BRIEF_ROWS, estimate_table
+from ...report.parameter_tables import estimate_table
+from ...report.shown import BRIEF_ROWS
 from ..estimation import Estimate, Identifiability
 from ..reported import Reported, unit_column
 from .experiment import Unknown

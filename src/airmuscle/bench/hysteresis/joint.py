@@ -12,7 +12,7 @@ from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...report.chapter import Chapter, Plot
-from ...report.shown import parameter_table
+from ...report.parameter_tables import parameter_table
 from ..estimation import effective_sample_size, format_p_value
 from ..inspection import RELATIVE_BAND
 from .loop_data import MILLIMETRES, DataLimits, combine_limits, limit_reservations

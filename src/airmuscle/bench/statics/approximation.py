@@ -11,7 +11,7 @@ from ...physics.muscle.characteristic import Characteristic, ValidityRange, valu
 from ...physics.muscle.characteristic.sampling import check_approximates, sample_force
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
-from ...report.shown import parameter_table
+from ...report.parameter_tables import parameter_table
 from ..estimation import UNCENSORED
 from ..inspection import POINT_COLUMNS
 from ..reported import Reported

@@ -18,7 +18,7 @@ from ...physics.muscle.characteristic import (
 )
 from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw
 from ...physics.muscle.characteristic.calls import silent_beyond_range
-from ...physics.muscle.characteristic.validity_range import DataScales
+from ...physics.muscle.characteristic.data_scales import DataScales
 from ...recording import Recording
 
 FORCE_MARGIN = 3.0

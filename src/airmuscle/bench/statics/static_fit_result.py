@@ -14,7 +14,8 @@ from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter, NamedValue, Plot, Table
-from ...report.shown import BRIEF_ROWS, estimate_table
+from ...report.parameter_tables import estimate_table
+from ...report.shown import BRIEF_ROWS
 from ..diagnosis import Diagnosis, Findings, LawMisfit, Scatter
 from ..estimation import CorrelationIndex, Estimate, Loss, ParameterCovariance
 from ..reported import Reported

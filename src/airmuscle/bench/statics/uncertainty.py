@@ -11,7 +11,8 @@ import numpy as np
 from ...core import BLACK, BLUE, RED, Array, legend_below, new_figure, tree
 from ...physics.muscle.characteristic.base import Characteristic
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ...report.formatting import symbol_formula, to_mathtext
+from ...report.formatting import to_mathtext
+from ...report.formulas import symbol_formula
 from ..reported import Reported
 from .intervals import ProfileLikelihood
 from .static_fit_result import Fit

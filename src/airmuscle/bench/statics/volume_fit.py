@@ -21,7 +21,7 @@ from ...physics.muscle.geometry import Braid, ChebyshevGeometry, Geometry
 from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
-from ...report.shown import parameter_table
+from ...report.parameter_tables import parameter_table
 from ..estimation import EQUIVALENT, aicc
 from ..inspection import level_intervals
 from ..reported import Reported

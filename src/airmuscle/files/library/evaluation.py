@@ -18,17 +18,12 @@ from ...core.errors import (
     RatingError,
     SolveError,
 )
+from ...physics import muscle
 from ...physics.muscle.characteristic import ForceLaw, ValidityRange, validity_range_of
 from ...physics.muscle.characteristic.calls import silent_beyond_range
-from ...physics.muscle.isobars import (
-    Isobars,
-    WorkingPoint,
-    compute_isobars,
-    describe_point,
-    isobar_figure,
-)
+from ...physics.muscle.working_point import WorkingPoint, describe_point
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
-from . import Entry, own_length
+from .entry import Entry, own_length
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 
@@ -126,11 +121,11 @@ class Evaluation(Reported):
     def _figure(self) -> Any:
         law = self.entry.characteristic
         title = self.entry.title
-        return isobar_figure(law, title, self.isobars(), self.validity_range, self.point)
+        return muscle.isobar_figure(law, title, self.isobars(), self.validity_range, self.point)
 
-    def isobars(self) -> Isobars:
+    def isobars(self) -> "muscle.Isobars":
         """The isobars of the law, with that of the point."""
-        return compute_isobars(self.entry.characteristic, self.validity_range, self.point)
+        return muscle.compute_isobars(self.entry.characteristic, self.validity_range, self.point)
 
     def isobar_table(self) -> Table:
         """The isobars as a table with one column of tensions per pressure."""

@@ -75,7 +75,11 @@ def model_names(kind: Any = Any) -> tuple[str, ...]:
 
 
 def has_variants(cls: type[Any]) -> bool:
-    """Whether a file may name a subclass of a class; such stand in the package of the class."""
+    """Whether a file may name a subclass of a class; such stand in the package of the class. A
+    class that a file may name has none: it is a leaf.
+    """
+    if _is_file_model(cls):
+        return False
     packages = [package for package in PACKAGES if cls.__name__ in package.__all__]
     return any(model is not cls and issubclass(model, cls) for model in _models(*packages).values())
 
@@ -104,10 +108,7 @@ def model_class(
         )
     if ":" in name and classes is None:
         return _class_of_code(name, where)
-    package = next(
-        (candidate for candidate in PACKAGES if name in candidate.__all__), None
-    )  # the only one that is imported
-    known = classes if classes is not None else _models(package) if package else {}
+    known = _named_model(name) if classes is None else classes
     if name not in known:
         known = _models(*PACKAGES) if classes is None else classes
         names = tuple(classes) if classes is not None else model_names(kind)
@@ -117,6 +118,18 @@ def model_class(
             f"{where}: no model '{one_line(name)}'{there}{here}{suggestion(name, known)}"
         )
     return known[name]
+
+
+def _named_model(name: str) -> dict[str, type[Any]]:
+    """The model of this name, whose module alone is imported; empty if there is none."""
+    package = next((candidate for candidate in PACKAGES if name in candidate.__all__), None)
+    cls: Any = getattr(package, name, None)
+    return {name: cls} if _is_file_model(cls) else {}
+
+
+def is_model_name(name: str) -> bool:
+    """Whether a file may name a model of this package so."""
+    return bool(_named_model(name))
 
 
 _ALLOWED = contextvars.ContextVar("allowed", default=False)

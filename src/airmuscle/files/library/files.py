@@ -1,11 +1,10 @@
-"""Files of the library: folders, entry names, reading of TOML, and locations in a file for error
+"""Files of the library: completion of names, reading of TOML, and locations in a file for error
 messages.
 """
 
 import contextlib
 import dataclasses
 import math
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from ...core import (
     units,
 )
 from ...core.errors import check_known, listed
+from .folders import LAWS, list_laws
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,57 +111,10 @@ def read_text(table: Mapping[str, Any], key: str, location: Location, *, needed:
     return value
 
 
-LAWS = Path(__file__).parent
-"""Folder of the muscles and laws."""
-PLANTS = LAWS / "plants"
-"""Folder of the plants."""
-DATA = LAWS / "data"
-"""Folder of the data sets."""
-FOLDERS = {
-    "valve": LAWS / "valves",
-    "plant": PLANTS,
-    "product": LAWS / "products",
-    "muscle or law": LAWS,
-}
-"""Folders of the entries, by what they are."""
 MAX_NAME = 255
 """Maximum length of a name in a file system; the question whether a longer one exists is an
 error.
 """
-
-
-def list_names(folder: Path) -> tuple[str, ...]:
-    """Names of the entries in a folder of the library, sorted."""
-    return tuple(
-        sorted(name.removesuffix(".toml") for name in os.listdir(folder) if name.endswith(".toml"))
-    )
-
-
-def list_library() -> tuple[str, ...]:
-    """Names of all entries that `load` reads: muscles, laws, valves, plants and products,
-    sorted.
-    """
-    return tuple(sorted(name for folder in FOLDERS.values() for name in list_names(folder)))
-
-
-def list_laws() -> tuple[str, ...]:
-    """Names of all muscles and laws, sorted."""
-    return list_names(LAWS)
-
-
-def list_valves() -> tuple[str, ...]:
-    """Names of all valves, sorted."""
-    return list_names(FOLDERS["valve"])
-
-
-def list_plants() -> tuple[str, ...]:
-    """Names of all plants, sorted."""
-    return list_names(PLANTS)
-
-
-def list_products() -> tuple[str, ...]:
-    """Names of all commercial muscles of which the ratings are known, sorted."""
-    return list_names(FOLDERS["product"])
 
 
 def entries_of_product(name: str) -> tuple[str, ...]:
@@ -174,11 +127,6 @@ def products_of_laws() -> dict[str, str]:
     none is stated.
     """
     return {law: str(read_toml(LAWS / f"{law}.toml").get("product", "")) for law in list_laws()}
-
-
-def list_data() -> tuple[str, ...]:
-    """Names of all measured or tabulated data sets, sorted."""
-    return tuple(sorted(path.stem for path in DATA.glob("*.csv")))
 
 
 def complete_name(name: str, known: Iterable[str], kind: str) -> str:

@@ -16,7 +16,7 @@ from ...physics import (
 )
 from ...physics.muscle.geometry import Braid, Geometry
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
-from .entry import OPTIONAL_PARTS, Entry
+from .entry import OPTIONAL_PARTS, Entry, own_length, resting_lengths_in
 
 T = TypeVar("T")
 _BRAID_LAWS = (ChouHannaford1996, TonduLopez2000, VirtualWork)
@@ -84,21 +84,6 @@ def scale_entry(
     )
 
 
-def own_length(entry: Entry) -> float | None:
-    """Resting length [m] of the law or geometry of an entry; None if it has none."""
-    parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
-    return next((length for part in parts for length in _resting_lengths(part).values()), None)
-
-
-def _resting_lengths(thing: Any) -> dict[str, float]:
-    """The resting lengths [m] in a model, by path."""
-    return {
-        leaf.path: float(leaf.value)
-        for leaf in leaves(thing)
-        if leaf.declared.name == "resting_length"
-    }
-
-
 def _with_resting_length(entry: Entry, length: float) -> Entry:
     if own_length(entry) is None:
         raise ParameterError(
@@ -156,11 +141,11 @@ def scale_to_length(thing: T, resting_length: float, where: str) -> T:
     """
     if all(
         abs(length - resting_length) <= LENGTH_TOLERANCE
-        for length in _resting_lengths(thing).values()
+        for length in resting_lengths_in(thing).values()
     ):
         return thing
     scaled = _scale(thing, resting_length)
-    for path, length in _resting_lengths(scaled).items():
+    for path, length in resting_lengths_in(scaled).items():
         if abs(length - resting_length) > LENGTH_TOLERANCE:
             raise ParameterError(
                 f"{where}: {path} of {type(thing).__name__} is {length:.4g} m, but the resting"

@@ -10,7 +10,8 @@ from typing import Any
 from ...bench.statics import Fit
 from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
 from ...physics import Characteristic, Muscle, Plant, Ratings, ValidityRange
-from .entry import OPTIONAL_PARTS, Check, Entry
+from .check import Check
+from .entry import OPTIONAL_PARTS, Entry
 from .fields import model_name
 from .fitted_entry import fitted_entry
 from .uncertainty import ParameterUncertainty, StatedBand

@@ -27,8 +27,10 @@ from ..library import (
     model_names,
     only_class,
 )
-from ..library.entry import CONDITIONS, PATHS, Check, Entry
+from ..library.check import CONDITIONS, Check
+from ..library.entry import Entry
 from ..library.fields import is_required
+from ..library.valve_entry import PATHS
 from . import controller, initial_state, plant_uncertainty, scenario, values
 from .controller import plant_fields
 

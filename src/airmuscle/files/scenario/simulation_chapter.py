@@ -24,7 +24,7 @@ from ...recording import Recording
 from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...report.formatting import format_number, typographic
-from ...report.shown import parameter_table
+from ...report.parameter_tables import parameter_table
 from .scenario import Scenario, run_column_units
 
 PLOTTED = (

@@ -1,5 +1,7 @@
 from .commands import COMMANDS as COMMANDS
 from .commands import app as app
+from .hints import INSTRUCTIONS as INSTRUCTIONS
+from .hints import in_options as in_options
 from .interruption import check_interrupted as check_interrupted
 from .interruption import deferred_sigint as deferred_sigint
 from .library import as_bibtex as as_bibtex
@@ -7,7 +9,5 @@ from .options import SHELLS as SHELLS
 from .options import complete_data as complete_data
 from .options import complete_entry as complete_entry
 from .options import complete_plant as complete_plant
-from .terminal import INSTRUCTIONS as INSTRUCTIONS
-from .terminal import in_options as in_options
 from .terminal import print_json as print_json
 from .terminal import print_table as print_table

@@ -18,7 +18,8 @@ from ...design.control_benchmark.result import benchmark_controllers
 from ...files.library.files import is_path
 from ..requests.declaration import many, option, request
 from .delivery import Execution, deliver
-from .options import Folder, Json, with_requests
+from .options import Folder, Json
+from .requested import with_requests
 from .terminal import counted_progress
 
 DEFAULT_BUDGET = 60

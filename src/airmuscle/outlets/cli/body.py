@@ -6,8 +6,9 @@ from typing import Annotated
 from ...core import check_writable
 from ..requests.body import BodyRequest
 from .delivery import deliver
-from .options import Json, OptionalFolder, with_requests
+from .options import Json, OptionalFolder
 from .parser import Argument
+from .requested import with_requests
 from .terminal import progress_bars
 
 BodyFile = Annotated[Path, Argument("BODY.xml", "A body with routes: MJCF or URDF.")]

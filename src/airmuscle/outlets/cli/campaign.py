@@ -20,7 +20,7 @@ from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
 from ...files.scenario.write import campaign_scenarios
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
-from ...report.data import as_json
+from ...report.json_text import as_json
 from ..requests import (
     ReadingRequest,
     braid_of_length,
@@ -32,10 +32,12 @@ from ..requests import (
     request,
 )
 from .delivery import Execution, deliver
+from .hints import in_options
 from .measurements import print_row_notes, reading_chapters
-from .options import Folder, Json, with_requests
+from .options import Folder, Json
 from .parser import Argument
-from .terminal import in_options, progress_bars
+from .requested import with_requests
+from .terminal import progress_bars
 
 STAGES_FILE = "stages.json"
 SCENARIOS = "scenarios"

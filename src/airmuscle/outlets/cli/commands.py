@@ -14,12 +14,14 @@ from typing import Annotated, Any, NamedTuple
 import click
 from click.shell_completion import CompletionItem
 
-from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
+from ...core.errors import AirmuscleError, AirmuscleWarning, quotable, suggestion
+from ...core.folder_locks import exclusive_folders
+from .. import cli
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .options import PROGRAM, print_completion_script
 from .parser import SETTINGS, CommandOption, command_of, parameter_of
 from .streams import encodable
-from .terminal import RUN_CODE, echo, in_options, warned
+from .terminal import echo, warned
 
 
 class CommandRow(NamedTuple):
@@ -42,7 +44,7 @@ COMMANDS = (
     ),
     CommandRow(
         "list",
-        "library",
+        "listing",
         "list_entries",
         "List muscles, laws, valves, plants, products and data sets.",
     ),
@@ -52,7 +54,7 @@ COMMANDS = (
     CommandRow("cite", "library", "cite", "Print the references of a library entry."),
     CommandRow(
         "evaluate",
-        "library",
+        "evaluate",
         "evaluate",
         "Evaluate a law for two of pressure, contraction and force.",
     ),
@@ -126,6 +128,22 @@ COMMANDS = (
     ),
 )
 """All commands, in the order of use."""
+RUN_CODE = (
+    "show",
+    "evaluate",
+    "fit",
+    "approximate",
+    "hysteresis",
+    "predict",
+    "plan",
+    "simulate",
+    "study",
+    "tune",
+    "benchmark",
+    "export",
+    "schema",
+)
+"""Commands with --allow-code."""
 _ROWS = {row.name: row for row in COMMANDS}
 _UsageError: Any = click.BadParameter.__base__
 
@@ -176,7 +194,7 @@ class LazyCommands(click.Group):
                 category, AirmuscleWarning
             ):  # one line, the others with their location in the code
                 text = message.args[0] if isinstance(message, Warning) else message
-                warned.add(worded := in_options(text, ctx.invoked_subcommand))
+                warned.add(worded := cli.in_options(text, ctx.invoked_subcommand))
                 echo(f"warning: {worded}", err=True)
             else:
                 show_other(message, category, *location, **options)
@@ -212,7 +230,7 @@ def _exit_codes(ctx: click.Context) -> Iterator[None]:
     try:
         yield
     except AirmuscleError as error:
-        echo(f"error: {in_options(error.message, ctx.invoked_subcommand)}", err=True)
+        echo(f"error: {cli.in_options(error.message, ctx.invoked_subcommand)}", err=True)
         raise click.exceptions.Exit(1) from None
     except BrokenPipeError:
         raise

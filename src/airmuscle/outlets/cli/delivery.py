@@ -2,23 +2,20 @@
 processes that compute it: --workers, --cluster; and the store of what they have finished."""
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from ...core import AirmuscleError, FileError, SimulationError, atomic_folder, counted
+from ...core import AirmuscleError, FileError, SimulationError, counted
 from ...engine.cluster import dask_cluster
 from ...engine.processes import Workers, available_cores
 from ...engine.result_store import STORE_FOLDER, ResultStore, result_store
 from ...report.chapter import Chapter
-from ...report.data import as_data, in_words
-from ...report.text import as_text
-from ...report.write import REPORT_FILE, write_into
+from ...report.data import in_words
+from ...report.write import REPORT_FILE
+from .. import cli
 from ..requests.declaration import RequestError, Where, optional, request
-from .terminal import echo, in_options, on_one_screen, print_json, terminal_width, warned
-
-Files = Mapping[str, "str | Callable[[Path], object]"]
-"""Files of a result by name: a text, or a function that writes the file at a path."""
+from .printing import Files, print_result, write_result
+from .terminal import echo
 
 
 def deliver(
@@ -40,7 +37,7 @@ def deliver(
     others   files elsewhere that are named with those of the folder
     complete whether nothing remains to be computed, so that the results of tasks are removed
     """
-    worded = [in_words(chapter, lambda text: in_options(text, command)) for chapter in chapters]
+    worded = [in_words(chapter, lambda text: cli.in_options(text, command)) for chapter in chapters]
     paths = dict(others or {})
     if out is not None:
         write_result(out, worded, title, files or {})
@@ -52,41 +49,6 @@ def deliver(
             )  # the files of a folder as one
             paths[path.stem] = out / path
     print_result(worded, paths, json)
-
-
-def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: bool) -> None:
-    """Print chapters and the paths of their files."""
-    if json:
-        print_json(
-            {**as_data(chapters), "files": {name: str(path) for name, path in paths.items()}}
-        )
-        return
-    if on_one_screen():
-        chapters = [
-            replace(chapter, notes=tuple(text for text in chapter.notes if text not in warned))
-            for chapter in chapters
-        ]
-    echo(
-        as_text(
-            chapters, terminal_width(), "the report" if "report" in paths else "the report of --out"
-        )
-    )
-    for name, path in paths.items():
-        echo(f"{name}: {path}")
-
-
-def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: Files) -> None:
-    """Write the files and the report, all or none."""
-    with atomic_folder(out) as folder:
-        for name, content in files.items():
-            path = folder / name
-            path.parent.mkdir(exist_ok=True)
-            if isinstance(content, str):
-                path.write_text(content, encoding="utf-8")
-            else:
-                content(path)
-        if title:
-            write_into(folder, chapters, title=title)
 
 
 @request

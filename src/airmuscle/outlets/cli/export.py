@@ -17,8 +17,9 @@ from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
 from ..requests.declaration import Where, check_rules, many, option, optional, request
-from .options import Folder, Json, complete_entry, with_requests
+from .options import Folder, Json, complete_entry
 from .parser import Argument
+from .requested import with_requests
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}

@@ -23,10 +23,12 @@ from ...files.library import (
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
 from ..requests import FitRequest, ReadingRequest, check_one_length, fit_requested
 from ..requests.declaration import RequestError, option, optional, request
-from .delivery import Execution, deliver, print_result
+from .delivery import Execution, deliver
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, Name, complete_law, with_requests
+from .options import Folder, Json, Name, complete_law
 from .parser import Argument, CommandOption
+from .printing import print_result
+from .requested import with_requests
 from .terminal import progress_bars
 
 

@@ -16,8 +16,9 @@ from ...recording.recording import row_notes
 from ..requests import WEAK, ReadingRequest, many, option, optional, request
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, with_requests
+from .options import Folder, Json
 from .parser import Argument
+from .requested import with_requests
 from .terminal import echo
 
 Study = Annotated[

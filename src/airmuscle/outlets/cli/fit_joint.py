@@ -6,8 +6,9 @@ from typing import Annotated
 from ...core import check_writable
 from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import Execution, deliver
-from .options import Folder, Json, with_requests
+from .options import Folder, Json
 from .parser import Argument
+from .requested import with_requests
 from .terminal import echo
 
 Episodes = Annotated[

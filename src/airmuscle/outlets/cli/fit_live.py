@@ -21,7 +21,8 @@ from ...files.library import Entry, save
 from ...physics.muscle.characteristic import ValidityRange
 from ..requests.declaration import option, request
 from ..requests.reading import Pairs, ReadingRequest
-from .options import Json, OptionalFolder, with_requests
+from .options import Json, OptionalFolder
+from .requested import with_requests
 from .terminal import echo
 
 QUANTITIES = ("pressure", "contraction", "force")

@@ -18,7 +18,8 @@ from ...physics.muscle.characteristic.base import ForceLaw
 from ..requests import ReadingRequest, RequestError, Where, many, option, optional, request
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, with_requests
+from .options import Folder, Json
+from .requested import with_requests
 from .terminal import echo
 
 

@@ -32,9 +32,11 @@ from ...recording.recording import row_notes
 from ...report.chapter import Chapter, NamedValue, Table
 from ..requests import ReadingRequest, option, optional, request
 from .delivery import deliver
-from .options import Json, OptionalFolder, complete_data, with_requests
+from .hints import in_options
+from .options import Json, OptionalFolder, complete_data
 from .parser import Argument
-from .terminal import echo, in_options, print_json, progress_bars
+from .requested import with_requests
+from .terminal import echo, print_json, progress_bars
 from .way_on import print_mapping, proposed_mapping, way_on
 
 MEASURED = (

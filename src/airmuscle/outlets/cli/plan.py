@@ -13,7 +13,8 @@ from ...physics.muscle.characteristic import ValidityRange
 from ...report.write import save_table
 from ..requests.declaration import RequestError, many, option, optional, request
 from .delivery import deliver
-from .options import Json, Name, OptionalFolder, with_requests
+from .options import Json, Name, OptionalFolder
+from .requested import with_requests
 
 PLAN_FILE = "plan.csv"
 

@@ -7,14 +7,15 @@ from typing import Annotated, Any
 from ...bench import RecordPrediction, StartTime
 from ...bench.prediction import prediction_chapters
 from ...core import FileError, check_writable
-from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
+from ...files.library import is_path, kind_of, list_plants, load_law, read_toml
 from ...files.scenario.prediction import PlantModel, load_plant_model, predict_with_entry
 from ...recording import Recording
 from ..requests import ReadingRequest, RequestError, Where, many, optional, request
 from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
-from .options import Folder, Json, complete_model, with_requests
+from .options import Folder, Json, complete_model
 from .parser import Argument
+from .requested import with_requests
 
 MODEL = (
     "A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the"
@@ -95,7 +96,7 @@ def predict(
     tables = [path for path in files if path.suffix == ".toml"]
     measured = [path for path in files if path not in tables]
     thing: Any
-    if kind_of(read_toml(Path(model))) is PlantEntry if is_file else model in list_plants():
+    if kind_of(read_toml(Path(model))) == "plant" if is_file else model in list_plants():
         loaded = load_plant_model(model)
         recordings = read_recordings(measured, reading) if measured else []
         predictions = _predicted_by_plant(loaded, recordings, tables, request)

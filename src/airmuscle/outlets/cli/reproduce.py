@@ -8,7 +8,7 @@ from ...core import AirmuscleError, counted
 from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
-from ...report.chapter import Chapter
+from ...report.chapter import Chapter, Table
 from ...report.claims import (
     MARKS,
     Kind,
@@ -18,10 +18,11 @@ from ...report.claims import (
     statements,
 )
 from ...report.formatting import to_plain
-from ...report.text import GAP
+from ...report.layout import GAP
+from ...report.text import table_lines
 from .options import Folder
 from .parser import Argument
-from .terminal import echo, print_table, terminal_width
+from .terminal import echo, terminal_width
 
 HEADERS = ("claim", "expected", "reproduced", "verdict")
 MIN_CLAIM = 28
@@ -101,4 +102,7 @@ def _print_chapter(chapter: Chapter) -> None:
         (textwrap.shorten(text, room, placeholder=" …"), *row)
         for text, row in zip(texts, values, strict=True)
     ]
-    print_table(dict(zip(HEADERS, zip(*rows, strict=True), strict=True)))
+    columns_of_texts = dict(zip(HEADERS, zip(*rows, strict=True), strict=True))
+    table = Table("table", "", columns_of_texts, brief=len(rows))
+    for line in table_lines(table, terminal_width(), ""):
+        echo(line)

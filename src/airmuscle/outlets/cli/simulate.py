@@ -12,11 +12,13 @@ from ...files.scenario import Scenario, load_scenario, muscle_schema, scenario_s
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording
 from ...report.chapter import Chapter
-from ...report.data import as_json
+from ...report.json_text import as_json
 from ..requests import many, read_pair, request
-from .delivery import Files, deliver, write_result
-from .options import Folder, Json, complete_plant, with_requests
+from .delivery import deliver
+from .options import Folder, Json, complete_plant
 from .parser import Argument, CommandOption
+from .printing import Files, write_result
+from .requested import with_requests
 from .terminal import echo, print_json
 
 SCENARIO = "A file with [plant], [input] and [run], or the name of a plant of the library."

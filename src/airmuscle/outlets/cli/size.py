@@ -4,7 +4,8 @@ from ...core import check_writable
 from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest
 from .delivery import Execution, deliver
-from .options import Json, OptionalFolder, with_requests
+from .options import Json, OptionalFolder
+from .requested import with_requests
 from .terminal import progress_bars
 
 SCENARIO_FILE = "scenario.toml"

@@ -8,8 +8,9 @@ from ..requests.declaration import option, optional, request
 from ..studio import export_page, serve
 from ..studio.page import open_sheets
 from ..studio.server import warning_of
-from .options import complete_law, with_requests
+from .options import complete_law
 from .parser import Argument
+from .requested import with_requests
 from .terminal import echo
 
 OPENED = "Muscles or laws to open: library entries or muscle files (TOML)."

@@ -7,9 +7,11 @@ from ...core import SimulationError, check_writable
 from ...design.study import load_study, run_study
 from ...design.study.result import RESULTS_FILE, write_study
 from ...engine.processes import process_pool
-from .delivery import Execution, print_result
-from .options import Folder, Json, with_requests
+from .delivery import Execution
+from .options import Folder, Json
 from .parser import Argument
+from .printing import print_result
+from .requested import with_requests
 from .terminal import counted_progress
 
 StudyFile = Annotated[

@@ -20,8 +20,9 @@ from ...report.write import save_table
 from ..requests.declaration import RequestError, many, option, request
 from .delivery import Execution, deliver
 from .interruption import check_interrupted
-from .options import Folder, Json, with_requests
+from .options import Folder, Json
 from .parser import Argument, CommandOption
+from .requested import with_requests
 from .terminal import echo, progress_bars
 
 INDICES: dict[str, type[TrackingIndex]] = {

@@ -20,6 +20,7 @@ from .size import SizeRequest as SizeRequest
 # isort: split
 # For the other rooms, not in __all__
 from .declaration import Where as Where
+from .declaration import read_pair as read_pair
 from .fit import SPLITS as SPLITS
 from .fit import WEAK as WEAK
 from .fit import braid_of_length as braid_of_length
@@ -27,5 +28,4 @@ from .fit import check_one_length as check_one_length
 from .fit import problem_of_lengths as problem_of_lengths
 from .fit import read_braid as read_braid
 from .reading import Pairs as Pairs
-from .reading import read_pair as read_pair
 from .size import KINDS as KINDS

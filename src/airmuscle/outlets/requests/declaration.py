@@ -51,6 +51,14 @@ def reworded(text: str, instructions: Mapping[str, Instruction]) -> str:
     return text.written(sentence)
 
 
+def read_pair(text: str, where: str) -> tuple[str, str]:
+    """Name and text of a value such as COLUMN=UNIT. Raises RequestError."""
+    name, sign, value = text.partition("=")
+    if not (name.strip() and sign):
+        raise RequestError(f"{where} must be NAME=TEXT, not {text}")
+    return name.strip(), value.strip()
+
+
 def check_rules(rules: Mapping[str, Any]) -> None:
     """Raise RequestError with the first message whose condition applies."""
     for message, applies in rules.items():

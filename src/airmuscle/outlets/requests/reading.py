@@ -5,16 +5,7 @@ from typing import Any
 
 from ...bench.readers import ColumnMapping, mapping_of_tables, read_mapping
 from ...bench.readers.tables.missing_values import parse_code
-from .declaration import RequestError, many, optional, request
-
-
-def read_pair(text: str, where: str) -> tuple[str, str]:
-    """Name and text of a value such as COLUMN=UNIT. Raises RequestError."""
-    name, sign, value = text.partition("=")
-    if not (name.strip() and sign):
-        raise RequestError(f"{where} must be NAME=TEXT, not {text}")
-    return name.strip(), value.strip()
-
+from .declaration import many, optional, read_pair, request
 
 Pairs = tuple[Any, ...]
 """Pairs of a name and a text."""

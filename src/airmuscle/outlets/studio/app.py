@@ -10,7 +10,8 @@ from importlib import metadata
 from typing import Any
 
 from ...core import AirmuscleError
-from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
+from ...files.library.files import read_toml
+from ...files.library.folders import LAWS, PLANTS, list_laws, list_plants
 from ..requests import (
     BraidRequest,
     FitRequest,

@@ -16,7 +16,8 @@ from ...bench import propose_mapping
 from ...bench.readers.tables.file_kind import parse_toml
 from ...core import AirmuscleError, FileError, atomic_folder, suggestion
 from ...files.library import list_plants
-from ...report.data import as_json, as_sheet
+from ...report.data import as_sheet
+from ...report.json_text import as_json
 from ...report.write import write_into
 from ..requests import (
     JointFitRequest,

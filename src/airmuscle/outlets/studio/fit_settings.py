@@ -16,7 +16,7 @@ import airmuscle as am
 
 from ...bench.inspection.outliers import Outlier, kept_rows, leave_out
 from ...core import AirmuscleError, UnitError, quantity
-from ...files.library.files import list_laws
+from ...files.library.folders import list_laws
 from ..requests import BraidRequest, FitRequest, ReadingRequest, RequestError, build, form_fields
 
 MAX_RULES = 200

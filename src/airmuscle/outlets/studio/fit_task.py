@@ -29,8 +29,9 @@ from ...core import AirmuscleError, AirmuscleWarning, atomic_folder
 from ...files.library import missing_geometry, part_toml, resting_lengths, save
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter
-from ...report.data import as_json, as_sheet, in_words
-from ...report.formatting import to_display_mathml
+from ...report.data import as_sheet, in_words
+from ...report.formulas import to_display_mathml
+from ...report.json_text import as_json
 from ...report.write import write_into
 from ..requests import FitRequest, RequestError, fit_requested, problem_of_lengths
 from .arm_task import ArmTexts, run_arm_fit

@@ -33,4 +33,7 @@ from .series import SeriesSpring as SeriesSpring
 
 # isort: split
 # For the other packages, not in __all__
+from .isobars import Isobars as Isobars
+from .isobars import isobar_figure as isobar_figure
+from .isobars import plot_isobars as plot_isobars
 from .ratings import LENGTH_BOUNDS as LENGTH_BOUNDS

@@ -4,7 +4,7 @@ figure.
 
 import dataclasses
 import textwrap
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from .characteristic import (
     validity_range_of,
     values_or_nan,
 )
+from .working_point import WorkingPoint
 
 MAX_FORCE_RATIO = 8.0
 """Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""
@@ -37,14 +38,6 @@ CHART_MAX_PRESSURE = 6e5
 """Maximum gauge pressure [Pa] in the chart of a law without a validity range (chosen)."""
 MAX_TITLE_LINES = 3
 """Maximum number of lines of a title; the rest is left out."""
-
-
-class WorkingPoint(NamedTuple):
-    """A working point: gauge pressure [Pa], contraction [1], tension [N]."""
-
-    pressure: float
-    contraction: float
-    force: float
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -289,12 +282,6 @@ def isobar_figure(
         axes.plot([across * point.contraction], [up * point.force], **ring, **style)
     plotting.legend_outside(axes, title="gauge pressure")
     return figure
-
-
-def describe_point(point: WorkingPoint) -> str:
-    """Return a working point as text in display units."""
-    texts = (quantity_text(point.pressure, "Pa", "kPa"), contraction_text(point.contraction))
-    return f"{', '.join(texts)}, {quantity_text(point.force, 'N', 'N')}"
 
 
 def plot_isobars(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import ClassVar
 
-from ..formatting import symbol_formula
+from ..formulas import symbol_formula
 from .derivation import LawEquation, Symbol
 from .expression import POWER, Term, fold, in_order, is_number, summands
 

@@ -6,7 +6,6 @@ separate process with limits of its time and memory, in which links to other fil
 """
 
 import dataclasses
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,21 +19,8 @@ from ..tables import (
     check_installed,
     check_is_data,
     check_regular_file,
+    named_function,
 )
-from .raw_csv import read_text_tables
-from .raw_hdf5 import read_hdf5_arrays, read_hdf5_tables
-from .raw_json import read_json_arrays
-from .raw_lvm import LVM_BEGINNING, read_lvm_tables
-from .raw_mat import read_mat_arrays, read_mat_tables
-from .raw_mdf import read_mdf_tables
-from .raw_npz import read_npz_arrays
-from .raw_parquet import read_parquet_arrays, read_parquet_tables
-from .raw_rosbag import read_rosbag_tables
-from .raw_tdms import read_tdms_tables
-from .raw_workbook import read_workbook_tables
-
-TableReader = Callable[[Path, Selection], tuple[RawTable, ...]]
-ArrayReader = Callable[[Path], list[Arrays]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,7 +31,8 @@ class Format:
     extensions  of its files, in lower case
     beginnings  first bytes, by which files with the extension of a text are recognised
     package     that it needs
-    tables, arrays  its readers; None if it gives episodes alone, or an episode for each table
+    tables, arrays  its readers, functions of modules of this package, which the process that reads
+                imports; None if it gives episodes alone, or an episode for each table
     is_separate     whether it is read in the separate process
     """
 
@@ -53,8 +40,8 @@ class Format:
     extensions: tuple[str, ...]
     beginnings: tuple[bytes, ...] = ()
     package: str | None = None
-    tables: TableReader | None = None
-    arrays: ArrayReader | None = None
+    tables: str | None = None
+    arrays: str | None = None
     is_separate: bool = True
 
     def read_tables(self, path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
@@ -74,61 +61,68 @@ class Format:
         arrays: list[Arrays] = self._call(self.arrays, path)
         return arrays
 
-    def _call(self, reader: Callable[..., Any], path: Path, *arguments: Any) -> Any:
+    def _call(self, reader: str, path: Path, *arguments: Any) -> Any:
         if self.package is not None:
             check_installed(self.package, path)
         check_regular_file(path)
         check_is_data(path)
+        name, _, function = reader.partition(".")
+        module = f"{__package__}.{name}"
         if not self.is_separate:
-            return reader(path, *arguments)
-        return call_in_separate_process(reader.__module__, reader.__name__, path, *arguments)
+            return named_function(module, function)(path, *arguments)
+        return call_in_separate_process(module, function, path, *arguments)
 
 
 TEXT = Format(
     "text",
     (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".lvm"),
-    tables=read_text_tables,
+    tables="raw_csv.read_text_tables",
     is_separate=False,
 )
 FORMATS = (
     TEXT,
-    Format("LVM", (), (LVM_BEGINNING,), tables=read_lvm_tables),
+    Format("LVM", (), (b"LabVIEW Measurement",), tables="raw_lvm.read_lvm_tables"),
     Format(
         "workbook",
         (".xlsx", ".xlsm", ".xls", ".ods"),
         package="python_calamine",
-        tables=read_workbook_tables,
+        tables="raw_workbook.read_workbook_tables",
     ),
     Format(
-        "Parquet", (".parquet",), (b"PAR1",), "pyarrow", read_parquet_tables, read_parquet_arrays
+        "Parquet",
+        (".parquet",),
+        (b"PAR1",),
+        "pyarrow",
+        "raw_parquet.read_parquet_tables",
+        "raw_parquet.read_parquet_arrays",
     ),
     Format(
         "HDF5",
         (".h5", ".hdf5"),
         (b"\x89HDF\r\n\x1a\n",),
         "h5py",
-        read_hdf5_tables,
-        read_hdf5_arrays,
+        "raw_hdf5.read_hdf5_tables",
+        "raw_hdf5.read_hdf5_arrays",
     ),
     Format(
         "MATLAB",
         (".mat",),
         (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"),
         "scipy",
-        read_mat_tables,
-        read_mat_arrays,
+        "raw_mat.read_mat_tables",
+        "raw_mat.read_mat_arrays",
     ),
-    Format("TDMS", (".tdms",), (b"TDSm",), "nptdms", read_tdms_tables),
-    Format("MDF", (".mf4", ".mdf"), (b"MDF  ",), "asammdf", read_mdf_tables),
+    Format("TDMS", (".tdms",), (b"TDSm",), "nptdms", "raw_tdms.read_tdms_tables"),
+    Format("MDF", (".mf4", ".mdf"), (b"MDF  ",), "asammdf", "raw_mdf.read_mdf_tables"),
     Format(
         "ROS bag",
         (".bag", ".db3", ".mcap"),
         (b"#ROSBAG V",),
         "rosbags.highlevel",
-        read_rosbag_tables,
+        "raw_rosbag.read_rosbag_tables",
     ),
-    Format("NPZ", (".npz",), arrays=read_npz_arrays),
-    Format("JSON", (".json", ".jsonl"), arrays=read_json_arrays),
+    Format("NPZ", (".npz",), arrays="raw_npz.read_npz_arrays"),
+    Format("JSON", (".json", ".jsonl"), arrays="raw_json.read_json_arrays"),
 )
 EXTENSIONS = tuple(name for form in FORMATS if form.tables for name in form.extensions)
 """Extensions of the files that give recordings."""

@@ -27,8 +27,6 @@ from ..tables import (
 )
 from .raw_csv import parse_columns, read_text
 
-LVM_BEGINNING = b"LabVIEW Measurement"
-"""First bytes of a file; one of numbers alone has no header, whatever its extension."""
 _END = "***End_of_Header***"
 _X = "X_Value"
 _SPECIAL = re.compile(r"\*\*\*Start_Special\*\*\*.*?\*\*\*End_Special\*\*\*", re.DOTALL)

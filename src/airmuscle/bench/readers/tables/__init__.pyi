@@ -45,6 +45,7 @@ from .separate_process import call_in_separate_process as call_in_separate_proce
 from .separate_process import check_installed as check_installed
 from .separate_process import import_lab_package as import_lab_package
 from .separate_process import is_installed as is_installed
+from .separate_process import named_function as named_function
 from .separate_process import reading as reading
 from .text_format import NumberedLines as NumberedLines
 from .text_format import TextFormat as TextFormat

@@ -10,7 +10,7 @@ import os
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -158,13 +158,19 @@ class Limits(NamedTuple):
     memory: float
 
 
+def named_function(module: str, function: str) -> Callable[..., Any]:
+    """The function of a module, which is imported."""
+    named: Callable[..., Any] = getattr(importlib.import_module(module), function)
+    return named
+
+
 def call_function(limits: Limits, module: str, function: str, path: Path, *arguments: Any) -> Any:
     """The result of a function of a module, which is imported only in the separate process, within
     its limits.
     """
     # the pool of memory that Arrow has by default reserves a gigabyte that it does not use
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
-    reader = getattr(importlib.import_module(module), function)
+    reader = named_function(module, function)
     if resource is not None:
         _limit(resource.RLIMIT_CPU, time.process_time() + limits.seconds)
         _limit(resource.RLIMIT_AS, _address_space() + limits.memory)

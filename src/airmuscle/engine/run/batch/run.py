@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, ParameterError, Status, System, as_float, check_known, one_line
-from ....core.atomic_output import raise_file_errors
+from ....core.folder_locks import raise_file_errors
 from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLaw, ControlLoop, InputSignal, PiecewiseLinear, designed_loop

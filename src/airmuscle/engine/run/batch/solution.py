@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, Columns, Reference, Status, System, cite
-from ....core.atomic_output import raise_file_errors
 from ....core.errors import ColumnError, FileError, ParameterError, alternatives
+from ....core.folder_locks import raise_file_errors
 from ....recording import Recording
 from ..integrators import Integrator
 from .variations import Variations

@@ -9,6 +9,7 @@ from .borzikova import BorzikovaExponential as BorzikovaExponential
 from .chou_hannaford1996 import ChouHannaford1996 as ChouHannaford1996
 from .contractile_surface import ContractileSurface as ContractileSurface
 from .contractile_surface import exponents as exponents
+from .data_scales import DataScales as DataScales
 from .energy_defect import maxwell_defect as maxwell_defect
 from .energy_defect import virtual_work_defect as virtual_work_defect
 from .exact_meridian import ExactMeridian as ExactMeridian
@@ -32,7 +33,6 @@ from .sarosi2012 import Sarosi2012 as Sarosi2012
 from .serres2009 import Serres2009 as Serres2009
 from .tabulated import Tabulated as Tabulated
 from .tondu_lopez2000 import TonduLopez2000 as TonduLopez2000
-from .validity_range import DataScales as DataScales
 from .validity_range import ValidityRange as ValidityRange
 from .virtual_work import CircleVirtualWork as CircleVirtualWork
 from .virtual_work import VirtualWork as VirtualWork

@@ -26,9 +26,9 @@ from ....core.declaration import forwarded
 from ..quantity_arguments import QuantityMethods, Units
 from .beyond_range import SEARCHED_CONTRACTIONS
 from .calls import Slopes, in_range
+from .data_scales import MeasuredPoints
 from .modes import formula_alone
 from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
-from .validity_range import MeasuredPoints
 
 MIN_PRESSURE = 1e-300
 """Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""

@@ -5,8 +5,8 @@ from typing import ClassVar, Self
 from ....core import Reference, Value, model, ops
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
 from .base import MIN_PRESSURE, AreaLaw
+from .data_scales import DataScales, MeasuredPoints
 from .solve import check_solution
-from .validity_range import DataScales, MeasuredPoints
 
 
 @model

@@ -10,7 +10,8 @@ from typing import ClassVar
 from ....core import ParameterError, Reference, Value, model, ops, parameter, published
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
-from .validity_range import DataScales, Limits, MeasuredPoints, ValidityRange
+from .data_scales import DataScales, MeasuredPoints
+from .validity_range import Limits, ValidityRange
 
 HOSOVSKY_HILL = published("hosovsky-hill")
 

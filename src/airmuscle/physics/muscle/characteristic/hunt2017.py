@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 
 from ....core import ParameterError, Reference, Value, model, ops, parameter, published
 from .base import PressureLaw
-from .validity_range import DataScales, MeasuredPoints
+from .data_scales import DataScales, MeasuredPoints
 
 _MAX_TANGENT_ARGUMENT = 1.5
 """Upper limit of the argument of the tangent; it corresponds to 2.9 MPa, above the strength of any

@@ -11,7 +11,7 @@ from ....core import ParameterError, Value, model, ops, parameter, suggestion
 from ....core.declaration import forwarded
 from ..geometry.base import LENGTHS, RESTING_LENGTH
 from .base import Characteristic, ForceLaw
-from .validity_range import DataScales, MeasuredPoints
+from .data_scales import DataScales, MeasuredPoints
 
 _RANGE_FACTOR = 2.0
 """Factor by which the contraction range of the inner surface exceeds that of the whole muscle

@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 from ....core import Reference, Value, model, ops, parameter, published
 from ..geometry.braid import Braid
 from .base import ForceLaw
-from .validity_range import DataScales, MeasuredPoints
+from .data_scales import DataScales, MeasuredPoints
 
 _MAX_CONTRACTION = 0.4
 """Upper limit of the contractions for which the modulus E(L) was identified."""

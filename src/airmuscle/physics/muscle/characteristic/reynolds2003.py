@@ -6,7 +6,7 @@ from ....core import Reference, Value, model, ops, parameter, published
 from ..geometry.base import LENGTHS, RESTING_LENGTH
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
-from .validity_range import DataScales, MeasuredPoints
+from .data_scales import DataScales, MeasuredPoints
 
 REYNOLDS_2003 = published("reynolds-2003")
 

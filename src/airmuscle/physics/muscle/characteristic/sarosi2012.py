@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter, published
 from .base import ForceLaw
-from .validity_range import DataScales, MeasuredPoints
+from .data_scales import DataScales, MeasuredPoints
 
 
 @model
