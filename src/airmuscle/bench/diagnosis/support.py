@@ -17,6 +17,7 @@ import numpy as np
 from ...core import Array, Hint, HintedText, IdentificationError, counted, level_text
 from ...recording.columns import displayed
 from ...recording.recording import Recording
+from ...report.chapter import Chapter
 from ..inspection import CONTRACTION_BAND, RIPPLE_BAND, rounding
 from .bench_rows import MAX_ELONGATION, BenchRows, file_list, limits, recordings_with
 from .contractions import MAX_STRETCH
@@ -95,6 +96,16 @@ class Support:
         hints = [] if self.cause.hint is None else [self.cause.hint]
         result = "" if self.record is None else f" The record gives: {self.record.summary}."
         return HintedText(f"{self.reason}. {remedy[:1].upper()}{remedy[1:]}.", *hints, result)
+
+    def chapter_of_record(self) -> Chapter | None:
+        """What a single isometric or isobaric record gives in place of a comparison of laws; None
+        for other data.
+        """
+        if self.cause is None or self.record is None:
+            return None
+        remedy = self.cause.remedy
+        problem = f"Laws cannot be compared. {self.reason}. {remedy[:1].upper()}{remedy[1:]}."
+        return dataclasses.replace(self.record.chapter(), problems=(problem,))
 
     def check(self, use: DataUse) -> None:
         """Raise IdentificationError where the rows do not support this use."""

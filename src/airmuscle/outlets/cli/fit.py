@@ -7,6 +7,7 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated, Any
 
+from ...bench.diagnosis import support_of
 from ...bench.statics import approximate as approximate_law
 from ...bench.statics.approximation import GRID_POINTS, sample_on_grid
 from ...bench.statics.volume_fit import fit_volume, volume_points
@@ -47,6 +48,8 @@ def fit(
     Writes DIR/muscle.toml, which every command accepts as NAME, and DIR/report.html with figures
     and data. FILES may also be data sets of the library (see airmuscle list). A misfit of the law
     is stated first; beyond ten times the scatter of the data DIR/muscle.toml needs --accept-misfit.
+    A single isometric or isobaric record compares no laws: --compare then reports its threshold,
+    slope, hysteresis and noise.
 
     \b
     Examples:
@@ -74,6 +77,9 @@ def fit(
         )
     recordings = read_recordings(files, reading)
     check_writable(out)
+    if request.compare and (record := support_of(recordings).chapter_of_record()) is not None:
+        deliver("fit", [record], json=json, out=out, title="Single record")
+        return
     progress = progress_bars("comparison" if request.compare else "fit")
     with execution.executor(out) as executor, progress as show:
         fitted = fit_requested(
