@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from command_line import airmuscle
+from command_line import airmuscle, command_names
+from dynamic_study import VALVES, plant_table
 
 import airmuscle as am
 from airmuscle.bench import (
@@ -27,6 +29,8 @@ from airmuscle.bench import (
     level_record,
     support_of,
 )
+from airmuscle.bench.diagnosis import support_of_transients
+from airmuscle.bench.dynamics import fit_regulator
 from airmuscle.bench.estimation import default_split
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import ContractileSurface
@@ -120,12 +124,14 @@ DEGENERATE = {
         PULL.with_columns(force=np.full(ROWS, np.nan)), "no row has a force", DataUse.PREDICTION
     ),
 }
+LIVE = ("--max-pressure", "7 bar", "--max-force", "2 kN", "--degree", 2)
 COMMANDS = {
     "compare": ("fit", "--compare"),
     "fit": ("fit", "--characteristic", "ContractileSurface", "--degree", 2),
     "hysteresis": ("hysteresis",),
     "campaign": ("campaign",),
     "predict": ("predict", "dmsp-20-300"),
+    "fit-live": ("fit-live", *LIVE, "--follow"),
 }
 SCOPES = {
     "compare": DataUse.COMPARISON,
@@ -133,8 +139,20 @@ SCOPES = {
     "hysteresis": DataUse.FIT,
     "campaign": DataUse.FIT,
     "predict": DataUse.PREDICTION,
+    "fit-live": DataUse.COMPARISON,
 }
 """What each command asks of the data."""
+WITHOUT_JUDGEMENT = {
+    "inspect": "it tells of any file what it contains",
+    "convert": "it writes any file",
+    "fit-volume": "it takes no force; its points of volume are judged in test_volume_fit.py",
+    "fit-joint": "it takes episodes, which are judged in test_fit_joint.py",
+    "fit-dynamic": "its records need cover no pressures and contractions: the table TRANSIENT",
+    "fit-regulator": "the same",
+    "plan": "the same, of a study",
+    "study": "its file is a study of a scenario, without records",
+}
+"""Commands that take records, and why they are not in the table."""
 UNREADABLE = {"no force"}
 """Records that the reader of files refuses first."""
 
@@ -149,6 +167,10 @@ def written(run: Recording, folder: Path) -> Path:
     return path
 
 
+SINGLE = {"one length", "one pressure"}
+"""Records that compare no laws but have a result of their own."""
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", sorted(DEGENERATE.keys() - UNREADABLE))
 def test_every_command_names_the_same_true_cause_first(name: str, command: str, tmp_path: Path):
@@ -156,9 +178,11 @@ def test_every_command_names_the_same_true_cause_first(name: str, command: str, 
     if scope < SCOPES[command]:
         pytest.skip("the command can use these rows")
     file = written(run, tmp_path)
-    result = airmuscle(
-        *COMMANDS[command], file, "--resting-length", "300 mm", "--out", tmp_path / "out"
-    )
+    out = tmp_path / "out"
+    result = airmuscle(*COMMANDS[command], file, "--resting-length", "300 mm", "--out", out)
+    if command == "compare" and name in SINGLE:
+        assert result.exit_code == 0  # with what the record gives, below
+        return
     assert result.exit_code == 1
     error = " ".join(result.stderr.split()).rpartition("error: ")[2]
     reason = support_of([am.read_csv(file, am.ColumnMapping(resting_length=0.3))]).reason
@@ -239,6 +263,89 @@ def test_what_a_single_record_gives(kind: str):
     assert result.noise == pytest.approx(NOISE, rel=0.25)
     assert result.summary in str(support_of([run]).refusal)
     assert str(result).startswith(f"run, {kind}")
+
+
+@pytest.mark.parametrize("name", sorted(SINGLE))
+def test_a_comparison_by_a_single_record_reports_what_the_record_gives(name: str, tmp_path: Path):
+    file = written(DEGENERATE[name].run, tmp_path)
+    run = am.read_csv(file, am.ColumnMapping(resting_length=0.3))
+    command = ("fit", file, "--compare", "--resting-length", "300 mm", "--out", tmp_path / "out")
+    shown = airmuscle(*command)
+    assert shown.exit_code == 0
+    text = " ".join(shown.stdout.split())
+    assert f"Laws cannot be compared. {support_of([run]).reason}" in text
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["report.html"]
+    values = json.loads(airmuscle(*command, "--json").stdout)["level_record"]
+    result = level_record(run)
+    assert values["slope_of_the_force"] == pytest.approx(result.slope)
+    assert values["noise_of_the_force"] == pytest.approx(result.noise)
+
+
+TRANSIENT = {
+    "constant reading",
+    "equal rows",
+    "huge",
+    "longer than at rest",
+    "one pressure and length",
+    "one row",
+    "saturated below",
+    "tiny",
+    "two rows",
+    "wrong sign",
+}
+"""Records that are none of a muscle that pulls and moves; the others may be fills or motions."""
+
+
+def dynamic_study(file: Path) -> Path:
+    """A study of fit-dynamic with one record, of which pressure and force are observed."""
+    weight = 'model = "HangingMass"\nmass = "10 kg"'
+    text = plant_table(weight, exponent=1.1, damping=100.0, conductance=4e-9)
+    text += '[input]\nfill = [["0.1 s", 1], ["1 s", 0]]\ndischarge = [["1.3 s", 1]]\n'
+    text += '[observed]\npressure = "500 Pa"\nforce = "5 N"\n'
+    text += f'[fit]\nfree = [{VALVES}, "muscle.damper.damping"]\n'
+    text += f'[[record]]\nfile = "{file.name}"\nmapping = {{ resting_length = "300 mm" }}\n'
+    text += 'initial_state = { pressure = "0.2 bar" }\n'
+    path = file.with_name("study.toml")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", ["fit-dynamic", "plan"])
+@pytest.mark.parametrize("name", sorted(TRANSIENT))
+def test_commands_of_transient_records_name_the_same_cause(name: str, command: str, tmp_path: Path):
+    file = written(DEGENERATE[name].run, tmp_path)
+    result = airmuscle(command, dynamic_study(file), "--out", tmp_path / "out")
+    assert result.exit_code == 1
+    run = am.read_csv(file, am.ColumnMapping(resting_length=0.3))
+    support = support_of_transients([run], ("pressure", "force"))
+    assert DEGENERATE[name].cause in support.reason
+    error = " ".join(result.stderr.split()).rpartition("error: ")[2]
+    assert support.reason in error
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_a_transient_record_is_refused_for_no_other_cause(name: str):
+    support = support_of_transients([DEGENERATE[name].run], ("pressure", "force"))
+    assert (support.cause is not None) == (name in TRANSIENT)
+
+
+def test_a_regulator_names_a_wrong_unit_of_its_pressure():
+    huge = Recording(
+        {"time": TIME, "setpoint": PRESSURE, "pressure": 1e6 * PRESSURE}, "regulator.csv"
+    )
+    with pytest.raises(IdentificationError, match="its unit is wrong"):
+        fit_regulator([huge], supply_pressure=6e5)
+
+
+def test_every_command_that_takes_records_is_in_a_table():
+    taking = set()
+    for command in command_names():
+        text = airmuscle(command, "--help", width=100).output
+        usage = " ".join(text.partition("Usage:")[2].partition("\n\n")[0].split())
+        if re.search(r"FILE|STUDY|EPISODES|FOLDER", usage) or "--follow" in text:
+            taking.add(command)
+    assert {"fit", "fit-live", "fit-dynamic", "campaign"} <= taking
+    assert taking <= {*COMMANDS, *WITHOUT_JUDGEMENT}
 
 
 def test_what_is_no_single_line_gives_no_such_result():

@@ -22,6 +22,7 @@ from .scatter import Scatter as Scatter
 from .support import DataUse as DataUse
 from .support import Support as Support
 from .support import support_of as support_of
+from .support import support_of_transients as support_of_transients
 
 # isort: split
 # For the other rooms, not in __all__

@@ -9,7 +9,7 @@ compare laws, but have a result of their own (`level_record`).
 
 import dataclasses
 import enum
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -131,6 +131,37 @@ def support_of(recordings: Sequence[Recording]) -> Support:
     )
 
 
+def support_of_transients(recordings: Sequence[Recording], observed: Iterable[str]) -> Support:
+    """Judge records of fills, discharges and motions, each alone, by their observed quantities.
+
+    They need not cover pressures and contractions, but must be those of a pulling muscle, and move.
+    """
+    names = set(observed)
+    for recording in recordings:
+        cause = next(_transient_causes(recording, names), None)
+        if cause is not None:
+            return Support(recording.origin, cause)
+    return Support(file_list([run.origin for run in recordings]))
+
+
+def _transient_causes(recording: Recording, observed: set[str]) -> Iterator[Cause]:
+    """All causes of one transient record, the most fundamental one first."""
+    judged = [name for name in GREATEST if name in observed and name in recording]
+    for name in judged:
+        yield from _too_great(name, recording[name])
+    if "pressure" in judged and np.nanmax(recording["pressure"], initial=0.0) > 0.0:
+        yield from _without_pressure(recording["pressure"])
+    complete = recordings_with([recording], *BenchRows._fields)
+    rows = _complete_rows(complete) if complete else None
+    if "force" in judged:
+        if rows is not None and np.max(np.abs(rows.force), initial=0.0) > MIN_FORCE:
+            yield from _constant_forces(rows)  # a muscle without load may be slack throughout
+        yield from _wrong_sign(recording["force"])
+    if rows is not None:
+        yield from _longer_than_at_rest(rows)
+        yield from _single_points(rows)
+
+
 def _empty_columns(recordings: Sequence[Recording]) -> Iterator[Cause]:
     """The fault of columns without a value."""
     for run in recordings:
@@ -159,6 +190,13 @@ def _causes(rows: BenchRows) -> Iterator[Cause]:
     yield from _impossible_values(rows)
     yield from _constant_forces(rows)
     yield from _without_tension(rows)
+    yield from _longer_than_at_rest(rows)
+    yield from _single_points(rows)
+    yield from _single_lines(rows)
+
+
+def _longer_than_at_rest(rows: BenchRows) -> Iterator[Cause]:
+    """A muscle that would be stretched beyond what any bears."""
     low, high = limits(rows.contraction)
     if low < -MAX_STRETCH and -low > REVERSED * max(high, 0.0):
         yield Cause(
@@ -166,8 +204,6 @@ def _causes(rows: BenchRows) -> Iterator[Cause]:
             f"the muscle is longer than at rest, by up to {-100 * low:.3g} %, which none bears",
             "check the resting length; if the column is a strain (L - L0)/L0, multiply it by -1",
         )
-    yield from _single_points(rows)
-    yield from _single_lines(rows)
 
 
 def _single_points(rows: BenchRows) -> Iterator[Cause]:
@@ -221,30 +257,42 @@ def _is_held(name: str, values: Array) -> bool:
     return bool(np.ptp(values) <= HELD_BANDS[name] * scale)
 
 
-def _impossible_values(rows: BenchRows) -> Iterator[Cause]:
-    """Values whose unit must be wrong, or that are those of a rig at rest."""
-    for name, values, unit, greatest in (
-        ("pressure", rows.pressure, "Pa", MAX_PRESSURE),
-        ("force", rows.force, "N", MAX_FORCE),
-    ):
-        size = float(np.max(np.abs(values)))
-        if size > greatest:
-            yield Cause(
-                f"the unit of the {name} is wrong",
-                f"the {name} is up to {size:.3g} {unit}, above {greatest:g} {unit}, which no muscle"
-                " bears: its unit is wrong",
-                f"correct the unit of the {name}",
-                _state_unit(name),
-            )
-    highest = float(np.max(rows.pressure))
-    stretched = float(np.min(rows.contraction)) < -MAX_ELONGATION
-    if highest < MIN_PRESSURE and not stretched:
+GREATEST = {"pressure": MAX_PRESSURE, "force": MAX_FORCE}
+
+
+def _too_great(name: str, values: Array) -> Iterator[Cause]:
+    """A pressure or a force that no muscle bears."""
+    unit = "Pa" if name == "pressure" else "N"
+    size = float(np.nanmax(np.abs(values), initial=0.0))
+    if size > GREATEST[name]:
+        yield Cause(
+            f"the unit of the {name} is wrong",
+            f"the {name} is up to {size:.3g} {unit}, above {GREATEST[name]:g} {unit}, which no"
+            " muscle bears: its unit is wrong",
+            f"correct the unit of the {name}",
+            _state_unit(name),
+        )
+
+
+def _without_pressure(pressure: Array) -> Iterator[Cause]:
+    """A pressure by which no muscle pulls."""
+    highest = float(np.nanmax(pressure, initial=0.0))
+    if highest < MIN_PRESSURE:
         yield Cause(
             "there is no pressure",
             f"the pressure is at most {highest:.3g} Pa, without which no muscle pulls",
             "measure under pressure, or correct the unit of the pressure",
             _state_unit("pressure"),
         )
+
+
+def _impossible_values(rows: BenchRows) -> Iterator[Cause]:
+    """Values whose unit must be wrong, or that are those of a rig at rest."""
+    yield from _too_great("pressure", rows.pressure)
+    yield from _too_great("force", rows.force)
+    highest = float(np.max(rows.pressure))
+    if not float(np.min(rows.contraction)) < -MAX_ELONGATION:  # a stretched muscle pulls without
+        yield from _without_pressure(rows.pressure)
     if float(np.max(np.abs(rows.force))) < MIN_FORCE:
         least = displayed("contraction", float(np.min(rows.contraction)))
         yield Cause(
@@ -280,9 +328,9 @@ def _constant_forces(rows: BenchRows) -> Iterator[Cause]:
         )
 
 
-def _without_tension(rows: BenchRows) -> Iterator[Cause]:
-    """A muscle that does not pull, or whose tension is counted negative."""
-    low, high = limits(rows.force)
+def _wrong_sign(force: Array) -> Iterator[Cause]:
+    """Tension that is counted negative."""
+    low, high = limits(force)
     if low < 0.0 and -low > REVERSED * max(high, 0.0):
         yield Cause(
             "the sign of the force is wrong",
@@ -290,6 +338,11 @@ def _without_tension(rows: BenchRows) -> Iterator[Cause]:
             " force is wrong",
             "multiply its column by -1",
         )
+
+
+def _without_tension(rows: BenchRows) -> Iterator[Cause]:
+    """A muscle that does not pull, or whose tension is counted negative."""
+    yield from _wrong_sign(rows.force)
     if float(np.max(rows.force)) <= 0.0:
         yield Cause(
             "the muscle is slack in every row",

@@ -14,6 +14,7 @@ from ...engine import Integrator, Rodas4
 from ...engine.compile import System
 from ...physics import Ambient, Plant, Tube, Valve, WithTubes
 from ...recording.columns import displayed
+from ..diagnosis import DataUse, support_of_transients
 from ..estimation import (
     EQUIVALENT,
     Estimate,
@@ -86,7 +87,8 @@ def fit_dynamic(
 
     The standard errors are scaled by the standard deviation of the residuals. Combinations of
     parameters that the records do not determine are named in the notes. Raises IdentificationError
-    where no initial guess can be simulated, or there are no more observations than unknowns,
+    where the records are none of a pulling muscle that moves (`support_of_transients`), no initial
+    guess can be simulated, or there are no more observations than unknowns,
     ParameterError where a record states another ambient air than its plant has.
     """
     if not experiments or not observed or starts < 1:
@@ -95,6 +97,8 @@ def fit_dynamic(
         )
     for experiment in experiments:
         check_ambient(plant, experiment)
+    records = [experiment.recording for experiment in experiments]
+    support_of_transients(records, observed).check(DataUse.FIT)
     unknowns = make_unknowns(plant, experiments, free, per_record, bounds or {}, prior)
     method = method or Rodas4()
     models = tuple(

@@ -24,6 +24,7 @@ from ...physics import (
 )
 from ...recording import Recording
 from ...report import Chapter, Table, TableColumn
+from ..diagnosis import DataUse, support_of_transients
 from ..estimation import MAX_RELATIVE_ERROR
 from ..inspection import EDGE, SAME_READING, distinct_readings, rounding
 from ..reported import Reported
@@ -161,6 +162,7 @@ def fit_regulator(
             f" {f'unknown parameter {unknown[0]!r}' if unknown else 'no recording is given'}; give"
             f" recordings with setpoint and pressure, and parameters among {', '.join(COMMANDS)}."
         )
+    support_of_transients(recordings, ("pressure",)).check(DataUse.FIT)
     for recording in recordings:
         _check_excitation(recording, noise)
     zeros = tuple(_settled_difference(recording) for recording in recordings)

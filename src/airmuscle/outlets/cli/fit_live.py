@@ -3,10 +3,14 @@
 import dataclasses
 import math
 import sys
+from collections.abc import Mapping
 from json import dumps
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ...bench.diagnosis import DataUse, support_of
 from ...bench.readers import RowReader, follow_lines
 from ...bench.statics import BenchLimits, RecursiveFit
 from ...core import (
@@ -19,6 +23,7 @@ from ...core import (
 )
 from ...files.library import Entry, save
 from ...physics.muscle.characteristic import ValidityRange
+from ...recording import Recording
 from ..requests.declaration import option, request
 from ..requests.reading import Pairs, ReadingRequest
 from .options import Json, OptionalFolder
@@ -26,6 +31,32 @@ from .requested import with_requests
 from .terminal import echo
 
 QUANTITIES = ("pressure", "contraction", "force")
+MOST_ROWS = 20_000
+"""Greatest number of rows of a stream by which a failed fit is explained (chosen)."""
+
+
+class SeenRows:
+    """Rows of a stream: all of them at first, later every second, fourth and so on, so that their
+    number is bounded."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[float, ...]] = []
+        self._count = 0
+        self._step = 1
+
+    def add(self, row: Mapping[str, float]) -> None:
+        """Take over a row with all quantities."""
+        if self._count % self._step == 0:
+            self._rows.append(tuple(row[name] for name in QUANTITIES))
+        self._count += 1
+        if len(self._rows) >= MOST_ROWS:
+            self._rows = self._rows[::2]
+            self._step *= 2
+
+    def recording(self, origin: str) -> Recording:
+        """The rows as a recording."""
+        table = np.array(self._rows, dtype=float).reshape(-1, len(QUANTITIES))
+        return Recording(dict(zip(QUANTITIES, table.T, strict=True)), origin)
 
 
 def same(name: str) -> Any:
@@ -100,10 +131,18 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
     fit = RecursiveFit(
         BenchLimits(limits, request.max_force), request.degree, forgetting=request.forgetting
     )
-    _finish(_follow(fit, reader, request, json), reader, out, json)
+    seen = SeenRows()
+    fit = _follow(fit, reader, request, json, seen)
+    try:
+        _finish(fit, reader, out, json)
+    except IdentificationError:
+        support_of([seen.recording(reader.origin)]).check(DataUse.COMPARISON)
+        raise
 
 
-def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bool) -> RecursiveFit:
+def _follow(
+    fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bool, seen: SeenRows
+) -> RecursiveFit:
     """The fit to all rows until the stream ends or the user interrupts it."""
     printed = 0
     try:
@@ -123,6 +162,7 @@ def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bo
                         f" {', '.join(row)}. Name it with --column 'NUMBER={name} [unit]'."
                     )
             fit = fit.updated(*(row[name] for name in QUANTITIES))
+            seen.add(row)
             if fit.samples >= printed + request.every:
                 printed = fit.samples
                 _report(fit, json)
