@@ -134,7 +134,8 @@ def support_of(recordings: Sequence[Recording]) -> Support:
 def support_of_transients(recordings: Sequence[Recording], observed: Iterable[str]) -> Support:
     """Judge records of fills, discharges and motions, each alone, by their observed quantities.
 
-    They need not cover pressures and contractions, but must be those of a pulling muscle, and move.
+    They need not cover pressures and contractions, and a few rows at rest may determine a load; but
+    they must be those of a pulling muscle.
     """
     names = set(observed)
     for recording in recordings:
@@ -159,7 +160,6 @@ def _transient_causes(recording: Recording, observed: set[str]) -> Iterator[Caus
         yield from _wrong_sign(recording["force"])
     if rows is not None:
         yield from _longer_than_at_rest(rows)
-        yield from _single_points(rows)
 
 
 def _empty_columns(recordings: Sequence[Recording]) -> Iterator[Cause]:

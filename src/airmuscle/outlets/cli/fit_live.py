@@ -136,7 +136,8 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
     try:
         _finish(fit, reader, out, json)
     except IdentificationError:
-        support_of([seen.recording(reader.origin)]).check(DataUse.COMPARISON)
+        use = DataUse.COMPARISON if fit.samples else DataUse.PREDICTION
+        support_of([seen.recording(reader.origin)]).check(use)
         raise
 
 
