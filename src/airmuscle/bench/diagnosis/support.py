@@ -32,6 +32,8 @@ MIN_FORCE = 1e-3
 MAX_FORCE = 1e6
 """Limits of the highest pressure [Pa] and of the greatest force [N] of a muscle (chosen: below what
 sensors resolve, and a hundredfold of what muscles on sale bear)."""
+ROUNDED_PRESSURE = 1e-6
+"""Pressure [Pa] up to which a simulated muscle is without pressure, by rounding (chosen)."""
 COUPLED = 0.05
 """Root mean square distance of the rows from one curve in the plane of pressure and contraction, as
 a fraction of the range, up to which both quantities move together (chosen)."""
@@ -150,7 +152,7 @@ def _transient_causes(recording: Recording, observed: set[str]) -> Iterator[Caus
     judged = [name for name in GREATEST if name in observed and name in recording]
     for name in judged:
         yield from _too_great(name, recording[name])
-    if "pressure" in judged and np.nanmax(recording["pressure"], initial=0.0) > 0.0:
+    if "pressure" in judged and np.nanmax(recording["pressure"], initial=0.0) > ROUNDED_PRESSURE:
         yield from _without_pressure(recording["pressure"])
     complete = recordings_with([recording], *BenchRows._fields)
     rows = _complete_rows(complete) if complete else None

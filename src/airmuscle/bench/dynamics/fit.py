@@ -87,8 +87,8 @@ def fit_dynamic(
 
     The standard errors are scaled by the standard deviation of the residuals. Combinations of
     parameters that the records do not determine are named in the notes. Raises IdentificationError
-    where the records are none of a pulling muscle (`support_of_transients`), no initial guess can be
-    simulated, or there are no more observations than unknowns,
+    where the records are none of a pulling muscle (`support_of_transients`), no initial guess can
+    be simulated, or there are no more observations than unknowns,
     ParameterError where a record states another ambient air than its plant has.
     """
     if not experiments or not observed or starts < 1:
