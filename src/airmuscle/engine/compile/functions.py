@@ -21,7 +21,7 @@ from .preparation import Preparation
 from .text.body import NO_LABEL
 
 LLVM = LlvmLanguage()
-LEAST_COUNT_OF_STAGE = 16
+LEAST_COUNT_IN_STEPS = 16
 """How often a part repeats at least in each stage of a whole step to be a function that is called:
 such a step takes 1.07 of its time with 6 equal parts, 1.00 with 16, 0.95 with 24 (measured)."""
 PARAMETERS = "p"
@@ -386,6 +386,6 @@ def explicit_module(
 
     with nodes.recording():
         step = explicit_step(t, a, b, h, inputs)
-        printer = Printer(least_count=LEAST_COUNT_OF_STAGE * len(b))
+        printer = Printer(least_count=LEAST_COUNT_IN_STEPS)
         printer.add("step", {**t.point, "w": t.w, "h": [h]}, {"y": step}, ["h"])
     return printer.module(), printer.held
