@@ -94,10 +94,12 @@ class Printer:
     c)`.
 
     The text is in LLVM unless another language is given. Parts that repeat `least_count` times are
-    functions that are called, where the language has calls.
+    functions that are called, where the language has calls; none are with None.
     """
 
-    def __init__(self, language: TargetLanguage = LLVM, least_count: int = LEAST_COUNT) -> None:
+    def __init__(
+        self, language: TargetLanguage = LLVM, least_count: int | None = LEAST_COUNT
+    ) -> None:
         self._least_count = least_count
         self.text: list[str] = []
         self.needed: dict[str, int] = {}
@@ -272,7 +274,9 @@ class Printer:
 
     def _divided(self, block: Any, code: Code, arguments: Arguments) -> list[Section]:
         """The code with its repeated parts apart, where the language of the block has calls."""
-        if not (isinstance(block, FunctionBody) and block.calls_parts):
+        if self._least_count is None or not isinstance(block, FunctionBody):
+            return []
+        if not block.calls_parts:
             return []
         return sections(code, arguments.array_of, arguments.level, self._least_count)
 
@@ -287,7 +291,7 @@ def system_module(
     extend: Extension | None = None,
     *,
     implicit: bool = True,
-    least_count: int = LEAST_COUNT,
+    least_count: int | None = LEAST_COUNT,
 ) -> tuple[str, ArraySizes]:
     """The functions of a system: rhs and outputs, and what an implicit method needs unless the
     caller has another.
