@@ -158,7 +158,8 @@ def test_a_law_that_is_not_linear_is_refitted_too():
     found = fit(TRUTH, runs)
     drawn = bootstrap(found, runs, refits=60, seed=1)
     assert drawn.failed_refits == 0
-    assert drawn.standard_errors == pytest.approx(found.standard_errors, rel=0.6)
+    ratio = drawn.standard_errors / found.standard_errors  # these contain errors that runs share
+    assert ((ratio > 0.3) & (ratio < 1.2)).all()
     low, high = drawn.intervals().T
     assert ((low < found.values) & (found.values < high)).all()
     assert drawn.model(0).end_correction == drawn.values[0, 2]

@@ -28,6 +28,7 @@ from .support import support_of_transients as support_of_transients
 # For the other rooms, not in __all__
 from .branch_residuals import branch_distance as branch_distance
 from .branch_residuals import branch_notes as branch_notes
+from .branch_residuals import row_directions as row_directions
 from .contractions import MAX_CONTRACTION as MAX_CONTRACTION
 from .contradictions import RepeatedRows as RepeatedRows
 from .contradictions import find_repeated_rows as find_repeated_rows

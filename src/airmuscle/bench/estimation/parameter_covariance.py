@@ -1,8 +1,10 @@
 """Covariance of the estimates of a static fit, with the correlation of the errors within runs.
 
 With independent errors the covariance is sigma^2 (J^T J)^-1. Errors that a whole run shares, such
-as the zero or the gain of a sensor, and those of a slow ramp are correlated. The covariance is then
-computed from groups of rows, between which errors are independent: C = A (Sum_g s_g s_g^T) A, where
+as the zero or the gain of a sensor, and those of a slow ramp are correlated: their variances are
+those of `run_errors`, beside what the law does not follow. Where one law is fitted to three or more
+specimens, these scatter about it in every direction. The covariance is then computed from the
+specimens as groups of rows, between which errors are independent: C = A (Sum_g s_g s_g^T) A, where
 A = (J^T J)^-1 and s_g = J_g^T (I - H_g)^-1/2 e_g is the gradient of group g, H_g = J_g A J_g^T its
 leverage (CR2). It has no bias where the errors of all rows are independent. The quantile of
 Student's distribution of an interval has the degrees of freedom of the variance of this combination
@@ -14,14 +16,15 @@ Resources 50(2), 317-372.
 
 import dataclasses
 import functools
-import itertools
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
+from .form_terms import Conditions
 from .model_evidence import lag_one_autocorrelation, student_quantile
+from .run_errors import RunErrors, estimate_run_errors
 
 ROWS = "rows"
 PARTS = "parts"
@@ -36,9 +39,6 @@ LEAST_DEGREES_OF_FREEDOM = 2.0
 """Least degrees of freedom of an interval by groups of rows (chosen: Student's distribution has no
 variance below; 91 to 99 % of 95 % intervals of seven laboratories held, each of 400
 experiments)."""
-SPARE_GROUPS = 2
-"""Number of parts of runs beyond that of the parameters (chosen: 92 to 95 % of 95 % intervals of
-first-order processes held, with an autocorrelation of 0.97 and 1000 rows)."""
 MIN_GROUP_ROWS = 3
 """Minimum number of rows of a part of a run (chosen)."""
 SIGNIFICANCE = 3.0
@@ -64,11 +64,31 @@ class Runs:
     """Whether the rows of a run follow each other in time."""
     place: Indices | None = None
     """The place of each row (N,) in its run, where the order of the rows has no meaning."""
+    direction: Array | None = None
+    """The direction of the motion of each row (N,): 1, -1, or 0 where it is not known."""
+    arguments: tuple[Array, ...] = ()
+    """The quantities (N,) that the rows are measured at, one or two."""
 
     def rows(self, selection: Mask | Indices) -> "Runs":
         """The runs of a selection of the rows, a mask (N,) or their indices."""
         place = None if self.place is None else self.place[selection]
-        return Runs(self.run[selection], self.specimen[selection], self.in_time, place)
+        direction = None if self.direction is None else self.direction[selection]
+        arguments = tuple(values[selection] for values in self.arguments)
+        return Runs(
+            self.run[selection],
+            self.specimen[selection],
+            self.in_time,
+            place,
+            direction,
+            arguments,
+        )
+
+    def conditions(self, modelled: Array) -> Conditions:
+        """What the errors of the rows may follow, with the modelled quantity (N,)."""
+        unknown = np.zeros(self.run.size)
+        first, second = (*self.arguments, unknown, unknown)[:2]
+        direction = unknown if self.direction is None else self.direction
+        return Conditions(first, second, modelled, direction)
 
     @property
     def order(self) -> Indices:
@@ -102,8 +122,11 @@ class ParameterCovariance:
     run_count: int
     specimen_count: int
     unit: str = ROWS
-    """What the errors are independent between: ROWS, PARTS of runs, RUNS or SPECIMENS."""
+    """What the errors are independent between: ROWS, RUNS or SPECIMENS."""
     groups: Groups | None = None
+    """The specimens, if they are the unit."""
+    run_errors: RunErrors | None = None
+    """The errors that the rows of a run share, if the runs are the unit."""
 
     @functools.cached_property
     def degrees_of_freedom(self) -> float:
@@ -113,7 +136,10 @@ class ParameterCovariance:
 
     @functools.cached_property
     def _scatter(self) -> Array:
-        """The covariance without the factor of Student's distribution, shape (P, P)."""
+        """The covariance without the factor of Student's distribution, shape (P, P); with errors of
+        runs its correlations alone have a meaning."""
+        if self.run_errors is not None:
+            return np.asarray(self.basis @ self.run_errors.matrix @ self.basis.T)
         if self.groups is None:
             return np.asarray(self.sigma**2 * self.basis @ self.basis.T)
         gradients = self.groups.gradients @ self.basis.T
@@ -121,24 +147,26 @@ class ParameterCovariance:
 
     def of_parameters(self) -> tuple[Array, Array]:
         """Standard errors (Q,) and correlations (Q, Q) of all fitted parameters; NaN for those that
-        are not contained. With groups of rows the standard errors contain Student's quantile over
-        that of the normal distribution, so that 1.96 of them are the half width of a 95 % interval
-        (effective degrees of freedom, JCGM 100:2008, G.4).
+        are not contained. Where the errors of rows are correlated, the standard errors contain
+        Student's quantile over that of the normal distribution, so that 1.96 of them are the half
+        width of a 95 % interval (effective degrees of freedom, JCGM 100:2008, G.4).
         """
         count = self.parameters.size
         square = np.ix_(self.parameters, self.parameters)
         errors = np.full(count, np.nan)
         correlations = np.full((count, count), np.nan)
-        factor = (
-            1.0
-            if self.groups is None
-            else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE
-        )
-        errors[self.parameters] = factor * np.sqrt(np.diag(self._scatter))
+        errors[self.parameters] = self._parameter_errors
         correlations[square] = normalised(
-            self.basis @ self.basis.T if self.groups is None else self._scatter
+            self.basis @ self.basis.T if self.unit == ROWS else self._scatter
         )
         return errors, correlations
+
+    @functools.cached_property
+    def _parameter_errors(self) -> Array:
+        """The standard errors (P,) of the contained parameters."""
+        if self.unit == ROWS:
+            return np.sqrt(np.diag(self._scatter))
+        return self._half_widths(np.eye(len(self.basis)), 0.95) / NORMAL_QUANTILE
 
     def greatest_correlations(self) -> Array:
         """The greatest magnitude of the correlations of each fitted parameter (Q,) with another for
@@ -153,21 +181,21 @@ class ParameterCovariance:
         rows.
         """
         position = int(np.count_nonzero(self.parameters[:index]))
-        half = float(self._quantile(self.degrees_of_freedom, level)) * np.sqrt(
-            self._scatter[position, position]
-        )
+        (half,) = self._half_widths(np.eye(len(self.basis))[[position]], level)
         return float(half / (self.sigma * np.linalg.norm(self.basis[position])))
 
     def half_widths(self, combinations: Array, level: float) -> Array:
         """Half widths (K,) of the intervals of combinations of the fitted parameters (K, Q) at a
         confidence level.
         """
-        variances, freedoms = self.variances(combinations[:, self.parameters])
-        return np.asarray(self._quantile(freedoms, level) * np.sqrt(variances))
+        return self._half_widths(combinations[:, self.parameters], level)
 
-    def _quantile(self, freedoms: npt.ArrayLike, level: float) -> Array:
-        least = 0.0 if self.groups is None else LEAST_DEGREES_OF_FREEDOM
-        return student_quantile(np.maximum(freedoms, least), level)
+    def _half_widths(self, combinations: Array, level: float) -> Array:
+        """Half widths (K,) of combinations of the contained parameters (K, P)."""
+        variances, freedoms = self.variances(combinations)
+        least = 0.0 if self.unit == ROWS else LEAST_DEGREES_OF_FREEDOM
+        quantile = student_quantile(np.maximum(freedoms, least), level)
+        return np.asarray(quantile * np.sqrt(variances))
 
     def within_bounds(self, low: Mask, high: Mask, descent: Array) -> "ParameterCovariance":
         """The covariance where some of the parameters, masks (P,), are on their lower and upper
@@ -183,7 +211,9 @@ class ParameterCovariance:
         """
         held = low | high
         beyond = (self.basis @ (self.basis.T @ descent))[held] * np.where(high, 1.0, -1.0)[held]
-        distance = np.maximum(beyond, 0.0) / np.sqrt(np.diag(self._scatter)[held])
+        distance = np.maximum(beyond, 0.0) / np.sqrt(
+            self.variances(np.eye(len(self.basis)))[0][held]
+        )
         covariance = self.basis @ self.basis.T
         slopes = np.linalg.solve(covariance[np.ix_(held, held)], covariance[np.ix_(held, ~held)]).T
         basis = self.basis.copy()
@@ -199,6 +229,8 @@ class ParameterCovariance:
         shape (K, P).
         """
         rows = combinations @ self.basis
+        if self.run_errors is not None:
+            return self.run_errors.student(rows)
         if self.groups is None:
             return self.sigma**2 * np.sum(rows**2, axis=1), np.full(
                 len(rows), float(self.spare_rows)
@@ -215,76 +247,84 @@ class ParameterCovariance:
         """
         if not np.isfinite(self.sigma):
             return "unknown, because there are no more rows than parameters"
-        text = "for independent rows"
-        if self.groups is not None:
-            count = len(self.groups.gradients)
-            runs = "one run" if self.run_count == 1 else f"{self.run_count} runs"
-            scatter = (
-                f"{count} successive parts of {runs}"
-                if self.unit == PARTS
-                else f"{count} {self.unit}"
-            )
-            text = (
-                f"from the scatter of {scatter}, {self.degrees_of_freedom:.2g} degrees of freedom"
-            )
-        if self.unit in (ROWS, PARTS) and (self.groups is not None or self.run_count > 1):
-            return f"{text}; the scatter between runs (zero and gain of the sensors) is not known"
-        if self.unit == RUNS and self.specimen_count > 1:
-            return f"{text}; the scatter between specimens is not known"
-        return text
+        if self.unit == ROWS:
+            return "for independent rows" + (_RUNS_UNKNOWN if self.run_count > 1 else "")
+        runs = "one run" if self.run_count == 1 else f"{self.run_count} runs"
+        freedom = f"{self.degrees_of_freedom:.2g} degrees of freedom"
+        if self.unit == SPECIMENS:
+            return f"from the scatter of {self.specimen_count} specimens, {freedom}"
+        if self.run_errors is None or not self.run_errors.knows_runs:
+            return f"from the scatter within {runs}, {freedom}{_RUNS_UNKNOWN}"
+        specimens = "; the scatter between specimens is not known"
+        return f"from the scatter of {runs}, {freedom}{specimens * (self.specimen_count > 1)}"
+
+
+_RUNS_UNKNOWN = "; the scatter between runs (zero and gain of the sensors) is not known"
 
 
 def estimate_covariance(
-    basis: Array, weighted: Array, residuals: Array, sigma: float, runs: Runs, which: Mask
+    basis: Array,
+    weighted: Array,
+    residuals: Array,
+    sigma: float,
+    runs: Runs,
+    modelled: Array,
+    which: Mask,
 ) -> ParameterCovariance:
     """The covariance from the weighted Jacobian (N, P) and the residuals (N,) of the rows that
     determine the fit, for the parameters of the mask `which` (Q,).
 
-    The groups are the specimens or else the runs, where these determine the standard errors.
-    Otherwise they are successive parts of the runs, as few as do so, if the rows follow in time or
-    are correlated in their order; if not, the rows are independent.
+    modelled  the weighted quantity (N,) that the law gives
+
+    Three or more specimens are groups, where these determine the standard errors. Otherwise the
+    rows of a run share errors, if they follow in time, are correlated in their order, or if the
+    runs are enough to show them; if not, the rows are independent.
     """
     if runs.place is not None:
         order = runs.order
-        weighted, residuals, runs = weighted[order], residuals[order], runs.rows(order)
+        weighted = weighted[order]
+        residuals = residuals[order]
+        modelled = modelled[order]
+        runs = runs.rows(order)
     spare = len(residuals) - len(basis)
-    parameters = len(basis)
     specimens, count = (
-        int(np.count_nonzero(np.bincount(each))) for each in (runs.specimen, runs.run)
+        int(np.count_nonzero(np.bincount(number))) for number in (runs.specimen, runs.run)
     )
     independent = ParameterCovariance(which, basis, sigma, spare, count, specimens)
-    if spare <= 0 or not parameters or not sigma > 0:
-        return independent
-    in_parts = runs.in_time or is_correlated(residuals, runs.run)
-    if not in_parts and count < MIN_GROUPS:
+    if spare <= 0 or not len(basis) or not sigma > 0:
         return independent
     rows = weighted @ basis  # the Jacobian in its orthonormal basis
-    units = (
-        (SPECIMENS, runs.specimen, specimens if specimens < count else 0),
-        (RUNS, runs.run, count),
+    if MIN_GROUPS <= specimens < count:
+        groups = _by_groups(rows, residuals, runs.specimen)
+        by_specimens = dataclasses.replace(independent, unit=SPECIMENS, groups=groups)
+        if by_specimens.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
+            return by_specimens
+    in_order = runs.in_time or is_correlated(residuals, runs.run)
+    if not in_order and count < MIN_GROUPS:
+        return independent
+    conditions = runs.conditions(modelled)
+    errors = estimate_run_errors(rows, residuals, runs.run, conditions, in_order=in_order)
+    if errors is None:
+        return independent
+    return dataclasses.replace(independent, unit=RUNS, run_errors=errors)
+
+
+def _by_groups(rows: Array, residuals: Array, group: Indices) -> Groups:
+    """The adjusted gradients and leverages of groups of rows (N,)."""
+    leverages = []
+    raw = []
+    for part, errors in zip(_split(rows, group), _split(residuals, group), strict=True):
+        leverages.append(part.T @ part)
+        raw.append(part.T @ errors)
+    values, vectors = np.linalg.eigh(np.array(leverages))
+    values = np.clip(values, 0.0, _MAX_LEVERAGE)
+    roots = np.sqrt(1.0 - values)
+    scaled = vectors / roots[:, None, :]
+    transposed = np.swapaxes(vectors, 1, 2)
+    gradients = scaled @ transposed @ np.array(raw)[:, :, None]
+    return Groups(
+        gradients[:, :, 0], np.array(leverages), (scaled * values[:, None, :]) @ transposed
     )
-    whole = ((unit, group) for unit, group, number in units if number >= MIN_GROUPS)
-    fewest = max(-(-(parameters + SPARE_GROUPS) // count), 2)
-    most = len(residuals) // (count * MIN_GROUP_ROWS)
-    divided = (
-        (PARTS, successive_parts(runs.run, parts)) for parts in range(fewest, most + 1) if in_parts
-    )
-    for unit, group in itertools.chain(whole, divided):
-        parts = _split(rows, group)
-        leverages = np.array([part.T @ part for part in parts])
-        raw = np.array(
-            [part.T @ errors for part, errors in zip(parts, _split(residuals, group), strict=True)]
-        )
-        values, vectors = np.linalg.eigh(leverages)
-        values = np.clip(values, 0.0, _MAX_LEVERAGE)
-        scaled = vectors / np.sqrt(1.0 - values)[:, None, :]
-        transposed = np.swapaxes(vectors, 1, 2)
-        gradients = (scaled @ transposed @ raw[:, :, None])[:, :, 0]
-        groups = Groups(gradients, leverages, (scaled * values[:, None, :]) @ transposed)
-        found = dataclasses.replace(independent, unit=unit, groups=groups)
-        if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
-            return found
-    return independent
 
 
 def normalised(matrix: Array) -> Array:

@@ -110,8 +110,15 @@ def fit_statistics(
     if on_bound.any():
         complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool))
         counted = design if complete.null.any() else complete
+    modelled = problem.weights * solution.modelled
     covariance = estimate_covariance(
-        counted.basis, counted.matrix, influences, sigma, runs.rows(active), counted.columns
+        counted.basis,
+        counted.matrix,
+        influences,
+        sigma,
+        runs.rows(active),
+        modelled[active],
+        counted.columns,
     )
     if counted is not design:
         low, high = problem.bounds_reached(solution.values)

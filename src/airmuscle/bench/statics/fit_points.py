@@ -20,6 +20,7 @@ from ..diagnosis import (
     apply_rules,
     examine_recordings,
     find_repeated_rows,
+    row_directions,
 )
 from ..estimation import Censoring, Runs, force_limits, sensor_deviations, specimen_name
 from ..inspection import (
@@ -124,13 +125,20 @@ class FitPoints:
     @functools.cached_property
     def runs(self) -> Runs:
         """The run and the specimen of each complete row."""
-        lengths = [len(run) for run in self.recordings]
-        names = [specimen_name(run) for run in self.recordings]
-        numbers = np.arange(len(lengths)), np.unique(names, return_inverse=True)[1]
-        index, specimen = (np.repeat(each, lengths)[~self.missing] for each in numbers)
-        in_time = all("time" in run for run in self.recordings)
-        static = all(find_static_points(run) is not None for run in self.recordings)
-        return Runs(index, specimen, in_time, self._places if static else None)
+        recordings = self.recordings
+        is_used = ~self.missing
+        lengths = [len(run) for run in recordings]
+        names = [specimen_name(run) for run in recordings]
+        specimens = np.unique(names, return_inverse=True)[1]
+        directions = [row_directions(run) for run in recordings]
+        static = all(find_static_points(run) is not None for run in recordings)
+        return Runs(
+            run=np.repeat(np.arange(len(lengths)), lengths)[is_used],
+            specimen=np.repeat(specimens, lengths)[is_used],
+            in_time=all("time" in run for run in recordings),
+            place=self._places if static else None,
+            direction=np.concatenate(directions)[is_used],
+        )
 
     @property
     def _places(self) -> npt.NDArray[np.intp]:

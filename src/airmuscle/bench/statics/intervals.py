@@ -32,12 +32,14 @@ def confidence_band(
     [SI].
 
     g is the gradient of the law with respect to its parameters, C their covariance, t the quantile
-    of Student's distribution. Covariance and degrees of freedom follow from the scatter of the
-    runs, or of parts of them, where rows are correlated (`fit.error_basis` states which); for
-    independent rows the latter are N - P. `prediction` gives the prediction band of one further
-    observation of the measured runs: the residual variance is added. `points` has the columns that
-    the law takes as arguments, and the constant `resting_length` if the law was fitted to several
-    lengths.
+    of Student's distribution. The band is that of the mean law of this muscle: of the fits of
+    further repeats of the same runs. What the law does not follow is equal in all of these, and is
+    not contained (`form_terms`). Covariance and degrees of freedom follow from the scatter of the
+    runs, or within them, where rows are correlated (`fit.error_basis` states which); for
+    independent rows the latter are N - P. `prediction` gives the band of one observation of a
+    further run of this muscle: the residual variance, with the form error, is added. `points` has
+    the columns that the law takes as arguments, and the constant `resting_length` if the law was
+    fitted to several lengths.
 
     The band of a PooledLengthLaw is that of the specimen that `points` state (the constant
     `specimen`, or else the resting length), or of a new muscle, with the scatter of the specimens

@@ -143,7 +143,8 @@ def _fit_law(
 ) -> Fit:
     problem = points.problem(law, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve_bounded(problem, points, loss)
-    statistics = fit_statistics(problem, solution, loss, points.runs)
+    runs = dataclasses.replace(points.runs, arguments=problem.arguments)
+    statistics = fit_statistics(problem, solution, loss, runs)
     check_determined_by_levels(problem, solution, points.at_levels)
     data = problem.data
     quantity = problem.fitted_quantity

@@ -299,9 +299,10 @@ _CURVE_AXES = {
 }
 """The quantity that is constant on a curve of the fitted one, and the one that varies along it."""
 _CAPTION = (
-    "Left: 95 % confidence bands (dark) and prediction bands of one further measurement (light) at"
-    " measured levels. Right: half width of the confidence bands (thick) and the prediction bands"
-    " (thin), for non-negative forces. The variance of the parameters is estimated "
+    "Left: 95 % confidence bands of the mean law (dark) and prediction bands of a further run of"
+    " this muscle (light) at measured levels. Right: half width of the confidence bands (thick) and"
+    " the prediction bands (thin), for non-negative forces. The variance of the parameters is"
+    " estimated "
 )
 
 
