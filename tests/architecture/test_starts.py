@@ -6,12 +6,15 @@ depend on the machine.
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 import airmuscle as am
+from airmuscle.errors import ParameterError
 
 HEAVY = {
     *("numba", "scipy", "pandas", "pint", "matplotlib", "jinja2", "rich", "yaml", "jax"),
@@ -96,3 +99,62 @@ def test_names_that_are_imported_on_use_are_available():
         AttributeError, match=r"no attribute 'load_scenario'; it is in airmuscle\.files$"
     ):
         am.load_scenario  # noqa: B018
+
+
+LINES = {
+    "list": (("list",), 3_000),
+    "evaluate": (
+        ("evaluate", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"),
+        11_000,
+    ),
+    "evaluate a law of measurements": (
+        ("evaluate", "dmsp-20-300", "--pressure", "3 bar", "--force", "100 N"),
+        11_200,
+    ),
+    "fit": (("fit", "dmsp-20-300", "--characteristic", "dmsp-20-300", "--out", "fit"), 44_500),
+}
+"""Commands, and the lines of source that each loads at most; these bounds may only be lowered."""
+COUNT = """
+import sys
+from pathlib import Path
+from airmuscle.outlets.cli import app
+app(sys.argv[1:], standalone_mode=False)
+modules = [m for name, m in sys.modules.items() if name.split(".")[0] == "airmuscle"]
+files = {m.__file__ for m in modules if getattr(m, "__file__", None)}
+print(sum(len(Path(file).read_text(encoding="utf-8").splitlines()) for file in files))
+"""
+
+
+@pytest.mark.parametrize("command", LINES)
+def test_a_command_loads_few_lines_of_source(command: str, tmp_path: Path):
+    arguments, most = LINES[command]
+    done = subprocess.run(
+        [sys.executable, "-c", COUNT, *arguments], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert int(done.stdout.split()[-1]) <= most
+
+
+def test_a_muscle_is_loaded_without_readers_of_measurements():
+    code = "import airmuscle as am\nam.load('dmsp-20-300')\nimport sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    readers = {
+        name
+        for name in done.stdout.split()
+        if name.startswith(("airmuscle.bench.readers.formats", "airmuscle.recording.columns"))
+        or name == "airmuscle.bench.readers.tables.mapping"
+    }
+    assert done.returncode == 0, done.stderr
+    assert readers == set()
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        *("spring", "damper", "friction", "wall", "series", "stop", "creep"),
+        *("ratings", "uncertainty", "error_band"),
+    ],
+)
+def test_the_type_of_a_part_of_an_entry_is_known_though_it_is_imported_on_use(part: str):
+    with pytest.raises(ParameterError, match=f"Entry: {part} must be an instance of .*; it is 3"):
+        dataclasses.replace(am.load("dmsp-20-300"), **{part: 3})

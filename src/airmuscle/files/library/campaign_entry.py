@@ -9,7 +9,7 @@ from ...bench.comparison.specimen_errors import ranked_specimen_errors, resting_
 from ...bench.diagnosis.misfit import misfit_warning
 from ...core import IdentificationError
 from ...physics import NoFriction
-from ...physics.muscle.muscle import LENGTH_TOLERANCE
+from ...physics.muscle.geometry.base import LENGTH_TOLERANCE
 from . import ParameterUncertainty, StatedBand
 from .entry import MEASURED, Entry
 from .fitted_entry import complete_band

@@ -5,27 +5,20 @@ another diameter.
 import dataclasses
 from typing import Any, TypeVar, cast
 
+from ... import physics
 from ...core import ParameterError, leaves, quantity
-from ...physics import (
-    ChouHannaford1996,
-    MartensBoblan2017,
-    Reynolds2003,
-    Serres2009,
-    TonduLopez2000,
-    VirtualWork,
-)
 from ...physics.muscle.geometry import Braid, Geometry
-from ...physics.muscle.muscle import LENGTH_TOLERANCE
+from ...physics.muscle.geometry.base import LENGTH_TOLERANCE
 from .entry import OPTIONAL_PARTS, Entry, own_length, resting_lengths_in
 
 T = TypeVar("T")
-_BRAID_LAWS = (ChouHannaford1996, TonduLopez2000, VirtualWork)
+_BRAID_LAWS = ("ChouHannaford1996", "TonduLopez2000", "VirtualWork")
 """Laws of a braid without wall, whose force at a braid angle is proportional to the square of the
 diameter.
 """
-_STIFFNESSES: dict[type[Any], tuple[str, ...]] = {
-    Reynolds2003: ("stiffness_offset", "stiffness_by_pressure"),
-    Serres2009: ("softening_offset", "softening", "stiffening_offset", "stiffening"),
+_STIFFNESSES = {
+    "Reynolds2003": ("stiffness_offset", "stiffness_by_pressure"),
+    "Serres2009": ("softening_offset", "softening", "stiffening_offset", "stiffening"),
 }
 """Parameters in N/m of one specimen, by law: a spring of twice the length has half the
 stiffness.
@@ -108,14 +101,14 @@ def entry_at_length(entry: Entry, length: float, where: str) -> Entry:
 
 
 def _with_diameter(entry: Entry, diameter: float) -> Entry:
-    law = entry.characteristic
+    law: Any = entry.characteristic
     geometry = entry.geometry
     if (
-        not isinstance(law, _BRAID_LAWS)
+        type(law).__name__ not in _BRAID_LAWS
         or not isinstance(law.geometry, Braid)
         or not isinstance(geometry, Braid)
     ):
-        names = ", ".join(cls.__name__ for cls in _BRAID_LAWS)
+        names = ", ".join(_BRAID_LAWS)
         raise ParameterError(
             f"{entry.name}: {type(law).__name__} cannot be scaled to another diameter, because the"
             f" wall does not scale with the braid; only {names} with a Braid can. Give an entry of"
@@ -164,7 +157,8 @@ def _scale(thing: Any, resting_length: float) -> Any:
     if isinstance(thing, Braid) or (has_length and not isinstance(thing, Geometry)):
         ratio = thing.resting_length / resting_length
         stiffnesses = {
-            name: getattr(thing, name) * ratio for name in _STIFFNESSES.get(type(thing), ())
+            name: getattr(thing, name) * ratio
+            for name in _STIFFNESSES.get(type(thing).__name__, ())
         }
         return dataclasses.replace(thing, resting_length=resting_length, **stiffnesses)
     geometry = getattr(thing, "geometry", None)
@@ -173,7 +167,7 @@ def _scale(thing: Any, resting_length: float) -> Any:
     changes: dict[str, Any] = {
         "geometry": dataclasses.replace(geometry, resting_length=resting_length)
     }
-    if isinstance(thing, MartensBoblan2017):
+    if isinstance(thing, physics.MartensBoblan2017):
         ratio = geometry.resting_length / resting_length
         changes |= {f"c{power}": getattr(thing, f"c{power}") * ratio**power for power in range(4)}
     return dataclasses.replace(thing, **changes)

@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ... import physics
 from ...bench.statics import Fit
 from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
-from ...physics import Characteristic, Muscle, Plant, Ratings, ValidityRange
+from ...physics import Characteristic, Muscle, Ratings, ValidityRange
 from .check import Check
 from .entry import OPTIONAL_PARTS, Entry
 from .fields import model_name
@@ -177,7 +178,7 @@ def entry_of(thing: Savable) -> Entry:
             **parts,
         )
     remedy = ""
-    if isinstance(thing, Plant):
+    if isinstance(thing, physics.Plant):
         remedy = " A plant is written with its run: airmuscle.files.save_scenario(scenario, path)."
     raise ParameterError(
         f"save: {one_line(thing)} is no muscle, characteristic, fit or entry of the"

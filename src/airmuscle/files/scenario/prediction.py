@@ -19,7 +19,7 @@ from ...bench.statics.fit_problem import fitted_quantity_of
 from ...core import ColumnError, Hint, ParameterError
 from ...engine.run import Integrator
 from ...physics.muscle.characteristic.base import ForceLaw
-from ...physics.muscle.muscle import LENGTH_TOLERANCE
+from ...physics.muscle.geometry.base import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...recording.columns import split_unit
 from ..library import Entry, Location, check_keys, located_errors, read_toml, scale_to_length

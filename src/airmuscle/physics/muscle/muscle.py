@@ -28,7 +28,7 @@ from .characteristic.beyond_range import ForceRange, extended_force, unlimited_f
 from .characteristic.calls import excesses, with_stated_range
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
-from .geometry.base import Geometry
+from .geometry.base import LENGTH_TOLERANCE, Geometry
 from .isobars import plot_isobars
 from .passive_elements import (
     CreepElements,
@@ -54,8 +54,6 @@ element.
 USUAL_PRESTRETCH = 0.03
 """Elongation of a muscle without pressure [1] that is usual where its maker states none: the least
 of Festo's DMSP muscles (catalogue, as in `festo-dmsp-10`)."""
-LENGTH_TOLERANCE = 1e-6
-"""Difference of two resting lengths [m] up to which they are the same (chosen)."""
 
 
 class MuscleForce(NamedTuple):

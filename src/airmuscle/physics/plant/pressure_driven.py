@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar, NamedTuple
 
-from ...core import ParameterError, Value, Values, check_known, model, parameter
+from ...core import Array, ParameterError, Value, Values, check_known, model, parameter
 from ...core.system import Input, StateVariable, select_prefix, with_prefix
 from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle
@@ -124,7 +124,7 @@ class PressureDriven(MuscleSystem):
             outputs[f"{prefix}force"] = pull.force.tension
         return outputs
 
-    def state_at(self, pressures: Sequence[float], **values: float) -> dict[str, float]:
+    def state_at(self, pressures: Sequence[float] | Array, **values: float) -> dict[str, float]:
         """A state by the gauge pressure [Pa] of each muscle and states by name; the others are 0,
         muscles settled.
         """

@@ -17,6 +17,9 @@ from ....core import (
 )
 from ..quantity_arguments import QuantityMethods, Units
 
+LENGTH_TOLERANCE = 1e-6
+"""Difference of two resting lengths [m] up to which they are the same (chosen)."""
+
 
 def check_contraction_range(
     contraction: Value, limits: tuple[float, float], owner: str, remark: str = ""
