@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
@@ -42,3 +43,56 @@ def numbers(*without: str) -> dict[str, float]:
 
 def test_laws_slopes_and_fits_need_no_compiler():
     assert numbers(*COMPILERS) == pytest.approx(numbers(), rel=1e-12)
+
+
+FURTHER = """
+import tempfile
+import numpy as np
+import airmuscle as am
+from airmuscle.bench import FixedCharacteristic, fit_hysteresis
+from airmuscle.physics.muscle import compute_isobars
+from airmuscle.report import write_report
+law = am.load("dmsp-20-300").characteristic
+time = np.linspace(0.0, 20.0, 401)
+contraction = 0.1 + 0.05 * np.sin(0.2 * np.pi * time)
+pressure = np.full_like(time, 3e5)
+rubbed = law.force(pressure, contraction) - 15.0 * np.tanh(np.gradient(contraction, time) / 0.002)
+loop = am.Recording(
+    {"time": time, "pressure": pressure, "contraction": contraction, "force": rubbed}, "a loop",
+    constants={"resting_length": 0.3},
+)
+friction = fit_hysteresis(am.friction.Dahl(1e4, 10.0), loop, static_curve=FixedCharacteristic(law))
+with tempfile.TemporaryDirectory() as folder:
+    page = write_report([friction.chapter()], folder).read_text(encoding="utf-8")
+results = {
+    "friction": friction.rmse,
+    "isobars": float(np.nansum(compute_isobars(law).forces)),
+    "figures": page.count("<figure"),
+}
+"""
+
+
+SIZING = """
+from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
+conditions = SizingConditions(supply=6e5, max_length=0.4)
+choice = size_muscles(LiftRequirement(stroke=0.04, mass=20.0), conditions).best
+results = {"length": choice.length, "count": choice.count, "air": choice.air}
+"""
+
+
+@pytest.mark.parametrize(
+    "work",
+    [
+        pytest.param(FURTHER, id="friction, figures and a report"),
+        pytest.param(SIZING, id="sizing", marks=pytest.mark.slow),
+    ],
+)
+def test_further_work_of_a_bench_needs_no_compiler(work: str):
+    blocked = f"import json, sys\nfor name in sys.argv[1:]:\n    sys.modules[name] = None\n{work}"
+    command = [sys.executable, "-c", f"{blocked}\nprint(json.dumps(results))", *COMPILERS]
+    process = subprocess.run(command, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr[-2000:]
+    scope: dict[str, Any] = {}
+    exec(work, scope)
+    assert json.loads(process.stdout) == pytest.approx(scope["results"], rel=1e-12)
+    assert all(scope["results"].values())
