@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from airmuscle.bench.dynamics import LevenbergMarquardt, bounded_step
+from airmuscle.bench.estimation import LevenbergMarquardt, bounded_step
 
 FREE = np.full(2, -np.inf), np.full(2, np.inf)
 

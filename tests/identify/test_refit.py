@@ -21,14 +21,14 @@ from airmuscle.bench.estimation import (
     KnownMinima,
     LeastSquaresSolution,
     find_initial_values,
+    gauss_newton,
+    resampling,
     solve_iteratively,
     solve_least_squares,
 )
-from airmuscle.bench.estimation.least_squares_descent import gauss_newton
 from airmuscle.bench.statics import (
     FitPoints,
     blank_surface,
-    bootstrapping,
     fitted_quantity_of,
     refit,
 )
@@ -151,7 +151,7 @@ def test_samples_far_along_a_valley_and_on_bounds_are_refitted_without_a_search(
     runs = bench()
     fit = am.fit(LAWS["braid"], runs)
     monkeypatch.setattr(
-        bootstrapping, "solve_iteratively", lambda *_: pytest.fail("a search of its own")
+        resampling, "solve_iteratively", lambda *_: pytest.fail("a search of its own")
     )
     drawn = bootstrap(fit, runs, refits=20, by=RunSplit(), seed=1).values
     assert (drawn[:, 1] < 0.0501).mean() > 0.2 < (drawn[:, 2] < 1.0001).mean()

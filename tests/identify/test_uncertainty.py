@@ -27,8 +27,8 @@ from airmuscle.bench import (
     profile,
     weakly_determined,
 )
+from airmuscle.bench.estimation import resampling
 from airmuscle.bench.statics import blank_surface
-from airmuscle.bench.statics.bootstrapping import _refit_iteratively
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000
 from airmuscle.recording import Recording
@@ -130,7 +130,9 @@ def test_refits_at_once_are_refits_one_by_one():
         .astype(float)
     )
     none_known = np.empty((0, len(found.values)))
-    expected = _refit_iteratively((found, which, none_known, None), times)
+    expected = resampling._refit_iteratively(
+        ((found.problem, found.values, found.loss, which), none_known, None), times
+    )
     assert np.isfinite(expected).all()
     assert drawn.values == pytest.approx(expected, rel=1e-8, abs=1e-6)
 

@@ -39,7 +39,7 @@ def test_a_bootstrap_does_not_depend_on_its_executor(
     executor: Executor, monkeypatch: pytest.MonkeyPatch
 ):
     """A first block, and two that start at what it has found."""
-    monkeypatch.setattr("airmuscle.bench.estimation.bootstrapping.REFITS_OF_A_TASK", 10)
+    monkeypatch.setattr("airmuscle.bench.estimation.resampling.REFITS_OF_A_TASK", 10)
     runs = load_data("dmsp-20-300")
     found = fit(load_law("dmsp-20-300").characteristic, runs)
     alone, shared = (

@@ -5,6 +5,7 @@ They are started afresh, not as copies of this process, and end together with it
 
 import atexit
 import contextlib
+import contextvars
 import multiprocessing
 import os
 import pickle
@@ -101,7 +102,7 @@ def thread_pool(threads: int) -> Iterator[Executor]:
     `check_running`; if the block is left by an exception, they stop there.
     """
     stop_events.append(stopped := threading.Event())
-    executor = ThreadPoolExecutor(threads, "worker")
+    executor = _ContextThreads(threads, "worker")
     try:
         yield executor
     except BaseException:
@@ -110,6 +111,14 @@ def thread_pool(threads: int) -> Iterator[Executor]:
     finally:
         executor.shutdown(cancel_futures=True)
         stop_events.remove(stopped)
+
+
+class _ContextThreads(ThreadPoolExecutor):
+    """Threads whose tasks have the context of their caller: the store of results, the watch over
+    searches."""
+
+    def submit(self, *task: Any, **arguments: Any) -> Future[Any]:
+        return super().submit(contextvars.copy_context().run, *task, **arguments)
 
 
 class _ProcessPool(ProcessPoolExecutor):

@@ -11,6 +11,7 @@ import numpy as np
 from ...core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ...physics import CreepElements, ForceLaw
 from ...recording import Recording
+from ..estimation import search_trust_region
 from ..hysteresis import MIN_RATIO, CreepFit, Hold, creep_elements, find_holds, fit_creep
 from ..inspection import CONTRACTION_BAND, EDGE
 from ..prediction import creep_stretches, displacement, has_path, thinned_rows
@@ -170,8 +171,6 @@ def _common_times(holds: Sequence[HeldRows], initial: Sequence[float]) -> Array:
     """The relaxation times of all holds [s] from initial ones, for which the linear unknowns are
     solved.
     """
-    from scipy.optimize import least_squares
-
     longest = max(float(h.recording["time"][-1] - h.recording["time"][0]) for h in holds)
     count = len(initial)
     ordered = np.clip(np.sort(np.array(initial)), 0.1, 2.0 * longest)
@@ -181,8 +180,8 @@ def _common_times(holds: Sequence[HeldRows], initial: Sequence[float]) -> Array:
     low = np.log([0.1, *[MIN_RATIO] * (count - 1)])
     high = np.log([2.0 * longest] * count)
     start = np.clip(steps, low + 1e-6, high - 1e-6)
-    result = least_squares(
-        lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high)
+    result = search_trust_region(
+        "creep", lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high)
     )
     return np.asarray(np.exp(np.cumsum(result.x)))
 

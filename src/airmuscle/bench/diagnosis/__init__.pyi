@@ -15,6 +15,7 @@ from .misfit import misfit_warning as misfit_warning
 from .recording_rules import RECORDING_RULES as RECORDING_RULES
 from .recording_rules import Findings as Findings
 from .recording_rules import diagnose as diagnose
+from .recording_rules import examine_recordings as examine_recordings
 from .rules import Diagnosis as Diagnosis
 from .rules import DiagnosisRule as DiagnosisRule
 from .rules import Subject as Subject
@@ -23,6 +24,7 @@ from .support import DataUse as DataUse
 from .support import Support as Support
 from .support import support_of as support_of
 from .support import support_of_transients as support_of_transients
+from .value_rules import VALUE_RULES as VALUE_RULES
 
 # isort: split
 # For the other rooms, not in __all__
@@ -35,9 +37,7 @@ from .contradictions import find_repeated_rows as find_repeated_rows
 from .data_checks import HELD as HELD
 from .data_checks import level_text as level_text
 from .matched_rows import match_rows as match_rows
-from .recording_rules import VALUE_RULES as VALUE_RULES
-from .recording_rules import bench_data as bench_data
-from .recording_rules import examine_recordings as examine_recordings
-from .recording_rules import warn_of_suspicious_values as warn_of_suspicious_values
 from .rules import apply_rules as apply_rules
 from .scatter import force_noise as force_noise
+from .value_rules import bench_data as bench_data
+from .value_rules import warn_of_suspicious_values as warn_of_suspicious_values

@@ -22,7 +22,7 @@ from ..readers import (
     read_one,
     warn_of_rates_without_time,
 )
-from .recording_rules import warn_of_suspicious_values
+from .value_rules import warn_of_suspicious_values
 
 
 def read(

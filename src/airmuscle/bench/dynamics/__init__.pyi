@@ -11,8 +11,6 @@ from .fit import describe_cross_predictions as describe_cross_predictions
 from .fit import fit_dynamic as fit_dynamic
 from .fit import fit_tube as fit_tube
 from .initial_conditions import InitialConditions as InitialConditions
-from .problem import LevenbergMarquardt as LevenbergMarquardt
-from .problem import bounded_step as bounded_step
 from .record_model import commands_at as commands_at
 from .record_ranking import RecordRanking as RecordRanking
 from .record_ranking import rank_records as rank_records

@@ -5,19 +5,20 @@ record by the others.
 import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
 from ...core import AirmuscleError, Array, IdentificationError, ParameterError, check_whole
 from ...engine import Integrator, Rodas4
 from ...engine.compile import System
+from ...engine.processes import thread_pool
 from ...physics import Ambient, Plant, Tube, Valve, WithTubes
 from ...recording.columns import displayed
 from ..diagnosis import DataUse, support_of_transients
 from ..estimation import (
     EQUIVALENT,
     Estimate,
+    LevenbergMarquardt,
     aicc,
     analyse_identifiability,
     lag_one_autocorrelation,
@@ -181,18 +182,18 @@ def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tup
     """
     if len(guesses) == 1:
         return [problem.solve(guesses[0])]
-    pool = ThreadPoolExecutor(min(len(guesses), os.cpu_count() or 1))
-    try:
-        every = list(range(len(problem.unknowns)))
-        searches = list(
-            pool.map(lambda guess: problem.search(guess, every).run(SCREENING_RUNS), guesses)
-        )
+    every = list(range(len(problem.unknowns)))
+
+    def screened(number: int) -> LevenbergMarquardt:
+        name = f"start {number + 1} of {len(guesses)}"
+        return problem.search(guesses[number], every, name).run(SCREENING_RUNS)
+
+    with thread_pool(min(len(guesses), os.cpu_count() or 1)) as pool:
+        searches = list(pool.map(screened, range(len(guesses))))
         lowest = min(search.cost for search in searches)
         continued = [s for s in searches if not s.finished and s.cost <= SCREENING_RATIO * lowest]
         list(pool.map(lambda search: search.run(MAX_RUNS), continued))
         return [(search.x, search.cost) for search in searches]
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:

@@ -1,190 +1,16 @@
-"""Least squares of the residuals of all records: Levenberg-Marquardt method with bounds, and the
-problem it solves.
-
-    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the maximum norms of the columns of J so
-                               far
-
-An unknown on its bound, with a gradient that points beyond it, is fixed for that step. An unknown
-that the step would move beyond a bound is set to that bound, and the step of the others is computed
-again. The same holds for the maximum change of an unknown in one step: an unknown with little
-effect so far, and thus a large step, does not shorten the steps of the others. The damping follows
-the ratio of the actual to the predicted reduction.
-
-Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes
-in Mathematics 630, Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's
-method, IMM-REP-1999-05, DTU 1999.
-"""
+"""Problem of a dynamic fit: the residuals of all records as a function of the unknowns."""
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, Self
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import AirmuscleError, Array
+from ..estimation import Checkpoint, LevenbergMarquardt
 from .experiment import Unknown
 from .record_model import MAX_STEPS, RecordModel
-
-Residuals = Callable[[Array], tuple[Array, Array] | None]
-"""Residuals (R,) and Jacobian (R, P) at unknowns (P,); None where they cannot be computed."""
-INITIAL_DAMPING = 1e-3
-MIN_DAMPING = 1e-12
-MAX_DAMPING = 1e30
-RELATIVE_STEP_LIMIT = 0.7
-MIN_STEP_LIMIT = 0.25
-"""Maximum change of an unknown in one step: this fraction of its value, or of its scale or bounds
-if that is larger. Chosen: far from the optimum a long step leads to plants that cannot be
-simulated, or only with tiny time steps."""
-TOLERANCE = 1e-10
-"""Predicted relative reduction below which the search ends, and relative step likewise."""
-COST_NOISE = 1e-5
-"""Relative jump of the sum of squares that is caused by the step-size control of the simulation;
-chosen. A step with a predicted reduction below a tenth of it is accepted if the sum of squares
-increases by no more than it: the Jacobian still gives the direction, the sum no longer does. Such a
-step ends the search unless its predicted reduction is less than half of the last one."""
-
-
-class _NormalEquations(NamedTuple):
-    """Sum of squares, normal matrix (P, P) and half the gradient (P,)."""
-
-    cost: float
-    normal: Array
-    gradient: Array
-
-
-def _normal_equations(evaluated: tuple[Array, Array] | None, count: int) -> _NormalEquations:
-    """The normal equations; an infinite sum where residuals or Jacobian are missing, not finite, or
-    overflow when squared.
-    """
-    if evaluated is not None:
-        r, j = evaluated
-        with np.errstate(over="ignore", invalid="ignore"):
-            cost = float(r @ r)
-            normal = j.T @ j
-            gradient = j.T @ r
-        if cost < np.inf and np.isfinite(normal).all():
-            return _NormalEquations(cost, normal, gradient)
-    return _NormalEquations(np.inf, np.zeros((count, count)), np.zeros(count))
-
-
-class LevenbergMarquardt:
-    """A search from one initial guess, which can be interrupted and continued: unknowns `x` (P,),
-    sum of squares there, `cost`, and whether it is `finished`. The sum of squares is infinite where
-    the residuals cannot be computed at the initial guess."""
-
-    def __init__(self, residuals: Residuals, start: Array, low: Array, high: Array) -> None:
-        self._residuals = residuals
-        self._low = low
-        self._high = high
-        self._scale = np.zeros(start.size)
-        self._damping = INITIAL_DAMPING
-        self._growth = 2.0
-        self._rejected_step = np.full(start.size, np.nan)
-        self._predicted = np.inf
-        self._evaluations = 1
-        x = np.clip(start, low, high)
-        self._accept(x, _normal_equations(residuals(x), x.size))
-        self.finished = not self.cost < np.inf
-
-    def run(self, max_evaluations: int) -> Self:
-        """Search until convergence, or until the residuals were evaluated `max_evaluations` times
-        in total.
-        """
-        while not self.finished and self._evaluations < max_evaluations:
-            self._step()
-        return self
-
-    def _accept(self, x: Array, equations: tuple[float, Array, Array]) -> None:
-        self.x = x
-        self.cost, self._normal, self._gradient = equations
-        self._scale = np.maximum(self._scale, np.sqrt(self._normal.diagonal()))
-
-    def _step(self) -> None:
-        """Propose steps until one is no repetition, evaluate it, and accept or reject it."""
-        step, predicted = self._propose_step()
-        while not (converged := self._is_converged(step, predicted)) and (
-            not predicted > 0 or (step == self._rejected_step).all()
-        ):
-            self._reject(step)
-            step, predicted = self._propose_step()
-        if converged:
-            self.finished = True
-            return
-        tried = _normal_equations(self._residuals(self.x + step), step.size)
-        self._evaluations = self._evaluations + 1
-        cost = tried[0]
-        small = predicted <= COST_NOISE / 10 * self.cost and self._damping < 1
-        within_noise = small and cost <= (1 + COST_NOISE) * self.cost
-        if within_noise and cost >= self.cost and predicted > self._predicted / 2:
-            self.finished = True
-        elif within_noise or cost < self.cost:
-            ratio = (self.cost - cost) / predicted if cost < self.cost else 1.0
-            self._accept(self.x + step, tried)
-            self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), MIN_DAMPING)
-            self._growth = 2.0
-            self._predicted = predicted
-        else:
-            self._reject(step)
-
-    def _reject(self, step: Array) -> None:
-        """Increase the damping, and remember the rejected step."""
-        self._damping = self._damping * self._growth
-        self._growth = 2 * self._growth
-        self._rejected_step = step
-
-    def _propose_step(self) -> tuple[Array, float]:
-        """A step, and the predicted reduction of the sum of squares."""
-        x = self.x
-        scale = self._scale
-        limit = np.maximum(
-            RELATIVE_STEP_LIMIT * np.abs(x),
-            MIN_STEP_LIMIT * np.minimum(self._high - self._low, 1.0),
-        )
-        low = np.maximum(self._low, x - limit)
-        high = np.minimum(self._high, x + limit)
-        damping = self._damping * np.where(scale > 0, scale, 1.0) ** 2
-        step = bounded_step(self._normal, self._gradient, damping, x, low, high)
-        return step, -float(step @ (2 * self._gradient + self._normal @ step))
-
-    def _is_converged(self, step: Array, predicted: float) -> bool:
-        """Whether the step or its predicted reduction is negligible, or the damping exceeds its
-        maximum.
-        """
-        if (
-            0 <= predicted <= TOLERANCE * self.cost and self._damping < 1
-        ) or not self._damping < MAX_DAMPING:
-            return True
-        scaled_step = self._scale * step
-        scaled_x = self._scale * self.x
-        return bool(scaled_step @ scaled_step <= TOLERANCE**2 * (scaled_x @ scaled_x))
-
-
-def bounded_step(
-    normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array
-) -> Array:
-    """The damped step (P,) from x; unknowns that it would move beyond a bound are set to it, the
-    others recomputed.
-    """
-    free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
-    step = np.zeros(x.size)
-    matrix = normal + np.diag(damping)
-    while free.any():
-        if free.all():
-            step[:] = np.linalg.solve(matrix, -gradient)
-        else:
-            right = gradient + normal @ np.where(free, 0.0, step)
-            indices = np.flatnonzero(free)
-            step[indices] = np.linalg.solve(matrix[indices[:, None], indices], -right[indices])
-        target = x + step
-        beyond = free & ((target < low) | (target > high))
-        if not beyond.any():
-            break
-        step[beyond] = (np.clip(target, low, high) - x)[beyond]
-        free &= ~beyond
-    return step
-
 
 MAX_RUNS = 200
 """Maximum number of simulations of all records in one search."""
@@ -300,28 +126,61 @@ class DynamicFitProblem:
         solution[free] = search.x
         return solution, search.cost
 
-    def search(self, scaled: Array, free: Sequence[int]) -> LevenbergMarquardt:
+    def search(
+        self, scaled: Array, free: Sequence[int], name: str = "search"
+    ) -> LevenbergMarquardt:
         """The search over the free unknowns from an initial guess (P,), which can be interrupted
         and continued. Simulations with far more steps than the best one so far, which occur far
         from physical parameters, are aborted."""
-        min_cost, max_steps, tried = np.inf, MAX_STEPS, scaled.copy()
-
-        def guarded(x: Array) -> tuple[Array, Array] | None:
-            nonlocal min_cost, max_steps
-            tried[free] = x
-            try:
-                residuals, jacobian, steps = self.run(tried, max_steps)
-            except AirmuscleError:
-                return None
-            if self.has_prior.any():
-                known, slopes = self.prior_residuals(tried)
-                residuals = np.concatenate([residuals, known])
-                jacobian = np.concatenate([jacobian, slopes])
-            cost = float(residuals @ residuals)
-            if cost < min_cost:
-                min_cost = cost
-                max_steps = int(min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps)))
-            return residuals, jacobian if len(free) == scaled.size else jacobian[:, free]
-
         low, high = self.bounds
-        return LevenbergMarquardt(guarded, scaled[free], low[free], high[free])
+        records = tuple((model.plant, model.experiment) for model in self.record_models)
+        content = records, self.unknowns, self.sensor_deviations, scaled, tuple(free)
+        return LevenbergMarquardt(
+            _GuardedRuns(self, scaled, free),
+            scaled[free],
+            low[free],
+            high[free],
+            name=name,
+            checkpoint=Checkpoint(__name__, content),
+        )
+
+
+class _GuardedRuns:
+    """Residuals and Jacobian by the free unknowns, with the priors; None where a simulation fails
+    or has far more steps than the best one so far."""
+
+    def __init__(self, problem: DynamicFitProblem, scaled: Array, free: Sequence[int]) -> None:
+        self._problem = problem
+        self._tried = scaled.copy()
+        self._free = free
+        self._min_cost = np.inf
+        self._max_steps = MAX_STEPS
+
+    @property
+    def memory(self) -> tuple[float, float]:
+        """The least sum of squares so far, and the limit of the steps of a simulation."""
+        return self._min_cost, float(self._max_steps)
+
+    @memory.setter
+    def memory(self, known: tuple[float, float]) -> None:
+        self._min_cost = known[0]
+        self._max_steps = int(known[1])
+
+    def __call__(self, x: Array) -> tuple[Array, Array] | None:
+        problem = self._problem
+        self._tried[self._free] = x
+        try:
+            residuals, jacobian, steps = problem.run(self._tried, self._max_steps)
+        except AirmuscleError:
+            return None
+        if problem.has_prior.any():
+            known, slopes = problem.prior_residuals(self._tried)
+            residuals = np.concatenate([residuals, known])
+            jacobian = np.concatenate([jacobian, slopes])
+        cost = float(residuals @ residuals)
+        if cost < self._min_cost:
+            self._min_cost = cost
+            budget = max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps)
+            self._max_steps = int(min(MAX_STEPS, budget))
+        is_complete = len(self._free) == self._tried.size
+        return residuals, jacobian if is_complete else jacobian[:, self._free]

@@ -7,6 +7,8 @@ import numpy as np
 from ...core import Array, Hint, IdentificationError
 from .least_squares_descent import gauss_newton
 from .problem import LeastSquaresProblem, LeastSquaresSolution
+from .search import is_budget_spent
+from .trust_region import search_trust_region
 from .variable_projection import (
     find_initial_values,
     solve_censored_least_squares,
@@ -71,8 +73,6 @@ def solve_iteratively(
     """Trust-region least squares within bounds, with parameters and residuals scaled to the order
     of one.
     """
-    from scipy.optimize import least_squares
-
     low, high = problem.bounds
     start = np.clip(start, low, high)
     scale = np.where(start != 0, np.abs(start), np.where(np.isfinite(high - low), high - low, 1.0))
@@ -102,11 +102,18 @@ def solve_iteratively(
     scaled = start / scale
     bounds = (low / scale, high / scale)
     for method, max_evaluations in SEARCH_STAGES:
-        result = least_squares(
-            residuals, scaled, jacobian, bounds, method, max_nfev=max_evaluations, **options
+        result = search_trust_region(
+            problem.name,
+            residuals,
+            scaled,
+            jac=jacobian,
+            bounds=bounds,
+            method=method,
+            max_nfev=max_evaluations,
+            **options,
         )
         scaled = result.x
-        if result.status > 0 or _is_converged(result):
+        if result.status > 0 or is_budget_spent() or _is_converged(result):
             break
     else:
         evaluations = sum(count for _, count in SEARCH_STAGES)

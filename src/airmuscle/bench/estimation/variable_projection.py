@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from ...core import Array
 from .problem import LeastSquaresProblem
+from .trust_region import search_trust_region
 
 RANK_TOLERANCE = 1e-10
 """Relative tolerance below which a singular value of the scaled design matrix counts as zero
@@ -211,14 +212,13 @@ class _Projection:
 
     def search(self, start: Array) -> Array:
         """The minimum found from one initial guess, or the guess itself where the search fails."""
-        from scipy.optimize import least_squares
-
         if not np.isfinite(self.sum_of_squares(start)):
             return start
         low, high = (bound / self._scale for bound in self._bounds)
         inside = np.clip(start / self._scale, low + 1e-9, high - 1e-9)
         try:
-            result = least_squares(
+            result = search_trust_region(
+                "initial values",
                 lambda x: self.residuals(x * self._scale),
                 inside,
                 bounds=(low, high),

@@ -18,7 +18,7 @@ import numpy as np
 from ...core import Array, IdentificationError, ParameterError, model, one_line, parameter
 from ...physics.muscle import CreepElements
 from ...recording import Recording
-from ..estimation import effective_sample_size, f_test_p_value
+from ..estimation import effective_sample_size, f_test_p_value, search_trust_region
 from ..inspection import (
     RELATIVE_BAND,
     SAME_READING,
@@ -225,8 +225,6 @@ def _fit_elements(time: Array, values: Array, count: int) -> Creep:
     """Nonlinear least squares in the time constants from the best grid point; the other parameters
     are linear.
     """
-    from scipy.optimize import least_squares
-
     low = np.log(np.median(np.diff(time)))
     high = np.log(2.0 * time[-1])
     min_step = np.log(MIN_RATIO)
@@ -244,7 +242,7 @@ def _fit_elements(time: Array, values: Array, count: int) -> Creep:
     best = min(starts, key=sum_of_squares)
     greatest_step = max(high - low, 2.0 * min_step)
     bounds = ([low, min_step][:count], [high, greatest_step][:count])
-    solution = least_squares(_residuals, best, bounds=bounds, args=(time, values))
+    solution = search_trust_region("creep", _residuals, best, bounds=bounds, args=(time, values))
     logarithms = np.cumsum(solution.x)
     coefficients = np.linalg.lstsq(_design_matrix(logarithms, time), values, rcond=None)[0]
     return Creep(float(coefficients[0]), tuple(coefficients[1:]), tuple(np.exp(logarithms)))

@@ -12,7 +12,12 @@ import numpy as np
 from ...core import Array, IdentificationError, Leaf, tree
 from ...physics.muscle.friction import Friction, PressureScaledFriction
 from ...recording import Recording
-from ..estimation import UndeterminedCombination, analyse_identifiability, effective_sample_size
+from ..estimation import (
+    UndeterminedCombination,
+    analyse_identifiability,
+    effective_sample_size,
+    search_trust_region,
+)
 from ..inspection import EDGE, Mask, estimate_noise, motion_direction
 from . import loop_data as data
 from .loop_data import MILLIMETRES, Axis, DataLimits, combine_limits
@@ -304,8 +309,6 @@ def _fit_iteratively(
     """Nonlinear least squares over the free parameters; the static curve is solved for at every
     evaluation.
     """
-    from scipy.optimize import least_squares
-
     limits = combine_limits(tuple(run.limits for run in runs))
     all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
@@ -327,7 +330,8 @@ def _fit_iteratively(
         return np.concatenate([_residuals(law(x.tolist()), runs), weight * (x - start)])
 
     # Central differences, because the forces have kinks, where one-sided ones differ by rounding.
-    result = least_squares(
+    result = search_trust_region(
+        type(friction).__name__,
         residuals,
         start,
         jac="3-point",

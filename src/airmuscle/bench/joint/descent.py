@@ -6,14 +6,15 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar, cast
+from typing import ClassVar, TypeVar, cast
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import Array, StateVariable, System, Value, Values, model, tree
 from ...engine import RungeKutta4, WithSensitivities, sensitivity, simulate_batch
-from ...engine.processes import check_running
 from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
+from ..estimation import SampledDescent, SampledParameters, SampledProblem, SearchStage
 from .episodes import HISTORY, Windows, WindowSignal, start_of
 
 Arm = TypeVar("Arm", bound=System)
@@ -24,19 +25,8 @@ OUTLIER = 3.0
 """Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor
 (chosen).
 """
-MEMORY = 0.9
-RATE = 0.3
-DAMPING = 1e-2
-LATE_DAMPING = 1e-3
-MAX_CHANGE = 0.4
-"""Share of the past in the running averages, step, damping and that of the second half of a stage,
-without which a search stops far up a valley of two parameters that act alike; greatest relative
-change of a parameter (chosen)."""
-CHECKED = 10
-LOST = 1.5
 SAMPLE = 1600
-"""Iterations after which the cost of their mean is checked, its ratio to the best one from which
-the search has lost its way, and windows from which it is computed (chosen)."""
+"""Windows from which the cost of a search is computed (chosen)."""
 PRIOR = 5.0
 """Weight of a prior value, in windows times rows with an error of one standard deviation
 (chosen).
@@ -77,21 +67,10 @@ def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     return _run_of_joint(arm, joint, (), windows)[0]
 
 
-@dataclasses.dataclass(frozen=True)
-class SearchStage:
-    """Iterations with windows of `rows` rows, or of all if they have fewer, `batch` windows
-    each.
-    """
-
-    rows: int
-    iterations: int
-    batch: int
-
-
 @dataclasses.dataclass(eq=False)
-class Descent:
+class Descent(SampledProblem):
     """Search for the parameters of an arm, by their paths in it, on which the motion of one joint
-    depends.
+    depends; its groups of rows are the windows.
     """
 
     arm: PressureDriven
@@ -108,65 +87,52 @@ class Descent:
     """Errors (N, rows) [rad] of the joint, from which the cost comes: in its own free run or in
     that of all joints.
     """
+    clip: ClassVar[float] = CLIP
 
     def __post_init__(self) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
-        self.values = np.array([float(leaves[path].value) for path in self.names])
-        self.sizes = np.array([typical_size(path, leaves) for path in self.names])
         bounds = [leaves[path].declared.bounds for path in self.names]
         least = [LOW.get(_field(path), -np.inf) for path in self.names]
-        declared_low = [low for low, _ in bounds]
-        self.low = np.maximum(declared_low, least)
-        self.high = np.array([high for _, high in bounds])
-        self.rng = np.random.default_rng(self.seed)
-        self.spread = 0.1
+        self._sizes = np.array([typical_size(path, leaves) for path in self.names])
+        self._low = np.maximum([low for low, _ in bounds], least)
+        self._high = np.array([high for _, high in bounds])
+        values = np.array([float(leaves[path].value) for path in self.names])
+        self._search = SampledDescent(values, self.seed)
+        self._stages = 0
+
+    @property
+    def values(self) -> Array:
+        """The parameters reached, shape (P,)."""
+        return self._search.values
+
+    @property
+    def parameters(self) -> SampledParameters:
+        prior = np.array([self.prior.get(path, 0.0) for path in self.names])
+        weights = np.array([self.ridge * (path in self.prior) for path in self.names])
+        return SampledParameters(self._sizes, self._low, self._high, prior, weights)
+
+    @property
+    def group_count(self) -> int:
+        return len(self.windows)
 
     def run(self, schedule: SearchStage) -> float:
-        """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost,
-        which is returned; a search that has lost its way goes on from that mean with half the
-        step."""
-        count = len(self.names)
-        rate = RATE
-        normal = np.zeros((count, count))
-        slope = np.zeros(count)
-        tail = []
-        rows = min(schedule.rows, self.windows.rows)
-        best = self.values.copy()
-        cost = self._cost(self.values, rows)
-        for step in range(1, schedule.iterations + 1):
-            check_running()
-            which = self.rng.permutation(len(self.windows))[: schedule.batch]
-            error, gradient = gradients(
-                self.arm, self.joint, self.names, self.windows.part(np.sort(which), rows)
-            )
-            self.spread = 0.9 * self.spread + 0.1 * max(float(np.sqrt(np.mean(error**2))), 1e-3)
-            weighted = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None]
-            flat = weighted.reshape(-1, count).T
-            normal = MEMORY * normal + (1 - MEMORY) * (
-                flat @ gradient.reshape(-1, count) / self.spread**2
-            )
-            slope = MEMORY * slope + (1 - MEMORY) * (flat @ error.ravel() / self.spread**2)
-            late = step / schedule.iterations
-            damping = DAMPING if late <= 0.5 else LATE_DAMPING
-            self._step(normal, slope, 0.4 * rate if late > 0.7 else rate, damping)
-            tail.append(self.values.copy())
-            if step % CHECKED == 0:
-                mean = np.mean(tail[-CHECKED:], axis=0)
-                reached = self._cost(mean, rows)
-                if reached < cost:
-                    best = mean
-                    cost = reached
-                elif not reached < LOST * cost:
-                    self.values = best.copy()
-                    rate = 0.5 * rate
-        self.values = best
+        """Descend; afterwards `arm` has the parameters with the smallest cost [rad^2], which is
+        returned.
+        """
+        stage = dataclasses.replace(schedule, rows=min(schedule.rows, self.windows.rows))
+        self._stages = self._stages + 1
+        name = f"joint {self.joint + 1}, stage {self._stages}"
+        cost = self._search.run(self, stage, name, self)
         self.arm = with_values(self.arm, self.names, self.values)
         return cost
 
-    def _cost(self, values: Array, rows: int) -> float:
-        """Robust mean square error [rad^2] of the free run of the joint over a fixed sample of the
-        windows.
-        """
+    def linearise(
+        self, values: Array, groups: npt.NDArray[np.intp], rows: int
+    ) -> tuple[Array, Array]:
+        arm = with_values(self.arm, self.names, values)
+        return gradients(arm, self.joint, self.names, self.windows.part(groups.tolist(), rows))
+
+    def cost(self, values: Array, rows: int) -> float:
         arm = with_values(self.arm, self.names, values)
         sampled = self.windows.sample(SAMPLE, rows)
         errors = self.errors(arm, self.joint, sampled)
@@ -175,21 +141,6 @@ class Descent:
         counted = limited[sampled.counts[:, HISTORY + 1 :]]
         losses = 2 * CLIP**2 * (np.sqrt(1 + (counted / CLIP) ** 2) - 1)
         return float(np.mean(losses))
-
-    def _step(self, normal: Array, slope: Array, rate: float, damping: float) -> None:
-        weights = [self.ridge * (name in self.prior) for name in self.names]
-        pull = np.array(weights) / self.sizes**2
-        centre = [self.prior.get(name, 0.0) for name in self.names]
-        slope = slope + pull * (self.values - centre)
-        normal = normal + np.diag(pull)
-        scale = np.sqrt(np.diag(normal))
-        scale = scale + 1e-6 * np.max(scale * self.sizes) / self.sizes
-        damped = normal / np.outer(scale, scale) + damping * np.eye(len(slope))
-        change = -np.linalg.solve(damped, slope / scale) / scale
-        limit = MAX_CHANGE * np.maximum(np.abs(self.values), self.sizes)
-        moved = self.values + np.clip(rate * change, -limit, limit)
-        self.values = np.clip(moved, self.low, self.high)
-        self.arm = with_values(self.arm, self.names, self.values)
 
 
 def with_slopes(

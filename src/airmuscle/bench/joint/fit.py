@@ -24,7 +24,8 @@ from ...physics import (
     WithStickSlip,
 )
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
-from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size, with_values
+from ..estimation import SearchStage
+from .descent import CLIP, Descent, gradients, joint_errors, typical_size, with_values
 from .episode_inspection import checked_inspection, without_saturated
 from .episodes import ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
 from .free_run import (

@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ...core import Array, ShortRepr, tree
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
+from ..estimation import SearchStage, search_trust_region
 from ..prediction import ARX, DEPTH, PERSISTENCE, fit_arx
-from .descent import Descent, SearchStage, with_slopes
+from .descent import Descent, with_slopes
 from .episode_inspection import without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of
 
@@ -169,7 +169,8 @@ def _fit(p: Array, u: Array) -> RegulatorLag:
             modelled = dataclasses.replace(model, values=tuple(values.tolist())).pressures(p, u)
             return (modelled - p)[:, HISTORY + 1 :].ravel() / UNIT
 
-        fit = least_squares(
+        fit = search_trust_region(
+            "regulator",
             errors,
             model.values,
             loss="soft_l1",

@@ -21,6 +21,7 @@ from ...core import (
 )
 from ...engine.distribution import stored_result
 from ...physics import PressureDriven
+from ..estimation import search_trust_region
 from .descent import CLIP, OUTLIER, with_slopes, with_values
 from .episode_inspection import checked_inspection, without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
@@ -260,9 +261,8 @@ class KnownSearch:
 
     def run(self) -> ReadPressures:
         """The system with the estimates."""
-        from scipy.optimize import least_squares
-
-        solution = least_squares(
+        solution = search_trust_region(
+            "joint",
             lambda x: self._evaluate(x)[0].ravel(),
             np.clip(self.start, self.low, self.high) / self.sizes,
             jac=lambda x: self._evaluate(x)[1].reshape(-1, len(self.paths)),

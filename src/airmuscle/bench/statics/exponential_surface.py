@@ -17,7 +17,7 @@ from ...core import Array, IdentificationError, bar
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.borzikova import BorzikovaExponential
 from ...recording import Recording
-from ..estimation import CorrelationIndex, correlation_index
+from ..estimation import CorrelationIndex, correlation_index, search_trust_region
 from ..inspection import distinct_readings, rounding
 
 
@@ -332,12 +332,12 @@ def fit_nonlinear(
     """Fit k itself by nonlinear least squares, S(A) = Sum (k_i - f(p_i, F_i, A))^2, with exact
     derivatives. The arguments are those of `fit_linearised`. All points are used, also those with k
     >= k_max. Raises IdentificationError."""
-    from scipy.optimize import least_squares
-
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
     start = np.linalg.lstsq(*problem.linear_system(), rcond=None)[0]
     limits = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    result = least_squares(problem.residuals, start, jac=problem.jacobian, method="lm", **limits)
+    result = search_trust_region(
+        "surface", problem.residuals, start, jac=problem.jacobian, method="lm", **limits
+    )
     if not result.success:
         raise IdentificationError(
             f"{recording.origin}: nonlinear least squares did not converge ({result.message})."

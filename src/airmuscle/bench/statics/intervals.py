@@ -9,8 +9,8 @@ import numpy as np
 
 from ...core import Array, IdentificationError
 from ...recording import Recording
-from ..estimation import LeastSquares, solve_least_squares, student_quantile
-from .fit_problem import RESTING_LENGTH, FitProblem
+from ..estimation import LeastSquares, profile_limits, student_quantile
+from .fit_problem import RESTING_LENGTH
 from .pooling import pooled_band
 from .static_fit_result import Fit
 
@@ -77,9 +77,6 @@ _HIGH_RELATIVE_ERROR = 0.5
 """Absolute correlation, or relative standard error, above which a standard error is not trusted
 (chosen).
 """
-_MAX_DOUBLINGS = 12
-"""Maximum number of outward steps, each twice the previous one: up to 4096 standard errors."""
-_BISECTIONS = 18
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,44 +137,8 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
             " uncensored rows than parameters."
         )
     index = fit.names.index(name)
-    minimum = _sum_of_squares(fit.problem, fit.values)
     ratio = fit.parameter_covariance.error_ratio(index, level)
-    threshold = minimum * (1 + ratio**2 / degrees_of_freedom)
-    low, high = (_find_limit(fit, index, sign * estimate.stderr, threshold) for sign in (-1, 1))
+    low, high = profile_limits(
+        fit.problem, fit.values, index, estimate.stderr, ratio**2 / degrees_of_freedom
+    )
     return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
-
-
-def _sum_of_squares(problem: FitProblem, values: np.ndarray) -> float:
-    return float(np.sum(problem.residuals(problem.predict(values)) ** 2))
-
-
-def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
-    """The value at which the profile exceeds the threshold on one side; infinite where it never
-    does, or where a bound is reached first."""
-    problem = fit.problem
-    estimate = fit.estimates[index]
-    bounds = problem.parameters[index].bounds
-
-    def is_beyond(value: float) -> bool:
-        constrained = problem.with_known(index, value)
-        values = np.zeros(0)
-        if constrained.parameters:
-            values = solve_least_squares(constrained, LeastSquares()).values
-        return _sum_of_squares(constrained, values) > threshold
-
-    inside = estimate.value
-    outside = estimate.value
-    unbounded = float(np.copysign(np.inf, step))
-    for doubling in range(_MAX_DOUBLINGS):
-        inside = outside
-        outside = float(np.clip(estimate.value + step * 2.0**doubling, *bounds))
-        if inside == outside:  # the bound is reached below the threshold
-            return unbounded
-        if is_beyond(outside):
-            break
-    else:
-        return unbounded
-    for _ in range(_BISECTIONS):
-        middle = (inside + outside) / 2
-        inside, outside = (inside, middle) if is_beyond(middle) else (middle, outside)
-    return (inside + outside) / 2

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...core import AirmuscleError, FileError, SimulationError, counted
 from ...engine.cluster import dask_cluster
 from ...engine.processes import Workers, available_cores
-from ...engine.result_store import STORE_FOLDER, ResultStore, result_store
+from ...engine.result_store import STORE_FOLDER, ResultStore, current_store, result_store
 from ...report.chapter import Chapter
 from ...report.data import in_words
 from ...report.write import REPORT_FILE
@@ -84,7 +84,7 @@ class Execution:
         for what uses all cores `alone`.
         """
         local = self.workers or (1 if alone else available_cores())
-        with _stored_results(out):
+        with stored_results(out):
             if self.cluster is None:
                 yield min(local, tasks or local)
                 return
@@ -93,9 +93,9 @@ class Execution:
 
 
 @contextlib.contextmanager
-def _stored_results(out: Path | None) -> Iterator[None]:
+def stored_results(out: Path | None) -> Iterator[None]:
     """A context manager for the store in the folder of the output; says where a command resumes."""
-    if out is None:
+    if out is None or current_store() is not None:
         yield
         return
     folder = out / STORE_FOLDER

@@ -30,6 +30,7 @@ from .options import Folder, Json, Name, complete_law
 from .parser import Argument, CommandOption
 from .printing import print_result
 from .requested import with_requests
+from .search_limit import SearchLimit
 from .terminal import progress_bars
 
 
@@ -39,6 +40,7 @@ def fit(
     request: FitRequest,
     reading: ReadingRequest,
     execution: Execution,
+    limit: SearchLimit,
     out: Folder = Path("fit"),
     json: Json = False,
 ) -> None:
@@ -81,7 +83,11 @@ def fit(
         deliver("fit", [record], json=json, out=out, title="Single record")
         return
     progress = progress_bars("comparison" if request.compare else "fit")
-    with execution.executor(out) as executor, progress as show:
+    with (
+        execution.executor(out) as executor,
+        progress as show,
+        limit.searches(out, lambda name, fraction: None),
+    ):
         fitted = fit_requested(
             request, files, recordings, lambda _, fraction: show("", fraction), executor
         )

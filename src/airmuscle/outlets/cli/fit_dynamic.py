@@ -19,6 +19,7 @@ from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json
 from .parser import Argument
 from .requested import with_requests
+from .search_limit import SearchLimit
 from .terminal import echo
 
 Study = Annotated[
@@ -44,7 +45,11 @@ class DynamicFitRequest:
 
 @with_requests
 def fit_dynamic(
-    study: Study, request: DynamicFitRequest, out: Folder = Path("dynamic"), json: Json = False
+    study: Study,
+    request: DynamicFitRequest,
+    limit: SearchLimit,
+    out: Folder = Path("dynamic"),
+    json: Json = False,
 ) -> None:
     """Identify plant parameters from transient records.
 
@@ -78,8 +83,9 @@ def fit_dynamic(
     if not json:
         counts = ((len(loaded.experiments), "record"), (loaded.search.starts, "start"))
         echo("  " + ", ".join(counted(*pair) for pair in counts), err=True)
-    fit = loaded.fit()
-    cross = loaded.cross_predictions(fit)
+    with limit.searches(out):
+        fit = loaded.fit()
+        cross = loaded.cross_predictions(fit)
     fit = fit.with_scatter_of_records([prediction.common for prediction in cross])
     names_of_profiles = _names_of_profiles(fit, request.profile)
     profiles = [fit.profile(name, request.points) for name in names_of_profiles]

@@ -9,6 +9,7 @@ from .delivery import Execution, deliver
 from .options import Folder, Json
 from .parser import Argument
 from .requested import with_requests
+from .search_limit import SearchLimit
 from .terminal import echo
 
 Episodes = Annotated[
@@ -21,6 +22,7 @@ def fit_joint_command(
     source: Episodes,
     request: JointFitRequest,
     execution: Execution,
+    limit: SearchLimit,
     out: Folder = Path("joint"),
     json: Json = False,
 ) -> None:
@@ -46,7 +48,7 @@ def fit_joint_command(
         echo(str(inspect_requested(source, request)))
         return
     check_writable(out)
-    with execution.executor(out, alone=True) as workers:
+    with execution.executor(out, alone=True) as workers, limit.searches(out):
         chapter, files = fit_requested_arm(
             source, request, lambda text: None if json else echo(text), workers
         )

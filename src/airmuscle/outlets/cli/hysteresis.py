@@ -20,6 +20,7 @@ from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json
 from .requested import with_requests
+from .search_limit import SearchLimit
 from .terminal import echo
 
 
@@ -73,6 +74,7 @@ def hysteresis(
     files: Files,
     request: HysteresisRequest,
     reading: ReadingRequest,
+    limit: SearchLimit,
     out: Folder = Path("hysteresis"),
     json: Json = False,
 ) -> None:
@@ -108,10 +110,12 @@ def hysteresis(
     progress = None if json else lambda name: echo(f"  {name}", err=True)
     elements = request.elements
     friction_laws = request.friction
-    fits = [
-        fit_loop(loop, elements=elements, others=friction_laws, progress=progress) for loop in loops
-    ]
-    joint = fit_jointly(fits, progress=progress)
+    with limit.searches(None):
+        fits = [
+            fit_loop(loop, elements=elements, others=friction_laws, progress=progress)
+            for loop in loops
+        ]
+        joint = fit_jointly(fits, progress=progress)
     selected = select_friction(fits, joint)
     chapters = hysteresis_chapters(fits, joint)
     if creep_fit is not None:
