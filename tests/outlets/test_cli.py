@@ -96,6 +96,7 @@ NAMES = (
     "fit-live",
     "size",
     "body",
+    "fit-out",
     "simulate",
     "study",
     "tune",

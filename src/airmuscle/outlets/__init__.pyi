@@ -13,6 +13,8 @@ from .environments import register_environments as register_environments
 from .environments import roll_out as roll_out
 from .export import C99 as C99
 from .export import PRECISIONS as PRECISIONS
+from .export import FittedBody as FittedBody
+from .export import ForceTable as ForceTable
 from .export import JavaScript as JavaScript
 from .export import MuscleActuator as MuscleActuator
 from .export import Octave as Octave
@@ -22,6 +24,7 @@ from .export import Target as Target
 from .export import TorchStack as TorchStack
 from .export import WarpStack as WarpStack
 from .export import WrittenFmu as WrittenFmu
+from .export import fitted_body as fitted_body
 from .export import make_identifiers as make_identifiers
 from .export import regulated_plant as regulated_plant
 from .export import write_actuator as write_actuator

@@ -113,6 +113,12 @@ COMMANDS = (
         "body",
         "Study the routes of muscles on a robot's body.",
     ),
+    CommandRow(
+        "fit-out",
+        "fit_out",
+        "fit_out_command",
+        "Choose the muscles of a robot's body for its routes.",
+    ),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),

@@ -1,3 +1,6 @@
+from .body_muscles import FittedBody as FittedBody
+from .body_muscles import ForceTable as ForceTable
+from .body_muscles import fitted_body as fitted_body
 from .compiler import build_and_run as build_and_run
 from .fmi_package import WrittenFmu as WrittenFmu
 from .fmu import write_fmu as write_fmu

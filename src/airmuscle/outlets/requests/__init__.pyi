@@ -1,4 +1,5 @@
 from .body import BodyRequest as BodyRequest
+from .body import FitOutRequest as FitOutRequest
 from .declaration import Option as Option
 from .declaration import RequestError as RequestError
 from .declaration import build as build

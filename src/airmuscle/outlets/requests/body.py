@@ -6,7 +6,10 @@ from pathlib import Path
 
 from ...core import UnitError
 from ...design.body import Body, BodyStudy, read_body, read_direction, read_range, study_body
-from .declaration import RequestError, many, optional, request
+from ...design.body.route_muscle import CRITERIA
+from ...design.sizing import SizingConditions
+from ...files.library import Entry, load_law
+from .declaration import RequestError, many, option, optional, request
 from .reading import Pairs
 
 
@@ -83,3 +86,31 @@ class BodyRequest:
             max_contraction=self.max_contraction,
             progress=progress,
         )
+
+
+@request
+class FitOutRequest:
+    """Which muscles a body may have."""
+
+    supply: float = option("Supply pressure: '6 bar' (gauge).", unit="Pa")
+    safety: float = option(
+        "Factor on the demanded tension.", unit="1", metavar="NUMBER", default="1.5"
+    )
+    max_count: int = option("Maximum number of muscles side by side.", default=3)
+    muscle: tuple[str, ...] = many(
+        "Muscle or file instead of the catalogue; repeatable.", metavar="NAME"
+    )
+    least: str = option(
+        f"What is made least: {', '.join(CRITERIA)}.",
+        choices=CRITERIA,
+        default="air",
+        metavar="KEY",
+    )
+
+    def conditions(self) -> SizingConditions:
+        """The conditions of the choice. Raises ParameterError."""
+        return SizingConditions(self.supply, self.safety, max_count=self.max_count)
+
+    def entries(self) -> tuple[Entry, ...] | None:
+        """The muscles that are named; None without. Raises UnknownNameError and FileError."""
+        return tuple(map(load_law, self.muscle)) or None

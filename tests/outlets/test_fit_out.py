@@ -1,0 +1,188 @@
+"""`airmuscle fit-out`: muscles that hold every pose, and a body whose actuators never exceed what
+its muscles are permitted.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import bodies
+import numpy as np
+import pytest
+from bodies import arm, written
+from command_line import airmuscle
+
+from airmuscle.design import (
+    Poses,
+    SizingConditions,
+    by_number,
+    fit_out,
+    read_body,
+    sample_routes,
+    study_body,
+)
+from airmuscle.outlets import fitted_body
+from airmuscle.units import bar
+
+pytestmark = pytest.mark.tool
+LEG = Path(__file__).parents[2] / "examples" / "air_leg.xml"
+SUPPLY = SizingConditions(6 * bar, 1.5)
+
+
+@pytest.fixture(scope="module")
+def mujoco():
+    return bodies.require_mujoco()
+
+
+@pytest.fixture(scope="module")
+def result(mujoco):
+    """The muscles of the leg of the examples."""
+    return fit_out(study_body(read_body(LEG)), SUPPLY)
+
+
+def test_every_route_of_the_leg_is_served_and_fills_its_path(result):
+    assert not result.unserved
+    assert len(result.muscles) == 6
+    for choice in result.muscles:
+        taken = choice.length * (1.0 - choice.contraction[0]) + choice.tendon + choice.fittings
+        assert taken == pytest.approx(choice.sweep.longest.length)
+        assert choice.tendon >= 0.0
+
+
+def test_no_pose_leaves_the_contraction_and_the_demand_has_its_reserve(result):
+    """10 000 random poses, against the lengths that MuJoCo gives there."""
+    body = result.study.body
+    ranges = np.array([(body.joints[name].low, body.joints[name].high) for name in body.moving])
+    positions = np.random.default_rng(3).uniform(*ranges.T, (10_000, len(ranges)))
+    lengths = sample_routes(body, Poses(body.moving, positions)).length
+    for column, choice in enumerate(result.muscles):
+        contraction = choice.contraction_at(lengths[:, column])
+        low, high = choice.muscle.contraction_range
+        assert contraction.min() >= low - 1e-6
+        assert contraction.max() <= high + 1e-6
+        demand = result.demands[choice.name]
+        assert (choice.capacity(demand.length) >= 1.499 * demand.tension).all()
+
+
+def test_a_shorter_muscle_or_one_fewer_does_not_serve(result):
+    """The choice is the least: with 2 % less length the contraction or the reserve is missed."""
+    for choice in result.muscles:
+        length = 0.98 * choice.length
+        last = choice.contraction[0] + choice.sweep.stroke / (choice.tackle * length)
+        demand = result.demands[choice.name]
+        taken = (choice.sweep.longest.length - demand.length) / (choice.tackle * length)
+        force = choice.muscle.capacity(choice.contraction[0] + taken)
+        capacity = choice.count / choice.tackle * force
+        least = choice.muscle.entry.ratings.min_length
+        assert (
+            last > choice.muscle.contraction_range[1]
+            or (capacity < 1.5 * demand.tension).any()
+            or length < max(least, 3.0 * choice.muscle.entry.ratings.diameter)
+        )
+
+
+def test_the_number_of_muscles_is_least_where_it_is_asked_for(result):
+    fewest = fit_out(result.study, SUPPLY, criterion=by_number)
+    count = sum(choice.count for choice in fewest.muscles)
+    assert not fewest.unserved
+    assert count < sum(choice.count for choice in result.muscles)
+
+
+def test_no_actuator_exceeds_the_permitted_force_and_each_keeps_its_stated_error(result, mujoco):
+    """10 000 random poses and pressures of the written body: forces are pulls within the permitted
+    ones, and those of the law within the greatest deviation that the file states."""
+    fitted = fitted_body(result)
+    model = mujoco.MjModel.from_xml_string(fitted.text)
+    data = mujoco.MjData(model)
+    generator = np.random.default_rng(4)
+    low, high = model.jnt_range.T
+    forces = np.empty((10_000, model.nu))
+    lengths = np.empty_like(forces)
+    pressures = generator.uniform(0.5 * bar, 6 * bar, forces.shape)
+    for row in range(len(forces)):
+        data.qpos[:] = generator.uniform(low, high)
+        data.act[:] = pressures[row]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fwdActuation(model, data)
+        forces[row] = data.actuator_force
+        lengths[row] = data.actuator_length
+    for column, choice in enumerate(result.muscles):
+        rated = choice.count / choice.tackle * choice.muscle.entry.ratings.max_force
+        pull = -forces[:, column]
+        assert pull.min() >= 0.0
+        assert pull.max() <= rated + 1e-9
+        table = fitted.tables[choice.name]
+        within = pressures[:, column] >= choice.muscle.pressure_range[0]
+        law = np.minimum(choice.tension(pressures[:, column], lengths[:, column]), table.permitted)
+        deviation = np.abs(pull - law)[within]
+        assert deviation.max() <= 1.05 * table.greatest  # between the points of the table
+
+
+def test_five_seconds_with_a_controller_at_each_joint_are_stable(result, mujoco):
+    """Pressures by PD control of the angles, at MuJoCo's default step."""
+    model = mujoco.MjModel.from_xml_string(fitted_body(result).text)
+    assert model.opt.timestep == 0.002
+    data = mujoco.MjData(model)
+    target = np.radians([-20.0, 40.0, 5.0])
+    angles = []
+    for _ in range(2500):
+        mujoco.mj_step1(model, data)
+        moment = np.zeros((model.nu, model.nv))
+        mujoco.mju_sparse2dense(
+            moment,
+            data.actuator_moment,
+            data.moment_rownnz,
+            data.moment_rowadr,
+            data.moment_colind,
+        )
+        wanted = 12.0 * (target - data.qpos) - 1.5 * data.qvel + data.qfrc_bias
+        pull = -(moment @ wanted)  # an actuator that helps has the sign of -dL/dq
+        data.ctrl[:] = 1.5 * bar + 6e4 * pull
+        mujoco.mj_step2(model, data)
+        angles.append(data.qpos.copy())
+    angles = np.array(angles)
+    assert np.isfinite(angles).all()
+    assert not any(warning.number for warning in data.warning)
+    assert np.abs(np.ptp(angles[-500:], axis=0)).max() <= np.radians(2.0)
+    assert np.abs(angles[-1] - target).max() <= np.radians(15.0)
+
+
+def test_a_route_that_no_muscle_serves_is_named_with_what_would(mujoco, tmp_path):
+    short = arm(front="0.06 0 0.06", insertion="0.06 0 -0.06", limits="-60 60")
+    result = fit_out(study_body(read_body(written(tmp_path, short))), SUPPLY)
+    assert not result.muscles
+    assert "A lever of" in result.unserved[0].reason
+    heavy = arm().replace('mass="1"', 'mass="900"')
+    result = fit_out(study_body(read_body(written(tmp_path, heavy))), SUPPLY)
+    assert "or more muscles" in result.unserved[0].reason
+
+
+def test_the_command_writes_the_body_the_choice_and_a_page_for_each_route(mujoco, tmp_path):
+    body = written(
+        tmp_path, arm(after='<actuator><motor name="old" tendon="arm_flexor"/></actuator>')
+    )
+    out = tmp_path / "out"
+    answer = airmuscle("fit-out", body, "--supply", "6 bar", "--out", out, "--json")
+    assert answer.exit_code == 0, answer.output
+    chapter = json.loads(answer.stdout)["fit_out"]
+    assert [row["route"] for row in chapter["muscles"]] == ["old", "arm_extensor"]
+    choice = tomllib.loads((out / "muscles.toml").read_text(encoding="utf-8"))
+    assert [row["number"] for row in choice["muscle"]] == [
+        row["number"] for row in chapter["muscles"]
+    ]
+    model = mujoco.MjModel.from_xml_path(str(out / "body.xml"))
+    assert [model.actuator(index).name for index in range(model.nu)] == ["old", "arm_extensor"]
+    assert (out / "figures" / "route_arm_extensor.svg").exists()
+    assert (out / "data" / "order.csv").exists()
+
+
+def test_nothing_is_written_without_a_body(mujoco, tmp_path):
+    answer = airmuscle(
+        "fit-out", tmp_path / "none.xml", "--supply", "6 bar", "--out", tmp_path / "out"
+    )
+    assert answer.exit_code == 1
+    assert "there is no such file" in answer.stderr
+    assert not (tmp_path / "out").exists()
