@@ -10,6 +10,7 @@ from pathlib import Path
 
 import bodies
 import numpy as np
+import printed
 import pytest
 from bodies import arm, written
 from command_line import airmuscle
@@ -121,11 +122,20 @@ def test_no_actuator_exceeds_the_permitted_force_and_each_keeps_its_stated_error
         assert deviation.max() <= 1.05 * table.greatest  # between the points of the table
 
 
-def test_five_seconds_with_a_controller_at_each_joint_are_stable(result, mujoco):
+@pytest.mark.parametrize("as_plugins", [False, True], ids=["tables", "plugins"])
+def test_five_seconds_with_a_controller_at_each_joint_are_stable(
+    as_plugins, result, mujoco, tmp_path
+):
     """Pressures by PD control of the angles, at MuJoCo's default step."""
-    model = mujoco.MjModel.from_xml_string(fitted_body(result).text)
+    if as_plugins:
+        printed.require("gcc")
+    fitted = fitted_body(result, tmp_path if as_plugins else None)
+    model = mujoco.MjModel.from_xml_string(fitted.text)
     assert model.opt.timestep == 0.002
     data = mujoco.MjData(model)
+    for route in fitted.plugins.values():
+        for name in route.names:
+            route.plugin.initialise(model, data, name, pressure=1 * bar)
     target = np.radians([-20.0, 40.0, 5.0])
     angles = []
     for _ in range(2500):
@@ -186,3 +196,29 @@ def test_nothing_is_written_without_a_body(mujoco, tmp_path):
     assert answer.exit_code == 1
     assert "there is no such file" in answer.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_plugins_have_the_torque_of_the_muscles_of_the_library(result, mujoco, tmp_path):
+    """The static torque of each route at random pressures and poses equals that of the law times
+    number and moment arm, within 1e-6; laws that give no force have a table."""
+    printed.require("gcc")
+    fitted = fitted_body(result, tmp_path)
+    assert set(fitted.plugins) | set(fitted.tables) == {choice.name for choice in result.muscles}
+    assert len(fitted.plugins) >= 4
+    spec = mujoco.MjSpec.from_string(fitted.text)
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4  # forces at the instant
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    generator = np.random.default_rng(5)
+    for _ in range(40):
+        data.qpos[:] = generator.uniform(*model.jnt_range.T)
+        for choice in result.muscles:
+            route = fitted.plugins.get(choice.name)
+            for name in () if route is None else route.names:
+                pressure = float(generator.uniform(1 * bar, 5.9 * bar))
+                route.plugin.initialise(model, data, name, pressure=pressure)
+                mujoco.mj_forward(model, data)
+                force = -data.actuator(name).force[0]
+                length = data.ten_length[choice.sweep.route.index]
+                law = float(choice.muscle.force(pressure, choice.contraction_at(length)))
+                assert force == pytest.approx(max(law, 0.0), rel=1e-6, abs=1e-6)

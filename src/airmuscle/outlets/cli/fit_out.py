@@ -1,5 +1,6 @@
 """`airmuscle fit-out`: the muscles of the routes of a robot's body."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -8,13 +9,15 @@ from ...design.body.fitting_out import fit_out
 from ..export.body_muscles import choice_toml, fitted_body
 from ..requests.body import BodyRequest, FitOutRequest
 from .delivery import deliver
-from .options import Json, OptionalFolder, with_requests
+from .options import Json, OptionalFolder
 from .parser import Argument
+from .requested import with_requests
 from .terminal import progress_bars
 
 BodyFile = Annotated[Path, Argument("BODY.xml", "A body with routes: MJCF or URDF.")]
 BODY_FILE = "body.xml"
 CHOICE_FILE = "muscles.toml"
+PLUGIN_FOLDER = "plugins"
 
 
 @with_requests
@@ -50,7 +53,13 @@ def fit_out_command(
             request.least,  # type: ignore[arg-type]
             lambda fraction: show("muscles", fraction),
         )
-    files = {}
+    files: dict[str, str | Callable[[Path], object]] = {}
     if out is not None and result.muscles:
-        files = {BODY_FILE: fitted_body(result).text, CHOICE_FILE: choice_toml(result)}
+        files[CHOICE_FILE] = choice_toml(result)
+
+        def write_body(target: Path) -> None:
+            folder = target.parent / PLUGIN_FOLDER if request.plugins else None
+            target.write_text(fitted_body(result, folder).text, encoding="utf-8")
+
+        files[BODY_FILE] = write_body
     deliver("fit-out", [result.chapter()], json=json, out=out, title="Fit-out", files=files)

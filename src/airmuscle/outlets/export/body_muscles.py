@@ -3,6 +3,7 @@ the choice as TOML.
 """
 
 import json
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...core import Array
 from ...design.body import FitOut, RouteMuscle
 from ...design.body.simulator import load_simulator
+from .body_plugins import MusclePlugins, RoutePlugin
 
 PRESSURES = 25
 LENGTHS = 25
@@ -43,10 +45,11 @@ class ForceTable(NamedTuple):
 
 
 class FittedBody(NamedTuple):
-    """A body with its muscles: MJCF, and the table of forces of each route by its name."""
+    """A body with its muscles: MJCF, and by the name of a route its table of forces or plugin."""
 
     text: str
     tables: dict[str, ForceTable]
+    plugins: dict[str, RoutePlugin]
 
 
 def force_table(choice: RouteMuscle) -> ForceTable:
@@ -78,11 +81,15 @@ def _strongest(choice: RouteMuscle) -> float:
     return float(np.max(choice.muscle.force(choice.muscle.pressure_range[1], contraction)))
 
 
-def fitted_body(fit_out: FitOut) -> FittedBody:
+def fitted_body(fit_out: FitOut, plugins: Path | None = None) -> FittedBody:
     """The MJCF of a body whose routes have their muscles as actuators.
 
-    The control of an actuator is the set gauge pressure [Pa], which the pressure follows with a
-    time constant. Actuators of the file at these routes are removed. Raises FileError.
+    plugins  folder for MuJoCo plugins of the muscles whose law gives a force; the other routes, or
+             all without a folder, have a general actuator by a table
+
+    The control of an actuator is the set gauge pressure [Pa]: of a plugin that of a regulator, else
+    the pressure follows it with a time constant. Actuators of the file at these routes are removed.
+    Raises FileError, and ParameterError for a MuJoCo without plugins.
     """
     mujoco = load_simulator()
     file = fit_out.study.body.file
@@ -92,7 +99,13 @@ def fitted_body(fit_out: FitOut) -> FittedBody:
         if actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON and actuator.target in served:
             spec.delete(actuator)
     tables = {}
+    built = {}
+    writer = None if plugins is None else MusclePlugins(plugins, fit_out.conditions)
     for tendon, choice in served.items():
+        plugin = None if writer is None else writer.add(spec, choice, tendon)
+        if plugin is not None:
+            built[choice.name] = plugin
+            continue
         table = force_table(choice)
         tables[choice.name] = table
         _add_actuator(mujoco, spec, choice, tendon, table)
@@ -102,7 +115,7 @@ def fitted_body(fit_out: FitOut) -> FittedBody:
         spec.texturedir = str(folder / spec.texturedir)
     file.compiled(spec)
     text: str = spec.to_xml()
-    return FittedBody(f"<!-- {_provenance(fit_out, tables)} -->\n{text}", tables)
+    return FittedBody(f"<!-- {_provenance(fit_out, tables)} -->\n{text}", tables, built)
 
 
 def _add_actuator(
@@ -129,13 +142,22 @@ def _provenance(fit_out: FitOut, tables: dict[str, ForceTable]) -> str:
     """The comment at the beginning of the MJCF."""
     lines = [
         f"{fit_out.study.body.name} with the muscles of airmuscle fit-out.",
-        "Control: set gauge pressure in Pa. Force: affine in pressure and length of the route.",
+        "Control: set gauge pressure in Pa. Force: affine in pressure and length of the route, or",
+        "that of a plugin, which mj_loadPluginLibrary loads before this file.",
     ]
     for choice in fit_out.muscles:
-        table = tables[choice.name]
-        lines.append(
+        muscles = (
             f"{choice.name}: {choice.count} x {choice.product}, {1e3 * choice.length:.4g} mm,"
-            f" tackle {choice.tackle}:1, greatest deviation from the law {table.greatest:.3g} N"
+            f" tackle {choice.tackle}:1"
+        )
+        table = tables.get(choice.name)
+        if table is None:
+            lines.append(
+                f"{muscles}, a plugin for each muscle, of the law {choice.muscle.entry.name}"
+            )
+            continue
+        lines.append(
+            f"{muscles}, greatest deviation from the law {table.greatest:.3g} N"
             f" (rms {table.rms:.3g} N) of {table.permitted:.4g} N"
         )
     for item in fit_out.unserved:

@@ -107,6 +107,10 @@ class FitOutRequest:
         metavar="KEY",
     )
 
+    plugins: bool = optional(
+        "Build MuJoCo plugins with the laws of the muscles, in DIR/plugins; needs a C compiler."
+    )
+
     def conditions(self) -> SizingConditions:
         """The conditions of the choice. Raises ParameterError."""
         return SizingConditions(self.supply, self.safety, max_count=self.max_count)
