@@ -3,6 +3,7 @@
 A reader gives tables, which become recordings, or the arrays of episodes; a format without arrays
 gives an episode for each table. All but text, which the program parses itself, are read in a
 separate process with limits of its time and memory, in which links to other files are refused.
+Text has no links, and is parsed in chunks, so that its time and memory are those of its size.
 """
 
 import dataclasses

@@ -12,6 +12,9 @@ from ....core import FileError, ParameterError, abridged
 from . import header
 from .channels import Cells, RawTable
 
+MAX_HEADER_LINES = 10_000
+"""Number of lines with content in which headings and first numbers are looked for (chosen: no data
+logger writes as many above its table)."""
 NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
 
@@ -164,9 +167,10 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
             f"{origin}: the file contains no table. A table consists of a row of headings and rows"
             " of numbers."
         )
+    beginning = body[: MAX_HEADER_LINES + (text_format.skip_rows or 0)]
     if text_format.delimiter is None:
-        text_format = _with_blanks(text_format, body)
-    above = _lines_above_headings(body, text_format)
+        text_format = _with_blanks(text_format, beginning)
+    above = _lines_above_headings(beginning, text_format)
     if text_format.skip_rows is not None and body[-1][0] <= text_format.skip_rows:
         raise FileError(
             f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows."
