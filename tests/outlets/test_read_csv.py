@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import ColumnMapping, read_csv
-from airmuscle.errors import ColumnError, FileError, InputError, UnitError
+from airmuscle.errors import AirmuscleWarning, ColumnError, FileError, InputError, UnitError
 from airmuscle.recording import Recording
 
 PLAIN = (
@@ -498,10 +498,12 @@ def test_the_fast_parser_equals_the_parser_by_cell(bench):
         assert np.array_equal(careful[name], values[:, i])
 
 
-def test_a_given_unit_overrides_that_of_the_file_with_a_note(tmp_path):
+@pytest.mark.parametrize("text", ["pressure [bar],force [N]\n", "pressure,force\nbar,N\n"])
+def test_a_given_unit_overrides_that_of_the_file_with_a_warning(tmp_path, text):
     path = tmp_path / "bench.csv"
-    path.write_text("pressure [bar],force [N]\n30,1\n60,2\n", encoding="utf-8")
-    recording = read_csv(path, ColumnMapping(units={"pressure": "psig"}))
+    path.write_text(f"{text}30,1\n60,2\n", encoding="utf-8")
+    with pytest.warns(AirmuscleWarning, match=r"bench.csv: The pressure is read in psig, as spec"):
+        recording = read_csv(path, ColumnMapping(units={"pressure": "psig"}))
     assert recording["pressure"][0] == pytest.approx(30 * 6894.757293168361)
     assert (
         "The pressure is read in psig, as specified by the user; the file states bar."

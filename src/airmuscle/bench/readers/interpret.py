@@ -7,12 +7,22 @@ import contextlib
 import dataclasses
 import datetime
 import difflib
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError, Hint, HintedText, UnitError, listed, suggestion
+from ...core import (
+    AirmuscleWarning,
+    Array,
+    ColumnError,
+    Hint,
+    HintedText,
+    UnitError,
+    listed,
+    suggestion,
+)
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion
 from ...recording import columns as headed
 from ...recording.columns import (
@@ -24,7 +34,7 @@ from ...recording.columns import (
 from ...recording.recording import Recording
 from ...recording.vocabulary import read_heading
 from .column_names import ReadColumn, quantities_of_units, read_columns
-from .mapping import ColumnMapping
+from .mapping import ColumnMapping, contradicts
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
 from .tables import (
     MAX_QUOTED,
@@ -175,15 +185,25 @@ def _read_by_words(headings: Sequence[Heading]) -> list[str]:
 
 
 def _overridden_units(table: RawTable, headings: Sequence[Heading]) -> list[str]:
-    """A note on each unit of the file, in its unit row or its heading, that the user overrides."""
+    """A note on each unit of the file, in its unit row or its heading, that the user overrides, and
+    a warning of another unit than that of the file.
+    """
     notes = []
     unit_row = [*(table.units or ()), *[""] * len(headings)]
     for heading, below in zip(headings, unit_row, strict=False):
         unit = below or parse_heading(heading.text).unit
-        if unit and heading.unit and unit != heading.unit:
-            notes.append(
-                f"The {heading.name} is read in {heading.unit}, as specified by the user; the file"
-                f" states {unit}."
+        if not unit or not heading.unit or unit == heading.unit:
+            continue
+        note = (
+            f"The {heading.name} is read in {heading.unit}, as specified by the user; the file"
+            f" states {unit}."
+        )
+        notes.append(note)
+        if contradicts(unit, heading):
+            warnings.warn(
+                f"{table.origin}: {note} Omit the unit if that of the file is right.",
+                AirmuscleWarning,
+                stacklevel=2,
             )
     return notes
 

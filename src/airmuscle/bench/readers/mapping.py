@@ -457,7 +457,7 @@ def _warn_of_contradiction(table: RawTable, index: int, heading: str) -> None:
     row = table.units[index] if table.units else ""
     unit = row or written.unit or split_unit(table.headings[index])[1] or ""
     another = written.known and written.target != read_as.target
-    if not another and not _contradict(unit, read_as):
+    if not another and not contradicts(unit, read_as):
         return
     warnings.warn(
         f"{table.origin}: column {table.number(index)}, '{table.headings[index]}',"
@@ -468,9 +468,9 @@ def _warn_of_contradiction(table: RawTable, index: int, heading: str) -> None:
     )
 
 
-def _contradict(unit: str, read_as: Heading) -> bool:
-    """Whether a unit of a file is another one than that of the heading in the mapping, if that
-    states one.
+def contradicts(unit: str, read_as: Heading) -> bool:
+    """Whether a unit of a file is another one than that of the heading of a mapping or of the user,
+    if that states one.
     """
     target = read_as.target or "1"
     if unit not in _USUAL_UNITS:
