@@ -129,7 +129,7 @@ def test_a_misfit_below_ten_times_the_scatter_is_said_and_the_muscle_is_written(
     bench = laboratory(tmp_path, 50.0, noise=5.0)
     said = run("fit", bench, tmp_path / "out")
     assert "the law does not follow them" in said
-    assert "the misfit counts as scatter" in said
+    assert "the misfit is equal in every repeat and is not contained" in said
     assert "--accept-misfit" not in said
     assert "does not follow the data of its fit" in warned(tmp_path / "out" / "muscle.toml")
 

@@ -219,7 +219,7 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
     for i, j in itertools.combinations(range(len(blocks)), 2):
         apart = (limits[i][0] > limits[j][1]).any() or (limits[j][0] > limits[i][1]).any()
         if not apart and blocks[i].direction == blocks[j].direction:
-            pairs = _nearest(points[i], points[j], 1, 1.0)
+            pairs = _nearest_of_fewer(points[i], points[j])
             if len(pairs) >= MIN_MATCHES:
                 matched.append(MatchedRuns(blocks[i], blocks[j], pairs))
     return [*matched, *_spread(blocks)]
@@ -250,6 +250,16 @@ def _within(block: Block, points: Array, count: int, reach: float) -> MatchedRun
     """
     pairs = _nearest(points, points, count, reach)
     return MatchedRuns(block, block, pairs[pairs[:, 0] != pairs[:, 1]], bool(np.isfinite(reach)))
+
+
+def _nearest_of_fewer(first: Array, second: Array) -> npt.NDArray[np.intp]:
+    """Each of the fewer points, (N, 2) and (M, 2), with the nearest of the more; indices in both,
+    shape (K, 2). Which of them are the first has no effect."""
+    of_first = (len(first), *np.sum(first, axis=0).tolist())
+    of_second = (len(second), *np.sum(second, axis=0).tolist())
+    if of_first <= of_second:
+        return _nearest(first, second, 1, 1.0)
+    return _nearest(second, first, 1, 1.0)[:, ::-1]
 
 
 def _nearest(points: Array, others: Array, count: int, reach: float) -> npt.NDArray[np.intp]:

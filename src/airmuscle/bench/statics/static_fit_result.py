@@ -280,7 +280,7 @@ class Fit(Reported):
         tables = (estimates, Table("correlations", "Correlations", correlations, shown=False))
         plots = (Plot("errors", "Modelled against measured values, and residuals.", self.plot),)
         misfit = "" if self.misfit is None else str(self.misfit)
-        counted = "; the misfit counts as scatter, which is too wide for a repeat" if misfit else ""
+        counted = "; the misfit is equal in every repeat and is not contained" if misfit else ""
         return Chapter(
             "fit",
             self._title,
