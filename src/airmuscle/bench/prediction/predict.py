@@ -28,7 +28,7 @@ from ..estimation import NORMAL_QUANTILE
 from ..inspection import Mask, rate_of_change
 from ..statics import FORCE, FORCE_MARGIN, evaluate, find_lagging_rows, fitted_quantity_of
 from .force_along_motion import predicted_force
-from .result import QuantityPrediction, RecordPrediction, with_band_notes
+from .result import QuantityPrediction, RecordPrediction
 
 COLUMNS = ("pressure", "contraction", "force")
 """Columns that a static law relates."""
@@ -125,11 +125,15 @@ def predict_static(
     )
     driving = np.column_stack([recording[name] for name in COLUMNS if name != quantity.name])
     misfit = _record_misfit(recording, result)
-    prediction = RecordPrediction(
-        recording, (result,), (*remarks, *notes), outside, driving, misfit
-    )
-    return with_band_notes(
-        prediction, [*differences, *(["a faster motion"] if faster else [])], USUAL_OF_LAWS
+    return RecordPrediction(
+        recording,
+        (result,),
+        (*remarks, *notes),
+        outside,
+        driving,
+        misfit,
+        differences=(*differences, *(["a faster motion"] if faster else [])),
+        usual_causes=USUAL_OF_LAWS,
     )
 
 
@@ -378,9 +382,14 @@ def predict_dynamic(
     driving = dynamics.commands_at(
         plant, experiment.command, recording["time"] - experiment.start_time
     )
-    prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
-    return with_band_notes(
-        prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL_OF_PLANTS
+    return RecordPrediction(
+        recording,
+        tuple(quantities),
+        tuple(notes),
+        outside,
+        driving,
+        differences=(*other_air, *(["faster changes"] if faster else [])),
+        usual_causes=USUAL_OF_PLANTS,
     )
 
 

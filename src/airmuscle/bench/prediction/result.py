@@ -3,7 +3,7 @@ report chapters.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,7 +13,7 @@ from ...core import RED, Array, ShortRepr, cite, counted, legend_below
 from ...recording import Recording
 from ...recording.columns import display_scale, displayed
 from ...report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
-from ..diagnosis import LawMisfit
+from ..diagnosis import Diagnosis, DiagnosisRule, LawMisfit, Subject, apply_rules
 from ..dynamics import draw_residuals, residual_panels, running_extreme
 from ..inspection import CONTRACTION_BAND, Mask
 from ..reported import Reported, unit_column
@@ -84,7 +84,8 @@ class RecordPrediction(Reported):
 
     recording: Recording
     quantities: tuple[QuantityPrediction, ...]
-    notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    """What limits the comparison with the record."""
     outside: Mask | None = None
     """Mask (N,) of the rows outside the range of the fit; None where the range is not known."""
     inputs: Array | None = None
@@ -93,6 +94,21 @@ class RecordPrediction(Reported):
     """
     misfit: LawMisfit | None = None
     """That a static law does not follow the record, by the rule of a fit; None if it does."""
+    differences: tuple[str, ...] = ()
+    """What differs from the records of the fit, such as "another specimen": likely reasons of an
+    error."""
+    usual_causes: str = ""
+    """Usual causes of an error that nothing recorded explains, as a phrase."""
+
+    @property
+    def diagnoses(self) -> tuple[Diagnosis, ...]:
+        """The findings of the rules of predictions."""
+        return apply_rules(PREDICTION_RULES, self)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The remarks, and the bands that do not hold; the misfit is told before them."""
+        return (*self.remarks, *_bands_that_do_not_hold(self))
 
     @property
     def origin(self) -> str:
@@ -107,33 +123,52 @@ class RecordPrediction(Reported):
         return dataclasses.replace(of_rows, tables=(_error_table([self]), *of_rows.tables))
 
 
-def with_band_notes(
-    prediction: RecordPrediction, differences: Sequence[str], usual: str
-) -> RecordPrediction:
-    """The prediction with a note for each quantity whose band does not hold: by how much, and the
-    likely reason, which is what lies outside the fit, `differences`, or one of the usual causes."""
-    notes = []
-    for each in prediction.quantities:
-        if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
+def _misfit(prediction: RecordPrediction) -> list[str]:
+    """The misfit of a record with its causes, as a text; none without one."""
+    return [] if prediction.misfit is None else [str(prediction.misfit)]
+
+
+def _bands_that_do_not_hold(prediction: RecordPrediction) -> Iterator[str]:
+    """For each quantity whose band does not hold: by how much, and the likely reason, which is what
+    lies outside the fit, or one of the usual causes."""
+    for quantity in prediction.quantities:
+        compared = quantity.compared
+        if quantity.share is None or quantity.share >= MIN_SHARE or compared.sum() < MIN_ROWS:
             continue
-        mean = float(np.mean(each.errors[each.compared]))
-        known = [*differences]
-        if prediction.outside is not None and (each.compared & prediction.outside).any():
-            inside = each.share_of(each.compared & ~prediction.outside)
+        mean = float(np.mean(quantity.errors[compared]))
+        known = [*prediction.differences]
+        if prediction.outside is not None and (compared & prediction.outside).any():
+            inside = quantity.share_of(compared & ~prediction.outside)
             text = (
                 "" if inside is None else f" (inside it {100 * inside:.3g} % are within the band)"
             )
             known.insert(0, f"rows outside the range of the fit{text}")
-        reason = f"likely because of {', '.join(known)}"
-        reason = reason if known else f"nothing recorded explains it; usual are {usual}"
-        notes.append(
-            f"the 95 % band of the {each.name} does not hold for this record:"
-            f" {100 * each.share:.3g} % of the rows are within it, and the predicted {each.name} is"
-            f" {displayed(each.name, abs(mean))} too {'high' if mean > 0 else 'low'} on average;"
-            f" {reason}"
+        reason = f"nothing recorded explains it; usual are {prediction.usual_causes}"
+        if known:
+            reason = f"likely because of {', '.join(known)}"
+        yield (
+            f"the 95 % band of the {quantity.name} does not hold for this record:"
+            f" {100 * quantity.share:.3g} % of the rows are within it, and the predicted"
+            f" {quantity.name} is {displayed(quantity.name, abs(mean))} too"
+            f" {'high' if mean > 0 else 'low'} on average; {reason}"
         )
-    return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
 
+
+PREDICTION_RULES = (
+    DiagnosisRule(
+        "a law that does not follow the record",
+        Subject.PREDICTION,
+        _misfit,
+        "remove its cause, or fit the law to records of this kind",
+    ),
+    DiagnosisRule(
+        "a band that does not hold",
+        Subject.PREDICTION,
+        _bands_that_do_not_hold,
+        "measure what differs from the records of the fit",
+    ),
+)
+"""The rules of predictions, in the order in which they are told."""
 
 BASELINES = (
     "Skill: 1 - error/error of the better baseline. Persistence keeps the first value; the ARX"
@@ -236,11 +271,6 @@ def _notes(predictions: Sequence[RecordPrediction]) -> tuple[str, ...]:
     return tuple(
         f"{each.origin}: {note}" for each in predictions for note in (*_misfit(each), *each.notes)
     )
-
-
-def _misfit(prediction: RecordPrediction) -> list[str]:
-    """The misfit of a record with its causes, as a note; empty without one."""
-    return [] if prediction.misfit is None else [str(prediction.misfit)]
 
 
 def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
