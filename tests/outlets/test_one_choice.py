@@ -148,11 +148,15 @@ def test_the_law_that_is_used_covers_half_of_the_range_and_of_these_rests_on_mos
 
 
 def test_a_long_thin_muscle_is_not_first_for_a_short_stroke(sized):
-    """One that is twice as long as another choice with no more muscles, and no smaller in total."""
+    """By air alone a muscle of 25 times the stroke was first; twelve times is a contraction of 8 %,
+    a third of what the makers permit.
+    """
     result, _, _ = sized
     best = result.best
-    for other in result.choices[1:]:
-        assert not (best.length > 2.0 * other.length and other.total_count <= best.total_count)
+    if isinstance(best.requirement, JointRequirement):
+        pytest.skip("the travel of a joint is a result")
+    shortest = 3.0 * best.entry.ratings.diameter
+    assert best.length <= max(12.0 * best.requirement.travel, 1.001 * shortest)
 
 
 def test_the_makers_table_of_a_tenth_of_the_contraction_does_not_set_the_length():

@@ -58,6 +58,10 @@ _STYLE: Any = {
 }
 
 
+_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""Metadata by format, without the time of writing."""
+
+
 def new_figure(
     rows: int = 1, columns: int = 1, *, width: float = 6.3, height: float = 3.6, **subplots: Any
 ) -> Any:
@@ -129,7 +133,7 @@ def rendered(
                 figure.savefig(
                     buffer,
                     format=name,
-                    metadata={"Date": None} if name == "svg" else None,
+                    metadata=_UNDATED.get(name),
                     **options,
                 )
                 files[name] = buffer.getvalue()

@@ -87,6 +87,7 @@ from .sizing import discharge_valve as discharge_valve
 from .sizing import fill_valve as fill_valve
 from .sizing import scenario_text as scenario_text
 from .sizing import size_muscles as size_muscles
+from .sizing import sizing_sheet as sizing_sheet
 from .study import Study as Study
 from .study import StudyResult as StudyResult
 from .study import dask_cluster as dask_cluster

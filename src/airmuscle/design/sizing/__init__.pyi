@@ -31,6 +31,8 @@ from .scenario import scenario_text as scenario_text
 from .scenario import scenario_valves as scenario_valves
 from .scenario import sizing_scenario as sizing_scenario
 from .search import choose as choose
+from .sheet import sheet_page as sheet_page
+from .sheet import sizing_sheet as sizing_sheet
 from .static_muscle import EndPoint as EndPoint
 from .static_muscle import StaticMuscle as StaticMuscle
 from .working_range import working_muscle as working_muscle

@@ -114,7 +114,7 @@ def coverage_of(entry: Entry, conditions: SizingConditions) -> tuple[float, str]
     first, last = muscle.contraction_range
     extent = (
         f"valid from {low / 1e5:.3g} to {high / 1e5:.3g} bar and from {100 * first + 0.0:.3g} to"
-        f" {100 * last:.3g} %, {100 * pressures * contractions:.2g} % of the working range"
+        f" {100 * last:.3g} %, {100 * pressures * contractions:.0f} % of the working range"
     )
     return pressures * contractions, extent
 

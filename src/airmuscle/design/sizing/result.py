@@ -161,14 +161,21 @@ class SizingResult(Reported):
         best = self.best
         is_joint = isinstance(best.requirement, JointRequirement)
         side = " (half of them on each side)" if is_joint else ""
+        choice = f"The best choice is {best.size}{side}{best.by_law}. {self.reason()}"
+        return choice, self.reasons_for_the_law()
+
+    def reason(self) -> str:
+        """The criterion by which the best choice is first, and a warning where the laws of its
+        product contradict each other.
+        """
+        best = self.best
         criterion = CRITERIA.get(self.sort, f"the least value of {_name_of(self.sort)}")
-        area = "" if best.area is None else f" ({1e4 * best.area:.3g} cm2)"
-        choice = (
-            f"The best choice is {best.size}{side}{best.by_law}. Of all choices it has {criterion}"
-            f"{area if self.sort is by_area else ''}; its length is the shortest with which it"
+        is_area = self.sort is by_area and best.area is not None
+        area = f" ({1e4 * (best.area or 0.0):.3g} cm2)" if is_area else ""
+        return (
+            f"Of all choices it has {criterion}{area}; its length is the shortest with which it"
             f" reaches both end points.{self._disagreement()}"
         )
-        return choice, self._reasons_for_the_law()
 
     @property
     def _laws_of_the_best(self) -> list[LawOfProduct]:
@@ -191,7 +198,7 @@ class SizingResult(Reported):
             " in the length: measure a muscle at its end points before you order."
         )
 
-    def _reasons_for_the_law(self) -> str:
+    def reasons_for_the_law(self) -> str:
         """Which law of the product of the best choice is used and why, and what the others give;
         empty where there is one law.
         """

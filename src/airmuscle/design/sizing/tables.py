@@ -264,12 +264,12 @@ def _figure(choice: MuscleChoice) -> Any:
             linewidth=1.0,
             label="maximum contraction",
         )
-    _draw_motion(axes, choice)
+    draw_motion(axes, choice)
     plotting.legend_outside(axes)
     return figure
 
 
-def _draw_motion(axes: Any, choice: MuscleChoice) -> None:
+def draw_motion(axes: Any, choice: MuscleChoice) -> None:
     """Both working points, and of a lift the load of one muscle over the stroke, alone and with the
     safety factor.
     """

@@ -1,7 +1,11 @@
 """`airmuscle size`: muscles of the catalogue for a lift, a joint or a gripper."""
 
-from ...core import check_writable
-from ...design.sizing.scenario import sizing_scenario
+import functools
+from collections.abc import Callable
+from pathlib import Path
+
+from ...core import check_writable, plotting
+from ...design.sizing import sheet_page, sizing_scenario, sizing_sheet
 from ..requests.size import SizeRequest
 from .delivery import Execution, deliver
 from .options import Json, OptionalFolder
@@ -21,8 +25,8 @@ def size(
     For each muscle whose law and permitted values are known: the shortest length that reaches both
     ends of the motion within ratings, validity range and supply, alone and in parallel, with
     pressures, reserve and air of a cycle. With --out, DIR/report.html shows the force-contraction
-    chart and all choices, and DIR/scenario.toml is the best choice for `airmuscle simulate`, with
-    valves for the cycle time.
+    chart and all choices, DIR/sheet.pdf and sheet.html are the best choice on one page of A4, and
+    DIR/scenario.toml is it for `airmuscle simulate`, with valves for the cycle time.
 
     \b
     Examples:
@@ -41,5 +45,11 @@ def size(
     scenario = sizing_scenario(
         result.best, SCENARIO_FILE if out is not None else "scenario.toml of --out"
     )
-    files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
+    files: dict[str, str | Callable[[Path], object]] = {}
+    if out is not None:
+        figure = sizing_sheet(result)
+        files["sheet.html"] = sheet_page(figure, f"Sizing: {result.best.size}")
+        files["sheet.pdf"] = functools.partial(plotting.save, figure)
+    if scenario.text:
+        files[SCENARIO_FILE] = scenario.text
     deliver("size", [result.chapter(scenario)], json=json, out=out, title="Sizing", files=files)
