@@ -81,6 +81,11 @@ def test_the_names_of_the_states_in_the_drawing_do_not_overlap(drawn):
     names = [(text, box) for text, box in boxes if "bar" in text]
     assert len(names) == 2
     (_, a), (_, b) = names
+    drawing = figure.axes[0]
+    for patch in drawing.patches[1:]:
+        muscle = patch.get_window_extent(renderer)
+        inside = min(a.x1, muscle.x1) - max(a.x0, muscle.x0)
+        assert inside <= 1.0 or a.y0 >= muscle.y1 - 1.0 or a.y1 <= muscle.y0 + 1.0, patch
     assert a.x1 <= b.x0 + 1.0 or b.x1 <= a.x0 + 1.0
 
 

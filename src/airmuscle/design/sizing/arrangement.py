@@ -74,14 +74,22 @@ def _draw_muscle(axes: Any, choice: MuscleChoice, point: EndPoint, x: float, top
     edge = np.concatenate([x - radius, (x + radius)[::-1]])
     rows = np.concatenate([top - down, (top - down)[::-1]])
     outline = np.column_stack([edge, rows])
-    axes.add_patch(Polygon(outline, facecolor=MUSCLE, edgecolor=plotting.BLACK, linewidth=LINE))
+    axes.add_patch(
+        Polygon(outline, facecolor=MUSCLE, edgecolor=plotting.BLACK, linewidth=LINE),
+    )
     low = top - float(down.max())
     for bottom in (top, low - height):
         corner = (x - 0.5 * nominal, bottom)
         axes.add_patch(
             Rectangle(corner, nominal, height, facecolor=METAL, edgecolor="black", linewidth=LINE)
         )
-    axes.plot([x, x], [top + 1.6 * height, low - 1.6 * height], "-.", color="0.4", linewidth=THIN)
+    axes.plot(
+        [x, x],
+        [top + 1.6 * height, low - 1.6 * height],
+        "-.",
+        color="0.4",
+        linewidth=THIN,
+    )
     return low
 
 
@@ -93,57 +101,143 @@ def _nominal_diameter(choice: MuscleChoice) -> float:
     return choice.muscle.diameter(0.0) or 0.0
 
 
+class Place(NamedTuple):
+    """Place of the muscles in one state of a drawing [mm]: middle and width of all, distance
+    between two.
+    """
+
+    middle: float
+    width: float
+    pitch: float
+
+    @property
+    def left(self) -> float:
+        """The edge of the first muscle."""
+        return self.middle - 0.5 * self.width
+
+    @property
+    def right(self) -> float:
+        """The edge of the last muscle."""
+        return self.middle + 0.5 * self.width
+
+
 def _draw_pull(axes: Any, choice: MuscleChoice, scale: Scale) -> None:
     """The muscles at the start and at the end of their travel, side by side, with their load."""
-    fitting = FITTING * 1e3 * _nominal_diameter(choice)
     pitch = (1.0 + GAP) * scale.diameter
     width = pitch * (choice.count - 1) + scale.diameter
-    states = (choice.design.extended, choice.design.contracted)
-    middles = (0.0, width + max(5.0 * scale.unit + scale.diameter, 0.3 * scale.length))
-    lows = []
-    for point, middle, name in zip(states, middles, ("start", "end"), strict=True):
-        first = middle - 0.5 * pitch * (choice.count - 1)
-        low = 0.0
-        for k in range(choice.count):
-            low = _draw_muscle(axes, choice, point, first + k * pitch, 0.0)
-        _draw_wall(axes, Span(middle - 0.6 * width, middle + 0.6 * width), fitting, scale.unit)
-        _draw_load(axes, choice, Span(middle - 0.5 * width, middle + 0.5 * width), low - fitting)
-        lows.append(low)
-        axes.text(
-            middle,
-            fitting + 2.2 * scale.unit,
-            f"{name}: {point.pressure / 1e5:.3g} bar\n{point.force:.4g} N each",
-            ha="center",
-            va="bottom",
-            fontsize=FONT,
-        )
-    left = -0.6 * width - 2.0 * scale.unit
-    right = middles[1] + 0.6 * width + 2.0 * scale.unit
-    _vertical(axes, left, Span(lows[0], 0.0), f"{-lows[0]:.4g}", -1.0)
-    _vertical(axes, right, Span(lows[1], 0.0), f"{-lows[1]:.4g}")
-    between = 0.5 * (middles[0] + middles[1])
-    _vertical(axes, between, Span(lows[0], lows[1]), f"travel {lows[1] - lows[0]:.4g}")
-    half = 0.5 * scale.diameter
-    last = middles[1] + 0.5 * pitch * (choice.count - 1)
-    level = 0.45 * lows[1]
-    _horizontal(axes, level, Span(last - half, last + half), f"max. dia. {scale.diameter:.3g}")
+    distance = max(5.0 * scale.unit + scale.diameter, 0.3 * scale.length)
+    start = Place(0.0, width, pitch)
+    end = Place(width + distance, width, pitch)
+    start_low = _draw_state(axes, choice, choice.design.extended, start, scale)
+    end_low = _draw_state(axes, choice, choice.design.contracted, end, scale)
+    height = _fitting(choice) + 2.2 * scale.unit
+    axes.text(
+        start.middle,
+        height,
+        _each_text("start", choice.design.extended),
+        **_LABEL,
+    )
+    axes.text(
+        end.middle,
+        height,
+        _each_text("end", choice.design.contracted),
+        **_LABEL,
+    )
+    beyond = 2.0 * scale.unit + 0.1 * width
+    _vertical(
+        axes,
+        start.left - beyond,
+        Span(start_low, 0.0),
+        f"{-start_low:.4g}",
+        -1.0,
+    )
+    _vertical(
+        axes,
+        end.right + beyond,
+        Span(end_low, 0.0),
+        f"{-end_low:.4g}",
+    )
+    travel = f"travel {end_low - start_low:.4g}"
+    _vertical(
+        axes,
+        0.5 * (start.middle + end.middle),
+        Span(start_low, end_low),
+        travel,
+    )
+    across = Span(end.right - scale.diameter, end.right)
+    _horizontal(
+        axes,
+        0.45 * end_low,
+        across,
+        f"max. dia. {scale.diameter:.3g}",
+    )
+
+
+def _fitting(choice: MuscleChoice) -> float:
+    """Length of an end fitting in the drawing [mm]."""
+    return FITTING * 1e3 * _nominal_diameter(choice)
+
+
+def _each_text(name: str, point: EndPoint) -> str:
+    return f"{name}: {point.pressure / 1e5:.3g} bar\n{point.force:.4g} N each"
+
+
+def _draw_state(
+    axes: Any, choice: MuscleChoice, point: EndPoint, place: Place, scale: Scale
+) -> float:
+    """All muscles at one end point; return the height of their lower ends [mm]."""
+    low = 0.0
+    for k in range(choice.count):
+        x = place.left + 0.5 * scale.diameter + k * place.pitch
+        low = _draw_muscle(axes, choice, point, x, 0.0)
+    margin = 0.1 * place.width
+    wall = Span(place.left - margin, place.right + margin)
+    _draw_wall(axes, wall, _fitting(choice), scale.unit)
+    _draw_load(axes, choice, Span(place.left, place.right), low - _fitting(choice))
+    return low
 
 
 def _draw_wall(axes: Any, span: Span, height: float, unit: float) -> None:
     """A fixed wall above the muscles, hatched."""
-    axes.plot([span.low, span.high], [height, height], color="black", linewidth=1.4)
+    axes.plot(
+        [span.low, span.high],
+        [height, height],
+        color="black",
+        linewidth=1.4,
+    )
     for x in np.linspace(span.low, span.high - unit, 9):
-        axes.plot([x, x + unit], [height, height + unit], color="black", linewidth=THIN)
+        axes.plot(
+            [x, x + unit],
+            [height, height + unit],
+            color="black",
+            linewidth=THIN,
+        )
 
 
 def _draw_load(axes: Any, choice: MuscleChoice, span: Span, top: float) -> None:
     """A crossbar below the muscles and what it carries, in words."""
-    axes.plot([span.low, span.high], [top, top], color="black", linewidth=2.4)
+    axes.plot(
+        [span.low, span.high],
+        [top, top],
+        color="black",
+        linewidth=2.4,
+    )
     text = _load_text(choice)
     depth = top - 0.10 * choice.length * 1e3
     middle = 0.5 * (span.low + span.high)
-    axes.plot([middle, middle], [top, depth], color=plotting.RED, linewidth=1.2)
-    axes.plot([middle], [depth], marker="v", markersize=4, color=plotting.RED)
+    axes.plot(
+        [middle, middle],
+        [top, depth],
+        color=plotting.RED,
+        linewidth=1.2,
+    )
+    axes.plot(
+        [middle],
+        [depth],
+        marker="v",
+        markersize=4,
+        color=plotting.RED,
+    )
     axes.annotate(
         text,
         (middle, depth),
@@ -195,82 +289,245 @@ def _draw_lever(axes: Any, choice: MuscleChoice, lift: LiftRequirement) -> None:
     longest = max(lift.lever, 1.0)
     at_muscle = 1.0 / longest
     at_load = lift.lever / longest
-    axes.plot([0.0, 1.0], [0.0, 0.0], color="black", linewidth=2.4)
-    axes.plot([0.0], [-0.05], marker="^", markersize=8, color=METAL, markeredgecolor="black")
-    _force(axes, (at_muscle, 0.04), (at_muscle, 0.36), plotting.BLUE)
-    _force(axes, (at_load, -0.04), (at_load, -0.30), plotting.RED)
-    axes.text(at_muscle, 0.38, _pull_text(choice, lift.travel), ha="center", fontsize=FONT)
-    load = f"load: {lift.load(lift.travel) / lift.lever:.4g} N, {1e3 * lift.stroke:.4g} mm"
-    axes.text(at_load, -0.34, load, ha="right", va="top", fontsize=FONT)
-    axes.text(0.0, -0.16, f"arms 1 : {lift.lever:.3g}", ha="center", va="top", fontsize=FONT)
+    axes.plot(
+        [0.0, 1.0],
+        [0.0, 0.0],
+        color="black",
+        linewidth=2.4,
+    )
+    axes.plot(
+        [0.0],
+        [-0.05],
+        marker="^",
+        markersize=8,
+        color=METAL,
+    )
+    _force(
+        axes,
+        (at_muscle, 0.04),
+        (at_muscle, 0.36),
+        plotting.BLUE,
+    )
+    _force(
+        axes,
+        (at_load, -0.04),
+        (at_load, -0.30),
+        plotting.RED,
+    )
+    force = lift.load(lift.travel) / lift.lever
+    load = f"load: {force:.4g} N, {1e3 * lift.stroke:.4g} mm"
+    arms = f"arms 1 : {lift.lever:.3g}"
+    _write(
+        axes,
+        at_muscle,
+        0.38,
+        _pull_text(choice, lift.travel),
+        "bottom",
+    )
+    _write(
+        axes,
+        at_load - 0.2,
+        -0.34,
+        load,
+        "top",
+    )
+    _write(
+        axes,
+        0.0,
+        -0.16,
+        arms,
+        "top",
+    )
 
 
 def _draw_fingers(axes: Any, choice: MuscleChoice, gripper: GripperRequirement) -> None:
     """Two fingers that the muscles close on an object against a spring."""
     from matplotlib.patches import Circle
 
-    axes.add_patch(Circle((0.95, 0.0), 0.12, facecolor=MUSCLE, edgecolor="black"))
-    for side in (-1.0, 1.0):
-        axes.plot([0.3, 0.55, 1.1], [0.0, 0.3 * side, 0.14 * side], color="black", linewidth=2.4)
-        axes.plot([0.55], [0.3 * side], marker="o", markersize=4, color=METAL)
-        _force(axes, (0.95, 0.42 * side), (0.95, 0.20 * side), plotting.RED)
-    zigzag = np.linspace(-0.22, 0.22, 9)
-    axes.plot(0.43 + 0.02 * (-1.0) ** np.arange(9), zigzag, color="black", linewidth=LINE)
-    _force(axes, (0.28, 0.0), (0.02, 0.0), plotting.BLUE)
-    axes.text(
-        -0.02, 0.0, _pull_text(choice, gripper.travel), ha="right", va="center", fontsize=FONT
+    axes.add_patch(
+        Circle((0.95, 0.0), 0.12, facecolor=MUSCLE, edgecolor="black"),
+    )
+    _draw_finger(axes, 1.0)
+    _draw_finger(axes, -1.0)
+    turns = np.linspace(-0.22, 0.22, 9)
+    sides = 0.43 + 0.02 * (-1.0) ** np.arange(turns.size)
+    axes.plot(
+        sides,
+        turns,
+        color="black",
+        linewidth=LINE,
+    )
+    _force(
+        axes,
+        (0.28, 0.0),
+        (0.02, 0.0),
+        plotting.BLUE,
     )
     grip = f"each finger: {gripper.grip:.4g} N, {1e3 * gripper.opening:.4g} mm"
-    axes.text(0.95, -0.46, grip, ha="center", va="top", fontsize=FONT)
+    _write(
+        axes,
+        -0.2,
+        0.05,
+        _pull_text(choice, gripper.travel),
+        "bottom",
+    )
+    _write(
+        axes,
+        0.95,
+        -0.46,
+        grip,
+        "top",
+    )
+
+
+def _draw_finger(axes: Any, side: float) -> None:
+    """The finger above, side 1, or below the object, with its force."""
+    hinge = 0.3 * side
+    axes.plot(
+        [0.3, 0.55, 1.1],
+        [0.0, hinge, 0.14 * side],
+        color="black",
+        linewidth=2.4,
+    )
+    axes.plot(
+        [0.55],
+        [hinge],
+        marker="o",
+        markersize=4,
+        color=METAL,
+    )
+    _force(
+        axes,
+        (0.95, 0.42 * side),
+        (0.95, 0.20 * side),
+        plotting.RED,
+    )
+
+
+def _write(axes: Any, x: float, y: float, text: str, anchor: str) -> None:
+    """A text whose middle is at x."""
+    axes.text(
+        x,
+        y,
+        text,
+        ha="center",
+        va=anchor,
+        fontsize=FONT,
+    )
 
 
 def _force(axes: Any, tail: tuple[float, float], head: tuple[float, float], colour: str) -> None:
     """An arrow of a force."""
     style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.3}
-    axes.annotate("", head, tail, arrowprops=style)
+    axes.annotate(
+        "",
+        head,
+        tail,
+        arrowprops=style,
+    )
 
 
 def _draw_joint(axes: Any, choice: MuscleChoice, scale: Scale, radius: float) -> None:
     """The pair of a joint below its pulley: one muscle contracted, the other extended."""
     from matplotlib.patches import Circle, Rectangle
 
-    fitting = FITTING * 1e3 * _nominal_diameter(choice)
-    axis = radius + 2.0 * fitting
-    axes.add_patch(Circle((0.0, axis), radius, facecolor="white", edgecolor="black", linewidth=1.2))
-    axes.add_patch(Circle((0.0, axis), 0.08 * radius, facecolor="black"))
-    used = choice.length * 1e3
-    states = (choice.design.contracted, choice.design.extended)
-    middle = 0.5 * (states[0].contraction + states[1].contraction)
-    base = -used * (1.0 - states[1].contraction) - fitting
-    for x, point, name in zip((-radius, radius), states, ("contracted", "extended"), strict=True):
-        top = base + fitting + used * (1.0 - point.contraction)
-        axes.plot([x, x], [top + fitting, axis], color="black", linewidth=1.0)
-        low = _draw_muscle(axes, choice, point, x, top)
-        side = -1.0 if x < 0.0 else 1.0
-        place = x + side * (0.5 * scale.diameter + 3.0 * scale.unit)
-        _vertical(axes, place, Span(low, top), f"{top - low:.4g}", side)
-        axes.text(
-            side * 0.1 * radius,
-            base - 1.6 * scale.unit,
-            f"{name}:\n{point.pressure / 1e5:.3g} bar, {point.force:.4g} N",
-            ha="right" if side < 0.0 else "left",
-            va="top",
-            fontsize=FONT,
-        )
+    axis = radius + 2.0 * _fitting(choice)
+    rim = Circle((0.0, axis), radius, facecolor="white", edgecolor="black", linewidth=1.2)
+    axes.add_patch(
+        rim,
+    )
+    axes.add_patch(
+        Circle((0.0, axis), 0.08 * radius, facecolor="black"),
+    )
+    length = 1e3 * choice.length * (1.0 - choice.design.extended.contraction)
+    base = -length - _fitting(choice)
+    contracted = _draw_side(axes, choice, choice.design.contracted, Side(-radius, base, axis))
+    extended = _draw_side(axes, choice, choice.design.extended, Side(radius, base, axis))
+    beyond = radius + 0.5 * scale.diameter + 3.0 * scale.unit
+    low = base + _fitting(choice)
+    _vertical(
+        axes,
+        -beyond,
+        Span(low, contracted),
+        f"{contracted - low:.4g}",
+        -1.0,
+    )
+    _vertical(
+        axes,
+        beyond,
+        Span(low, extended),
+        f"{extended - low:.4g}",
+    )
     wide = radius + scale.diameter
     corner = (-wide, base - scale.unit)
-    axes.add_patch(Rectangle(corner, 2.0 * wide, scale.unit, facecolor=METAL, edgecolor="black"))
-    level = axis + radius + 2.0 * scale.unit
-    _horizontal(axes, level, Span(-radius, radius), f"pulley dia. {2.0 * radius:.4g}")
-    half = 0.5 * scale.diameter
+    axes.add_patch(
+        Rectangle(corner, 2.0 * wide, scale.unit, facecolor=METAL, edgecolor="black"),
+    )
+    pulley = Span(-radius, radius)
     _horizontal(
         axes,
-        base + fitting + 0.5 * used * (1.0 - middle),
-        Span(-radius - half, -radius + half),
+        axis + radius + 2.0 * scale.unit,
+        pulley,
+        f"pulley dia. {2 * radius:.4g}",
+    )
+    half = 0.5 * scale.diameter
+    across = Span(-radius - half, -radius + half)
+    middle = 0.5 * (low + contracted)
+    _horizontal(
+        axes,
+        middle,
+        across,
         f"max. dia. {scale.diameter:.3g}",
     )
+    foot = base - 1.6 * scale.unit
+    axes.text(
+        -0.1 * radius,
+        foot,
+        _state_text("contracted", choice.design.contracted),
+        **_LEFT,
+    )
+    axes.text(
+        0.1 * radius,
+        foot,
+        _state_text("extended", choice.design.extended),
+        **_RIGHT,
+    )
     if choice.count > 1:
-        axes.text(0.0, axis, f"\n{choice.count} pairs on the axis", ha="center", fontsize=FONT)
+        _write(
+            axes,
+            0.0,
+            axis - 0.15 * radius,
+            f"{choice.count} pairs",
+            "top",
+        )
+
+
+class Side(NamedTuple):
+    """Place of one muscle of a pair [mm]: its axis, the height of the base and of the axis of the
+    pulley.
+    """
+
+    x: float
+    base: float
+    axis: float
+
+
+def _draw_side(axes: Any, choice: MuscleChoice, point: EndPoint, side: Side) -> float:
+    """One muscle of a pair with its rope to the pulley; return the height of its upper end [mm]."""
+    fitting = _fitting(choice)
+    top = side.base + fitting + 1e3 * choice.length * (1.0 - point.contraction)
+    axes.plot(
+        [side.x, side.x],
+        [top + fitting, side.axis],
+        color="black",
+        linewidth=1.0,
+    )
+    _draw_muscle(axes, choice, point, side.x, top)
+    return top
+
+
+def _state_text(name: str, point: EndPoint) -> str:
+    return f"{name}:\n{point.pressure / 1e5:.3g} bar, {point.force:.4g} N"
 
 
 def _vertical(axes: Any, x: float, span: Span, text: str, side: float = 1.0) -> None:
@@ -304,8 +561,21 @@ def _horizontal(axes: Any, y: float, span: Span, text: str) -> None:
 
 def _arrow(axes: Any, first: tuple[float, float], last: tuple[float, float]) -> None:
     """A line with heads at both ends; the axes include it."""
-    axes.plot(*zip(first, last, strict=True), color="black", linewidth=THIN)
-    axes.annotate("", first, last, arrowprops=_ARROW, annotation_clip=False)
+    axes.plot(
+        *zip(first, last, strict=True),
+        color="black",
+        linewidth=THIN,
+    )
+    axes.annotate(
+        "",
+        first,
+        last,
+        arrowprops=_ARROW,
+        annotation_clip=False,
+    )
 
 
+_LABEL = {"ha": "center", "va": "bottom", "fontsize": FONT}
+_LEFT = {"ha": "right", "va": "top", "fontsize": FONT}
+_RIGHT = {"ha": "left", "va": "top", "fontsize": FONT}
 _ARROW = {"arrowstyle": "<->", "linewidth": THIN, "color": "black", "shrinkA": 0, "shrinkB": 0}

@@ -149,10 +149,13 @@ class LiftRequirement(PullRequirement):
     def describe(self) -> str:
         first = self.load(0.0) / self.lever
         last = self.load(self.travel) / self.lever
-        load = f"{first:.4g} N" if math.isclose(first, last) else f"{first:.4g} to {last:.4g} N"
-        load = f"{self.mass:.4g} kg ({load})" if self.mass else load
-        lever = "" if self.lever == 1.0 else f" by a lever of {self.lever:.4g}"
-        return f"{load} over {1e3 * self.stroke:.4g} mm{lever}"
+        load = f"{first:.4g} to {last:.4g} N"
+        if math.isclose(first, last):
+            load = f"{first:.4g} N"
+        if self.mass:
+            load = f"{self.mass:.4g} kg ({load})"
+        motion = f"{load} over {1e3 * self.stroke:.4g} mm"
+        return motion if self.lever == 1.0 else f"{motion} by a lever of {self.lever:.4g}"
 
 
 OPENING_SHARE = 0.1

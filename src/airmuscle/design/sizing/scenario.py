@@ -273,10 +273,12 @@ def _muscles(
 
 def _stiffness(choice: MuscleChoice, muscle: Muscle) -> float:
     """Stiffness [N/m] of one muscle at constant pressure in the middle between its end points."""
-    first, last = (choice.design.extended, choice.design.contracted)
+    first = choice.design.extended
+    last = choice.design.contracted
     pressure = 0.5 * (first.pressure + last.pressure)
     contraction = 0.5 * (first.contraction + last.contraction)
-    return max(float(muscle.stiffness(pressure, contraction)), 0.0) / choice.length
+    stiffness = float(muscle.stiffness(pressure, contraction))
+    return max(stiffness, 0.0) / choice.length
 
 
 def _load(choice: MuscleChoice, requirement: PullRequirement) -> tuple[Mechanism, float]:

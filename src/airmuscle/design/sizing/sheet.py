@@ -40,7 +40,7 @@ class Box(NamedTuple):
     height: float
 
 
-class Entry(NamedTuple):
+class SheetRow(NamedTuple):
     """A quantity with its value, as texts."""
 
     name: str
@@ -66,7 +66,7 @@ def sizing_sheet(result: SizingResult) -> Any:
         _draw_chart(_axes(figure, Box(27.0, 160.0, 80.0, 58.0)), choice)
         right = Box(115.0, 44.0, 80.0, 200.0)
         top = right.top
-        for title, entries in _sections(choice):
+        for title, entries in _sections(choice).items():
             top = _write_rows(figure, right._replace(top=top), title, entries)
         if has_schematic(choice):
             draw_schematic(_axes(figure, right._replace(top=top, height=225.0 - top)), choice)
@@ -118,92 +118,149 @@ def _rule(figure: Any, box: Box) -> None:
 def _write_head(figure: Any, result: SizingResult) -> None:
     choice = result.best
     is_joint = isinstance(choice.requirement, JointRequirement)
-    side = ", half of them on each side" if is_joint else ""
-    _write(figure, MARGIN, 13.0, f"{choice.size}{side}", fontsize=15, fontweight="bold")
-    need = f"{result.requirement.describe()}, supply {choice.conditions.supply / 1e5:.4g} bar"
-    _write(figure, MARGIN, 22.0, f"For {need}", fontsize=10)
+    title = f"{choice.size}, half of them on each side" if is_joint else choice.size
+    supply = f"supply {choice.conditions.supply / 1e5:.4g} bar"
     sentence = textwrap.fill(result.reason(), CHARACTERS)
-    _write(figure, MARGIN, 29.0, sentence, fontsize=TEXT, linespacing=1.4)
-    _rule(figure, Box(MARGIN, 41.5, PAGE[0] - 2 * MARGIN, 0.0))
-    _write(figure, MARGIN, 44.0, "Dimensions in mm, to scale", fontsize=TEXT, color="0.35")
+    _write(
+        figure,
+        MARGIN,
+        13.0,
+        title,
+        fontsize=15,
+        fontweight="bold",
+    )
+    _write(
+        figure,
+        MARGIN,
+        22.0,
+        f"For {result.requirement.describe()}, {supply}",
+        fontsize=10,
+    )
+    _write(
+        figure,
+        MARGIN,
+        29.0,
+        sentence,
+        fontsize=TEXT,
+        linespacing=1.4,
+    )
+    _rule(
+        figure,
+        Box(MARGIN, 41.5, PAGE[0] - 2 * MARGIN, 0.0),
+    )
+    _write(
+        figure,
+        MARGIN,
+        44.0,
+        "Dimensions in mm, to scale",
+        fontsize=TEXT,
+        color="0.35",
+    )
 
 
-def _write_rows(figure: Any, box: Box, title: str, entries: Sequence[Entry]) -> float:
+def _write_rows(figure: Any, box: Box, title: str, entries: Sequence[SheetRow]) -> float:
     """A titled block of quantities; return the height [mm] below it."""
-    _write(figure, box.left, box.top, title, fontsize=8.5, fontweight="bold")
+    _write(
+        figure,
+        box.left,
+        box.top,
+        title,
+        fontsize=8.5,
+        fontweight="bold",
+    )
     top = box.top + 4.8
     for entry in entries:
         lines = textwrap.wrap(entry.value, VALUE_CHARACTERS) or [""]
-        _write(figure, box.left, top, entry.name, fontsize=TEXT, color="0.35")
+        _write(
+            figure,
+            box.left,
+            top,
+            entry.name,
+            fontsize=TEXT,
+            color="0.35",
+        )
         for line in lines:
             right = (box.left + box.width) / PAGE[0]
             figure.text(right, 1.0 - top / PAGE[1], line, va="top", ha="right", fontsize=TEXT)
             top += LINE_HEIGHT - 0.3
         top += 0.3
-    _rule(figure, box._replace(top=top + 0.4))
+    _rule(
+        figure,
+        box._replace(top=top + 0.4),
+    )
     return top + 2.2
 
 
-def _sections(choice: MuscleChoice) -> Iterator[tuple[str, list[Entry]]]:
-    yield "Choice", list(_choice_entries(choice))
-    yield "Working points of one muscle", list(_point_entries(choice))
-    yield "Cycle and air of all muscles", list(_air_entries(choice))
-    yield "Valves and regulator, for each muscle", list(_valve_entries(choice))
-    yield "Permitted by the maker", list(_rating_entries(choice))
+def _sections(choice: MuscleChoice) -> dict[str, list[SheetRow]]:
+    """The rows of the column of quantities, by their titles."""
+    return {
+        "Choice": list(_choice_entries(choice)),
+        "Working points of one muscle": list(_point_entries(choice)),
+        "Cycle and air of all muscles": list(_air_entries(choice)),
+        "Valves and regulator, for each muscle": list(_valve_entries(choice)),
+        "Permitted by the maker": list(_rating_entries(choice)),
+    }
 
 
-def _choice_entries(choice: MuscleChoice) -> Iterator[Entry]:
-    yield Entry("product", choice.product)
-    yield Entry("number", str(choice.total_count))
-    yield Entry("nominal length", f"{1e3 * choice.length:.4g} mm")
+def _choice_entries(choice: MuscleChoice) -> Iterator[SheetRow]:
+    yield SheetRow("product", choice.product)
+    yield SheetRow("number", str(choice.total_count))
+    yield SheetRow("nominal length", f"{1e3 * choice.length:.4g} mm")
     if choice.design.radius is not None:
-        yield Entry("pulley radius", f"{1e3 * choice.design.radius:.4g} mm")
+        yield SheetRow("pulley radius", f"{1e3 * choice.design.radius:.4g} mm")
     at_rest = choice.muscle.diameter(0.0)
     if at_rest is not None and choice.diameter is not None:
         ends = f"{1e3 * at_rest:.3g} mm, {1e3 * choice.diameter:.3g} mm"
-        yield Entry("outer diameter at rest, contracted", ends)
+        yield SheetRow("outer diameter at rest, contracted", ends)
     if choice.area is not None:
-        yield Entry("mounting area", f"{1e4 * choice.area:.3g} cm2")
-    yield Entry("order code, price", UNKNOWN)
-    yield Entry("life", UNKNOWN)
+        yield SheetRow("mounting area", f"{1e4 * choice.area:.3g} cm2")
+    yield SheetRow("order code, price", UNKNOWN)
+    yield SheetRow("life", UNKNOWN)
 
 
-def _point_entries(choice: MuscleChoice) -> Iterator[Entry]:
+def _point_entries(choice: MuscleChoice) -> Iterator[SheetRow]:
     first = choice.design.extended
     last = choice.design.contracted
-    yield Entry("pressure", f"{first.pressure / 1e5:.3g} to {last.pressure / 1e5:.3g} bar")
-    contraction = f"{100 * first.contraction + 0.0:.3g} to {100 * last.contraction:.3g} %"
-    yield Entry("contraction", contraction)
-    forces = " to ".join(dict.fromkeys(f"{point.force:.4g}" for point in (first, last)))
-    yield Entry("force", f"{forces} N")
-    yield Entry("force reserve at least", f"{100 * choice.design.reserve:.3g} %")
-    yield Entry("safety factor that was asked", f"{choice.conditions.safety_factor:.3g}")
+    reserve = 100 * choice.design.reserve
+    factor = choice.conditions.safety_factor
+    yield SheetRow("pressure", _range(first.pressure / 1e5, last.pressure / 1e5, "bar"))
+    yield SheetRow("contraction", _range(100 * first.contraction, 100 * last.contraction, "%"))
+    yield SheetRow("force", _range(first.force, last.force, "N"))
+    yield SheetRow("force reserve at least", f"{reserve:.3g} %")
+    yield SheetRow("safety factor that was asked", f"{factor:.3g}")
 
 
-def _air_entries(choice: MuscleChoice) -> Iterator[Entry]:
+def _range(first: float, last: float, unit: str) -> str:
+    """Both ends of a range as text, or one number where they are shown alike."""
+    low = f"{first + 0.0:.4g}"
+    high = f"{last + 0.0:.4g}"
+    return f"{low} {unit}" if low == high else f"{low} to {high} {unit}"
+
+
+def _air_entries(choice: MuscleChoice) -> Iterator[SheetRow]:
     cycle = choice.conditions.cycle_time
-    yield Entry("cycle, there and back", f"{cycle:.3g} s, {MOVING * cycle:.3g} s each way")
+    yield SheetRow("cycle, there and back", f"{cycle:.3g} s, {MOVING * cycle:.3g} s each way")
     volume = choice.reference_volume
     if volume is None or choice.efficiency is None or choice.air_energy is None:
-        yield Entry("air", "not known: the law has no geometry")
+        yield SheetRow("air", "not known: the law has no geometry")
         return
-    yield Entry("air a cycle", f"{1e3 * volume:.3g} l (ANR)")
-    yield Entry("air a minute", f"{6e4 * volume / cycle:.3g} l (ANR)")
-    yield Entry(
+    yield SheetRow("air a cycle", f"{1e3 * volume:.3g} l (ANR)")
+    yield SheetRow("air a minute", f"{6e4 * volume / cycle:.3g} l (ANR)")
+    yield SheetRow(
         "energy of the air, efficiency",
         f"{choice.air_energy:.3g} J, {100 * choice.efficiency:.2g} %",
     )
-    yield Entry("volume from", choice.geometry_source)
+    yield SheetRow("volume from", choice.geometry_source)
 
 
-def _valve_entries(choice: MuscleChoice) -> Iterator[Entry]:
+def _valve_entries(choice: MuscleChoice) -> Iterator[SheetRow]:
     try:
         fill, discharge = scenario_valves(choice)
     except AirmuscleError:
-        yield Entry("valves", "not known: the volume or the flow is")
+        yield SheetRow("valves", "not known: the volume or the flow is")
         return
     conductances = f"{1e8 * fill.conductance:.3g}, {1e8 * discharge.conductance:.3g} dm3/(s bar)"
-    yield Entry("conductance C, in and out", conductances)
+    yield SheetRow("conductance C, in and out", conductances)
     table = valve_table(choice)
     reaching = [
         name
@@ -213,15 +270,15 @@ def _valve_entries(choice: MuscleChoice) -> Iterator[Entry]:
         )
         if suffices and not warning
     ]
-    yield Entry(
+    yield SheetRow(
         "smallest valve of the library", reaching[0] if reaching else "none reaches the cycle time"
     )
     last = choice.design.contracted.pressure / 1e5
     first = choice.design.extended.pressure / 1e5
-    yield Entry("regulator", f"{first:.3g} to {last:.3g} bar, with this flow")
+    yield SheetRow("regulator", f"{first:.3g} to {last:.3g} bar, with this flow")
 
 
-def _rating_entries(choice: MuscleChoice) -> Iterator[Entry]:
+def _rating_entries(choice: MuscleChoice) -> Iterator[SheetRow]:
     ratings = choice.entry.ratings
     ranges = {} if ratings is None else {row.quantity: str(row) for row in ratings.ranges()}
     names = {
@@ -232,7 +289,7 @@ def _rating_entries(choice: MuscleChoice) -> Iterator[Entry]:
         "temperature": "temperature",
     }
     for quantity, name in names.items():
-        yield Entry(name, ranges.get(quantity, UNKNOWN))
+        yield SheetRow(name, ranges.get(quantity, UNKNOWN))
 
 
 def _draw_chart(axes: Any, choice: MuscleChoice) -> None:
@@ -242,22 +299,49 @@ def _draw_chart(axes: Any, choice: MuscleChoice) -> None:
     curves = compute_isobars(entry.characteristic, valid)
     muscle = choice.muscle
     for forces in curves.forces:
-        axes.plot(100 * curves.contractions, forces, color="0.75", linewidth=0.7)
+        axes.plot(
+            100 * curves.contractions,
+            forces,
+            color="0.75",
+            linewidth=0.7,
+        )
     contraction = np.linspace(*muscle.contraction_range, 121)
     capacity = muscle.capacity(contraction)
     label = f"capacity, {muscle.pressure_range[1] / 1e5:.3g} bar"
-    axes.plot(100 * contraction, capacity, color="black", linewidth=1.6, label=label)
+    axes.plot(
+        100 * contraction,
+        capacity,
+        color="black",
+        linewidth=1.6,
+        label=label,
+    )
     draw_motion(axes, choice)
     need = choice.conditions.safety_factor * max(
         point.force for point in (choice.design.extended, choice.design.contracted)
     )
-    axes.set_ylim(0.0, min(1.05 * float(capacity.max()), 4.0 * need))
-    axes.set_xlim(100 * muscle.contraction_range[0], 100 * muscle.contraction_range[1])
-    axes.set_xlabel("contraction [%]", fontsize=TEXT)
-    axes.set_ylabel("force of one muscle [N]", fontsize=TEXT)
+    axes.set_ylim(
+        0.0,
+        min(1.05 * float(capacity.max()), 4.0 * need),
+    )
+    axes.set_xlim(
+        100 * muscle.contraction_range[0],
+        100 * muscle.contraction_range[1],
+    )
+    axes.set_xlabel(
+        "contraction [%]",
+        fontsize=TEXT,
+    )
+    axes.set_ylabel(
+        "force of one muscle [N]",
+        fontsize=TEXT,
+    )
     axes.tick_params(labelsize=TEXT - 0.5)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=6.5, frameon=False, loc="upper right")
+    axes.legend(
+        fontsize=6.5,
+        frameon=False,
+        loc="upper right",
+    )
 
 
 def _write_notes(figure: Any, box: Box, result: SizingResult) -> None:
@@ -275,12 +359,29 @@ def _write_notes(figure: Any, box: Box, result: SizingResult) -> None:
     if not sources:
         texts.pop()
     top = box.top
-    _rule(figure, box)
+    _rule(
+        figure,
+        box,
+    )
     for text in texts:
         lines = textwrap.wrap(text, CHARACTERS)
-        _write(figure, box.left, top + 2.0, "\n".join(lines), fontsize=7.0, linespacing=1.35)
+        _write(
+            figure,
+            box.left,
+            top + 2.0,
+            "\n".join(lines),
+            fontsize=7.0,
+            linespacing=1.35,
+        )
         top += 3.5 * len(lines) + 1.5
-    _write(figure, MARGIN, 287.0, f"airmuscle size: {choice.size}", fontsize=6.5, color="0.35")
+    _write(
+        figure,
+        MARGIN,
+        287.0,
+        f"airmuscle size: {choice.size}",
+        fontsize=6.5,
+        color="0.35",
+    )
 
 
 def _source(reference: Reference) -> str:

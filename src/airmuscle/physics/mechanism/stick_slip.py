@@ -171,14 +171,16 @@ class GaussianResidual:
         pressures in q.
         """
         joints = len(angles)
+        count = len(self.energies)
         torques: list[Value] = [0.0] * joints
         logs: list[Value] = [0.0] * joints
-        for k, (energy, (level, away)) in enumerate(
-            zip(self.energies, self._levels(angles, q), strict=True)
-        ):
-            for j, scale in enumerate(self.angle_scales):
-                torques[j] = torques[j] + energy * level * away[j] / (self._size * scale)
-                logs[j] = logs[j] + self.friction_logs[j * len(self.energies) + k] * level
+        levels = self._levels(angles, q)
+        for k in range(count):
+            level, away = levels[k]
+            stiffness = self.energies[k] * level / self._size
+            for j in range(joints):
+                torques[j] = torques[j] + stiffness * away[j] / self.angle_scales[j]
+                logs[j] = logs[j] + self.friction_logs[j * count + k] * level
         return torques, [ops.exp(log) for log in logs]
 
     def potential(self, angles: Sequence[Value], q: Values) -> Value:
@@ -195,17 +197,21 @@ class GaussianResidual:
         scales.
         """
         size = self._size
-        place = [angle / scale for angle, scale in zip(angles, self.angle_scales, strict=True)]
-        means = [sum(self.centres[i::size]) / len(self.energies) for i in range(len(angles), size)]
-        place += [
-            q[name] / scale if name in q else mean
-            for name, scale, mean in zip(self.pressures, self.pressure_scales, means, strict=True)
-        ]
+        place: list[Value] = []
+        for angle, scale in zip(angles, self.angle_scales, strict=True):
+            place.append(angle / scale)
+        for name, scale in zip(self.pressures, self.pressure_scales, strict=True):
+            if name in q:
+                place.append(q[name] / scale)
+            else:
+                column = self.centres[len(place) :: size]
+                place.append(sum(column) / len(self.energies))
         levels: list[tuple[Value, list[Value]]] = []
         for k in range(len(self.energies)):
             centre = self.centres[size * k : size * (k + 1)]
             away = [x - c for x, c in zip(place, centre, strict=True)]
-            levels.append((ops.exp(-sum(a * a for a in away) / (2.0 * size)), away))
+            distance = sum(a * a for a in away)
+            levels.append((ops.exp(-distance / (2.0 * size)), away))
         return levels
 
 
