@@ -122,6 +122,8 @@ ARGUMENTS = {
     "displacement_zero": "reading of a displacement at the resting length [m]",
     "skip_rows": "number of lines above the headings of a file",
     "missing": "treatment of missing values: refused, left out or interpolated",
+    "sample_rate": "rows per second of a file without time [Hz]",
+    "grid": "quantities of a grid: of its cells, first column and headings",
     "sections": "further keys of a mapping for the files of a pattern of names",
     "drop_outliers": "whether the rows of suspected outliers are left out",
     "path": "path of a file to read or to write",

@@ -173,9 +173,7 @@ def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_pat
     (tmp_path / "a.csv").write_text(
         "force [N],pressure [kPa]\n" + f"{'a' * 3000},1\n" * 3, encoding="utf-8"
     )
-    with pytest.raises(
-        ColumnError, match="3 cells in 3 of 3 lines are no finite numbers"
-    ) as raised:
+    with pytest.raises(ColumnError, match=r"3 of 3 cells of .* are no finite numbers") as raised:
         read(tmp_path / "a.csv")
     assert len(str(raised.value)) < 1000
     assert "missing" not in str(raised.value)

@@ -208,9 +208,14 @@ SIDE_BY_SIDE = [
 
 @pytest.mark.parametrize("name", ["run.csv", "run.xlsx"])
 def test_messages_and_mappings_count_the_columns_of_the_file(tmp_path: Path, name: str):
-    table_of_cells(tmp_path / name, SIDE_BY_SIDE)
+    apart = [[*row[:2], "" if i else "remark", *row[3:]] for i, row in enumerate(SIDE_BY_SIDE)]
+    table_of_cells(tmp_path / f"apart-{name}", apart)
     with pytest.raises(ColumnError, match=r"\(numbers 2 and 5\) both contain the force"):
-        read(tmp_path / name)
+        read(tmp_path / f"apart-{name}")
+    table_of_cells(tmp_path / name, SIDE_BY_SIDE)
+    first, second = read(tmp_path / name)  # groups side by side
+    assert first["force"].tolist() == [0.0, 8.0, 16.0]
+    assert second["force"].tolist() == [1.0, 6.0, 11.0]
     (recording,) = read(tmp_path / name, ColumnMapping(columns={"2": ""}))  # the remedy works
     assert recording["force"].tolist() == [1.0, 6.0, 11.0]
 

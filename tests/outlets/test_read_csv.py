@@ -351,7 +351,7 @@ def test_a_value_that_is_not_finite(bench, cell: str):
     )
     said = refusal(bench(f"time [s],force [N]\n0,1\n1,{cell}\n2,3\n3,nan\n"), ColumnError)
     assert (
-        f"2 cells in 2 of 4 lines are no finite numbers: line 3 (force {float(cell):g}), line 5"
+        f"2 of 4 cells of 'force [N]' are no finite numbers: line 3 (force {float(cell):g}), line 5"
         " (force nan)" in said
     )
 

@@ -152,7 +152,7 @@ def test_a_formula_that_was_never_computed_and_one_with_an_error_have_no_value(t
     book.save(tmp_path / "bench.xlsx")
     with pytest.raises(
         ColumnError,
-        match=r"2 cells in 2 of 9 rows .* row 9 \(force empty\), row 10 \(force empty\)",
+        match=r"2 of 9 cells of 'force \[N\]' .* row 9 \(force empty\), row 10 \(force empty\)",
     ):
         read(tmp_path / "bench.xlsx")
     assert len(read(tmp_path / "bench.xlsx", ColumnMapping(missing=DropMissing()))[0]) == 7

@@ -103,6 +103,31 @@ _FACTORS: dict[str, tuple[float, str]] = {
 }
 """Factors of common units, tested against pint, whose registry takes 0.4 s to load."""
 
+_FULL_NAMES = {
+    "newton": "N",
+    "newtons": "N",
+    "kilonewton": "kN",
+    "pascal": "Pa",
+    "kilopascal": "kPa",
+    "megapascal": "MPa",
+    "bars": "bar",
+    "millibar": "mbar",
+    "kilogram": "kg",
+    "kilograms": "kg",
+    "gram": "g",
+    "grams": "g",
+    "millimeter": "mm",
+    "millimetre": "mm",
+    "millimeters": "mm",
+    "millimetres": "mm",
+    "meter": "m",
+    "metre": "m",
+    "second": "s",
+    "seconds": "s",
+    "sec": "s",
+    "degrees": "deg",
+}
+"""Units by their names in words, in lower case."""
 _USUAL_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "m": ((1.0, "m"), (math.inf, "mm")),
     "Pa": ((20.0, "bar"), (1e4, "kPa")),
@@ -299,6 +324,7 @@ def conversion(
     if target == ABSOLUTE:
         return _to_absolute(unit, where)
     unit = unit.strip()
+    unit = _FULL_NAMES.get(unit.casefold(), unit)
     where = f"{where}: " if where else ""
     if unit == target and target != "Pa":
         return UnitConversion(1.0)

@@ -76,7 +76,7 @@ WORDS: Mapping[str, Mapping[str, str]] = {
     },
     "position": {
         "en": "displacement disp displ position pos stroke travel lvdt",
-        "de": "weg hub verschiebung traversenweg kolbenweg federweg",
+        "de": "weg hub verschiebung kolbenweg federweg",
         "fr": "déplacement course position",
         "es": "desplazamiento carrera posición",
         "it": "spostamento corsa posizione",
@@ -156,7 +156,7 @@ WORDS: Mapping[str, Mapping[str, str]] = {
     },
     "elongation": {
         "en": "elongation extension strain stretch crosshead",
-        "de": "dehnung verlängerung verlaengerung traverse standardweg",
+        "de": "dehnung verlängerung verlaengerung traverse traversenweg standardweg",
         "fr": "allongement",
         "es": "alargamiento elongación",
         "it": "allungamento",

@@ -38,14 +38,19 @@ from .mapping import ColumnMapping, contradicts
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
 from .tables import (
     MAX_QUOTED,
+    SAMPLE_RATE,
     Cells,
     RawTable,
     constant_from_column,
     epoch_unit,
     guessed_time_unit,
     is_clock,
+    is_number,
     parse_constant_name,
+    parse_rate,
+    resampled,
     seconds_from_clock,
+    time_of_rows,
 )
 from .tables import constants as fixed
 
@@ -84,6 +89,8 @@ def interpret(
         notes.append(_hold_quantity(table, text, value, ambient, columns))
     columns, displaced = headed.displacement_columns(columns, run_constants)
     notes += displaced
+    columns, timed = _with_rate(table, columns, run_constants, mapping)
+    notes += timed
     if "time" in columns:
         time, note = mapping.time.apply(table, columns["time"])
         if time is None:
@@ -96,6 +103,30 @@ def interpret(
     )
     written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
+
+
+def _with_rate(
+    table: RawTable,
+    columns: dict[str, Array],
+    constants: Mapping[str, float | str],
+    mapping: ColumnMapping,
+) -> tuple[dict[str, Array], list[str]]:
+    """The columns with a time by the sample rate that the user or the file states, or interpolated
+    to that of the user; notes on each.
+    """
+    if mapping.sample_rate is not None:
+        rate = parse_rate(mapping.sample_rate, table.origin)
+        if "time" in columns:
+            uniform, note = resampled(columns, rate)
+            return uniform, [note]
+        time, note = time_of_rows(columns, len(table.rows), rate, "as specified by the user")
+        return {"time": time, **columns}, [note]
+    stated = constants.get(SAMPLE_RATE)
+    if stated is None or "time" in columns:
+        return columns, []
+    rate = parse_rate(stated, table.origin)
+    time, note = time_of_rows(columns, len(table.rows), rate, "as the file states")
+    return {"time": time, **columns}, [note]
 
 
 def _is_held_quantity(name: str) -> bool:
@@ -178,8 +209,11 @@ def _read_by_words(headings: Sequence[Heading]) -> list[str]:
             columns.setdefault(heading.evidence, []).append(
                 f"'{heading.text}' as {heading.name}{unit}"
             )
+    proposals = dict.fromkeys(
+        headed.proposal(heading.text) for heading in headings if heading.known and heading.evidence
+    )
     return [
-        f"Read {evidence}: {listed(texts, 4 * MAX_QUOTED, MAX_QUOTED)}."
+        f"Read {evidence}: {listed(texts, 4 * MAX_QUOTED, MAX_QUOTED)}.{''.join(proposals)}"
         for evidence, texts in columns.items()
     ]
 
@@ -443,6 +477,13 @@ def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) 
     """Keep the numbers of a few different texts that repeat; the note on a column of texts."""
     labels = fixed.label_texts(cells)
     values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    bad = [cell for cell in cells if cell.strip() and not is_number(cell)]
+    if len(bad) < len(cells) / 2:
+        examples = listed([f"'{text}'" for text in dict.fromkeys(bad)], MAX_QUOTED)
+        return (
+            f"{len(bad)} of {len(cells)} cells of '{heading.text}' are no numbers ({examples}),"
+            " so that the column is not read."
+        )
     if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
         return f"Column '{heading.text}' contains text and is ignored."
     columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)

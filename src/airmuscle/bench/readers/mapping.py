@@ -89,14 +89,22 @@ line.
 """
 QUESTION = "?"
 """Stands in a mapping for what its user must answer, `pressure [?]`."""
-_TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name")
+_TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name", "grid")
 _WORDS: Mapping[str, Mapping[str, Any]] = {
     "time": TIME_BASES,
     "missing": MISSING_VALUES,
     "outliers": OUTLIERS,
 }
 _TABLES = ("columns", "units", "constants")
-_KEYS = (*_TABLES, *CONSTANT_NAMES, *_TEXTS, *_WORDS, "skip_rows", "missing_codes")
+_KEYS = (
+    *_TABLES,
+    *CONSTANT_NAMES,
+    *_TEXTS,
+    *_WORDS,
+    "skip_rows",
+    "missing_codes",
+    "sample_rate",
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,6 +138,10 @@ class ColumnMapping:
     missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with the
                numbers and texts that stand for missing values, such as -999
     drop_outliers  whether the rows of suspected outliers are left out
+    sample_rate  [Hz] or a text, "500 Hz" or "2 ms": the time of rows without time, by a counter of
+               samples if there is one; rows with time are interpolated to it
+    grid       quantities of a grid, "force [N] over contraction [%], pressure [kPa]": of the cells,
+               the first column and the headings
     sections   further keys for the files of a pattern: {"*.tdms": {"columns": {"AI 0": "force
                [N]"}}}
     """
@@ -150,6 +162,8 @@ class ColumnMapping:
     time: TimeBase = RecordedTime()
     missing: MissingValues = RefuseMissing()
     drop_outliers: bool = False
+    sample_rate: float | str | None = None
+    grid: str | None = None
     sections: Mapping[str, Mapping[str, Any]] = dataclasses.field(default_factory=dict)
 
     def of_file(self, path: Path) -> "ColumnMapping":
@@ -357,6 +371,8 @@ def check_answered(mapping: ColumnMapping, where: str) -> None:
 
 def _required_kind(key: str, value: Any) -> str:
     """The kind of value that a key requires, as a phrase; empty where the value is of this kind."""
+    if key == "sample_rate" and not _is_of(value, float | int | str):
+        return 'a number [Hz] or a text, such as "500 Hz"'
     if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
         return "a quoted text"
     if key == "skip_rows" and not _is_of(value, int):

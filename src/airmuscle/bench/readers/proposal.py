@@ -19,13 +19,17 @@ from .column_names import ReadColumn, quantities_of_units, read_columns
 from .mapping import QUESTION, ColumnMapping
 from .reader import read_tables
 from .tables import (
+    UNKNOWN_GRID,
     Cells,
     Decimation,
     RawTable,
     epoch_unit,
     file_conversion,
+    grid_of,
     guessed_time_unit,
     is_clock,
+    is_grid,
+    split_groups,
 )
 
 LENGTHS = "length, shortening, elongation or position"
@@ -81,14 +85,15 @@ class Proposal:
     file: str
     columns: tuple[ProposedColumn, ...] = ()
     unused: tuple[str, ...] = ()
+    grid: str = ""
 
     def __bool__(self) -> bool:
-        return bool(self.columns)
+        return bool(self.columns or self.grid)
 
     @property
-    def questions(self) -> tuple[ProposedColumn, ...]:
-        """The lines that the user must answer."""
-        return tuple(column for column in self.columns if column.is_question)
+    def questions(self) -> int:
+        """Number of lines that the user must answer."""
+        return sum(column.is_question for column in self.columns) + (QUESTION in self.grid)
 
     @property
     def toml(self) -> str:
@@ -96,7 +101,10 @@ class Proposal:
         lines = [f"# mapping proposed for {self.file}"]
         if self.questions:
             lines.append(f"# answer each {QUESTION} : it stands for what the file does not state")
-        lines += ["[columns]", *(column.line for column in self.columns)]
+        if self.grid:
+            lines.append(f"grid = {json.dumps(self.grid)}  # cells over first column, headings")
+        if self.columns:
+            lines += ["[columns]", *(column.line for column in self.columns)]
         if self.unused:
             lines.append(f"# not used: {', '.join(self.unused)}")
         return "\n".join(line.replace("\r", " ") for line in lines) + "\n"
@@ -104,8 +112,13 @@ class Proposal:
     @property
     def options(self) -> str:
         """The same as options of a command."""
+        grid = [f"--grid {shlex.quote(self.grid)}"] if self.grid else []
         return " ".join(
-            f"--column {shlex.quote(f'{column.key}={column.reading}')}" for column in self.columns
+            grid
+            + [
+                f"--column {shlex.quote(f'{column.key}={column.reading}')}"
+                for column in self.columns
+            ]
         )
 
 
@@ -116,14 +129,20 @@ def propose(path: str | Path, mapping: ColumnMapping = ColumnMapping()) -> Propo
     path = Path(path)
     numbered = dataclasses.replace(mapping, columns={**mapping.columns, 1: ""})
     tables = read_tables(path, numbered, Decimation())
-    parts = [propose_for_table(table, mapping) for table in tables]
+    parts = []
+    for table in tables:
+        parts += [propose_for_table(part, mapping) for part in split_groups(table)]
     lines = {column.key: column for part in parts for column in part.columns}
     unused = dict.fromkeys(name for part in parts for name in part.unused)
-    return Proposal(path.name, tuple(lines.values()), tuple(unused))
+    grid = next((part.grid for part in parts if part.grid), "")
+    return Proposal(path.name, tuple(lines.values()), tuple(unused), grid)
 
 
 def propose_for_table(table: RawTable, mapping: ColumnMapping) -> Proposal:
     """The mapping that completes a table."""
+    if mapping.grid is None and is_grid(table):
+        grid = grid_of(table) or UNKNOWN_GRID
+        return Proposal(table.origin, grid=grid.text if QUESTION in grid.text else "")
     few = table.of_rows(np.arange(min(len(table.rows), MAX_ROWS)))
     columns = read_columns(few, quantities_of_units(mapping.units))
     counts = Counter(few.headings)
@@ -234,4 +253,5 @@ def merged(proposals: Iterable[Proposal]) -> Proposal:
     files = list(proposals)
     lines = {column.key: column for proposal in files for column in proposal.columns}
     names = dict.fromkeys(proposal.file for proposal in files if proposal)
-    return Proposal(", ".join(names), tuple(lines.values()))
+    grid = next((proposal.grid for proposal in files if proposal.grid), "")
+    return Proposal(", ".join(names), tuple(lines.values()), grid=grid)

@@ -4,6 +4,7 @@ gives the format.
 
 import dataclasses
 import glob
+import itertools
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -28,7 +29,7 @@ from .mapping import (
     mapped_columns,
     read_mapping,
 )
-from .tables import Decimation, Downsampling, RawTable, downsample, split_specimens
+from .tables import Decimation, Downsampling, RawTable, downsample, split_specimens, unwound
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
@@ -103,7 +104,10 @@ def read_one(
     recordings = list[Recording]()
     present = set[str]()
     tables = read_tables(path, mapping, downsampling, progress)
-    for table in tables:
+    is_numbered = any(str(column).isdecimal() for column in mapping.columns)
+    for table in itertools.chain.from_iterable(
+        (table,) if is_numbered else unwound(table, mapping.grid) for table in tables
+    ):
         # figures cannot contain every name of a file
         named = dataclasses.replace(table, origin=printable(table.origin))
         present |= mapped_columns(named, mapping)

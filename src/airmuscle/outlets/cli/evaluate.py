@@ -1,6 +1,9 @@
 """`airmuscle evaluate`: a law at an operating point."""
 
+import contextlib
+
 from ... import report
+from ...core import STANDARD_GRAVITY, UnitError, quantity
 from ...files.library import UNITS
 from ...files.library import evaluate as evaluate_entry
 from ...physics.muscle.working_point import describe_point
@@ -12,6 +15,13 @@ from .requested import with_requests
 from .terminal import echo
 
 
+def read_tension(text: str, where: str) -> float:
+    """A force [N], also of a load in g or kg by standard gravity. Raises UnitError."""
+    with contextlib.suppress(UnitError):
+        return float(quantity(text, "kg", where=where)) * STANDARD_GRAVITY
+    return float(quantity(text, "N", where=where))
+
+
 @request
 class EvaluateRequest:
     """Two of pressure, contraction and force."""
@@ -21,7 +31,11 @@ class EvaluateRequest:
         unit="Pa",
     )
     contraction: float | None = optional("Contraction: 0.12 or '12 %'.", unit="1")
-    force: float | None = optional("Tension with unit: '100 N', '0.1 kN'.", unit="N")
+    force: float | None = optional(
+        "Tension with unit: '100 N', '0.1 kN'; a load in kg is its weight.",
+        metavar="QUANTITY",
+        read=read_tension,
+    )
 
     def check(self, where: Where) -> None:
         """Raise RequestError unless two quantities are given."""

@@ -53,6 +53,7 @@ _FILES: Mapping[str, Instruction] = {
     "file_name": lambda hint: f"use --file-name '{hint.value}'",
     "time": lambda hint: f"use --time {TIME_BASE_NAMES[hint.value]}",
     "decimal": lambda hint: f"use --decimal '{hint.value}'",
+    "grid": lambda hint: f'use --grid "{hint.value}"',
     "resting_length": lambda hint: 'use --resting-length "..."',
     "ambient": lambda hint: 'use --ambient "..."',
     "displacement_zero": lambda hint: f'use --displacement-zero "{hint.value}"',

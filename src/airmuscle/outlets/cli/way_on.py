@@ -110,7 +110,7 @@ def print_mapping(
     names = " ".join(shlex.quote(name) for name in files)
     target = str(saved or MAPPING_FILE)
     verb = f"saved as {target}" if saved else f"save it as {target}, or use --save-mapping {target}"
-    open_count = len(proposal.questions)
+    open_count = proposal.questions
     ask = f"; answer its {open_count} question marks" if open_count else ""
     echo(f"\nA mapping for what the files do not state ({verb}{ask}):\n")
     echo(proposal.toml)

@@ -66,6 +66,20 @@ class ReadingRequest:
             ("none", "none"),
         ),
     )
+    sample_rate: str | None = optional(
+        "Time of rows without time: '500 Hz' or '2 ms', by a counter of samples if there is one;"
+        " rows with time are interpolated to it.",
+        metavar="QUANTITY",
+        label="Sample rate",
+        example="500 Hz",
+    )
+    grid: str | None = optional(
+        "Quantities of a grid: 'force [N] over contraction [%], pressure [kPa]' (cells, first"
+        " column, headings).",
+        metavar="QUANTITIES",
+        label="Quantities of a grid",
+        example="force [N] over contraction [%], pressure [kPa]",
+    )
     displacement_zero: str | None = optional(
         "Reading of a displacement, shortening or elongation at the resting length, such as '12"
         " mm'; default: 0.",

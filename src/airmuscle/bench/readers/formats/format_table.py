@@ -20,6 +20,7 @@ from ..tables import (
     check_installed,
     check_is_data,
     check_regular_file,
+    is_text,
     named_function,
 )
 
@@ -80,15 +81,17 @@ TEXT = Format(
     tables="raw_csv.read_text_tables",
     is_separate=False,
 )
+WORKBOOK = Format(
+    "workbook",
+    (".xlsx", ".xlsm", ".xls", ".ods"),
+    (b"PK\x03\x04", b"\xd0\xcf\x11\xe0"),
+    package="python_calamine",
+    tables="raw_workbook.read_workbook_tables",
+)
 FORMATS = (
     TEXT,
     Format("LVM", (), (b"LabVIEW Measurement",), tables="raw_lvm.read_lvm_tables"),
-    Format(
-        "workbook",
-        (".xlsx", ".xlsm", ".xls", ".ods"),
-        package="python_calamine",
-        tables="raw_workbook.read_workbook_tables",
-    ),
+    WORKBOOK,
     Format(
         "Parquet",
         (".parquet",),
@@ -118,7 +121,7 @@ FORMATS = (
     Format(
         "ROS bag",
         (".bag", ".db3", ".mcap"),
-        (b"#ROSBAG V",),
+        (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0"),
         "rosbags.highlevel",
         "raw_rosbag.read_rosbag_tables",
     ),
@@ -129,17 +132,26 @@ EXTENSIONS = tuple(name for form in FORMATS if form.tables for name in form.exte
 """Extensions of the files that give recordings."""
 EPISODE_EXTENSIONS = tuple(name for form in FORMATS for name in form.extensions)
 """Extensions of the files that give episodes."""
-_LONGEST = max(len(beginning) for form in FORMATS for beginning in form.beginnings)
+BEGINNING = 4096
+"""First bytes of a file by which its format is told [bytes] (chosen)."""
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file, by its extension; where that is one of text, or unknown, by its first
-    bytes, else text. Raises FileError for a path that is no regular file.
+    """The format of a file: the first bytes decide before the extension, which tells apart those
+    that begin alike; a table of text under the name of another format is text. Raises FileError for
+    a path that is no regular file.
     """
     named = next((form for form in FORMATS if path.suffix.lower() in form.extensions), TEXT)
-    if named is not TEXT:
+    if named is not TEXT and not path.is_file():  # its reader states what is missing
         return named
     check_regular_file(path)
     with path.open("rb") as file:
-        beginning = file.read(_LONGEST)
-    return next((form for form in FORMATS if beginning.startswith(form.beginnings)), TEXT)
+        beginning = file.read(BEGINNING)
+    if named.beginnings and beginning.startswith(named.beginnings):
+        return named
+    by_bytes = next((form for form in FORMATS if beginning.startswith(form.beginnings)), None)
+    if named is TEXT:
+        return by_bytes or TEXT if by_bytes is not WORKBOOK else TEXT
+    if by_bytes is not None and named.arrays is None:
+        return by_bytes
+    return TEXT if named.tables and named.beginnings and is_text(beginning) else named

@@ -36,7 +36,10 @@ from ..tables import (
     split_cells,
 )
 from ..tables import text_format as form
+from .text_sections import sections, with_headings_of_cells
 
+_DOTS = re.compile(r"[-+]?\d{1,3}(\.\d{3}){2,}")
+"""A number with dots for thousands and for decimals, or for thousands alone."""
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 
 
@@ -50,7 +53,13 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
         raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     check_text_file(path)
-    return _parse_text(path.name, read_text(path), text_format)
+    tables = parse_text(path.name, read_text(path), text_format)
+    if len(tables) > 1:
+        raise ColumnError(
+            f"{path.name}: the file contains {len(tables)} tables, each below its headings; read()"
+            " gives a recording of each."
+        )
+    return tables[0]
 
 
 def read_text_tables(
@@ -60,11 +69,36 @@ def read_text_tables(
     check_text_file(path)
     if is_large_file(path):
         return (read_large_csv(path, selection.text_format, selection.downsampling, progress),)
-    return (read_csv_table(path, selection.text_format),)
+    return parse_text(path.name, read_text(path), selection.text_format)
 
 
-def _parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
-    header, body = _header_and_body(origin, re.split(r"\r\n|\n|\r", text), text_format)
+def parse_text(origin: str, text: str, text_format: TextFormat) -> tuple[RawTable, ...]:
+    """The tables of a text, of which a further one begins where the headings repeat. Raises
+    FileError or ColumnError.
+    """
+    lines = re.split(r"\r\n|\n|\r", text)
+    numbered = [(i, line) for i, line in enumerate(lines, 1) if has_content(line)]
+    numbered = with_headings_of_cells(numbered)
+    header = parse_header(origin, numbered, text_format)
+    body = [(i, line) for i, line in numbered if not is_comment(line)]
+    parts = sections(body, header.headings, header.delimiter)
+    if len(parts) == 1 and not parts[0].note:
+        rows = body[header.header_lines :]
+        cells = parse_columns(origin, header, rows, text_format)
+        return (header.table(origin, cells, [i for i, _ in rows]),)
+    if len(parts) == 1:
+        comments = [(i, line) for i, line in numbered if is_comment(line)]
+        complete = sorted([*comments, *parts[0].lines], key=lambda line: line[0])
+        return (_table_of(origin, complete, text_format).noted(*filter(None, [parts[0].note])),)
+    return tuple(
+        _table_of(f"{origin}, {part.title or f'table {number}'}", part.lines, text_format)
+        for number, part in enumerate(parts, 1)
+    )
+
+
+def _table_of(origin: str, numbered: NumberedLines, text_format: TextFormat) -> RawTable:
+    header = parse_header(origin, numbered, text_format)
+    body = [(i, line) for i, line in numbered if not is_comment(line)][header.header_lines :]
     return header.table(
         origin, parse_columns(origin, header, body, text_format), [i for i, _ in body]
     )
@@ -132,10 +166,40 @@ def _parse_by_cell(
                 " part of the table with '#'."
             )
         rows.append(row)
+    decimal = decimal or _sign_beside_thousands(rows, header.delimiter)
     _check_decimal_sign(origin, body, rows, decimal)
     return tuple(
         numbers_if_all([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width)
     )
+
+
+_GROUPED = {
+    ",": re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*"),
+    ".": re.compile(r"[-+]?\d{1,3}(,\d{3})+\.\d*"),
+}
+"""Numbers with separated thousands, by their decimal sign."""
+
+
+def _sign_beside_thousands(rows: list[list[str]], delimiter: str) -> str | None:
+    """The decimal sign where numbers such as `1.300,00` show it, and no number contradicts them;
+    None elsewhere.
+    """
+    if delimiter == "," or not rows:
+        return None
+    for sign, grouped in _GROUPED.items():
+        other = POINT_NUMBER if sign == "," else COMMA_NUMBER
+        is_shown = False
+        is_contradicted = False
+        for column in range(len(rows[0])):
+            cells = [row[column] for row in rows if column < len(row)]
+            other_cells = [cell for cell in cells if other.fullmatch(cell)]
+            shows = any(map(grouped.fullmatch, cells))
+            is_shown = is_shown or shows
+            all_thousands = all(map(_THOUSANDS.fullmatch, other_cells))
+            is_contradicted = is_contradicted or not (all_thousands and (shows or not other_cells))
+        if is_shown and not is_contradicted:
+            return sign
+    return None
 
 
 def _with_decimal_point(cell: str, decimal: str | None) -> str:
@@ -144,6 +208,8 @@ def _with_decimal_point(cell: str, decimal: str | None) -> str:
     """
     if decimal is None:
         return cell.replace(",", ".") if COMMA_NUMBER.fullmatch(cell) else cell
+    if decimal == "." and _DOTS.fullmatch(cell):  # the last dot is the decimal point
+        cell = cell[::-1].replace(".", "_", 1).replace(".", "").replace("_", ".")[::-1]
     thousands = "." if decimal == "," else ","
     plain = cell.replace(thousands, "").replace(",", ".")
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
@@ -262,7 +328,7 @@ def read_text_stream(
     encoding = form.detect_encoding(beginning)
     if len(beginning) < _HEADER_BYTES:
         return downsample(
-            _parse_text(origin, beginning.decode(encoding, errors="replace"), text_format),
+            parse_text(origin, beginning.decode(encoding, errors="replace"), text_format)[0],
             downsampling,
         )
     first, header = _read_header(origin, beginning, encoding, text_format)

@@ -24,6 +24,7 @@ from .file_kind import check_beginning as check_beginning
 from .file_kind import check_is_data as check_is_data
 from .file_kind import check_regular_file as check_regular_file
 from .file_kind import check_text_file as check_text_file
+from .file_kind import is_text as is_text
 from .file_kind import read_toml as read_toml
 from .file_kind import readable as readable
 from .header import COMMA_NUMBER as COMMA_NUMBER
@@ -40,6 +41,10 @@ from .missing_values import Mask as Mask
 from .missing_values import MissingValues as MissingValues
 from .missing_values import RefuseMissing as RefuseMissing
 from .missing_values import parse_code as parse_code
+from .sample_rate import SAMPLE_RATE as SAMPLE_RATE
+from .sample_rate import parse_rate as parse_rate
+from .sample_rate import resampled as resampled
+from .sample_rate import time_of_rows as time_of_rows
 from .selection import Selection as Selection
 from .separate_process import call_in_separate_process as call_in_separate_process
 from .separate_process import check_installed as check_installed
@@ -75,3 +80,8 @@ from .time_base import epoch_unit as epoch_unit
 from .time_base import guessed_time_unit as guessed_time_unit
 from .time_base import is_clock as is_clock
 from .time_base import seconds_from_clock as seconds_from_clock
+from .wide_tables import UNKNOWN_GRID as UNKNOWN_GRID
+from .wide_tables import grid_of as grid_of
+from .wide_tables import is_grid as is_grid
+from .wide_tables import split_groups as split_groups
+from .wide_tables import unwound as unwound

@@ -43,6 +43,8 @@ class RawTable:
     """Headings that are names of fields of a message and state no quantity."""
     numbers: tuple[int, ...] = ()
     """Numbers of the columns in the file, from 1 on; empty if they are those of the table."""
+    above: tuple[str, ...] = ()
+    """Cells of the row above the headings, for each column; empty if there is none."""
 
     def number(self, column: int) -> int:
         """The number in the file, from 1 on, of a column by its index."""
@@ -60,9 +62,9 @@ class RawTable:
         headings = tuple(self.headings[i] for i in indices)
         columns = tuple(self.columns[i] for i in indices)
         numbers = tuple(self.number(i) for i in indices)
-        return dataclasses.replace(
-            self, headings=headings, units=units, columns=columns, numbers=numbers, **changes
-        )
+        above = tuple(self.above[i] for i in indices) if self.above else ()
+        parts: dict[str, Any] = {"columns": columns, "numbers": numbers, "above": above}
+        return dataclasses.replace(self, headings=headings, units=units, **{**parts, **changes})
 
     def of_rows(self, indices: npt.NDArray[np.intp], **changes: Any) -> "RawTable":
         """The table with these rows alone, by their indices, and with further changes of its

@@ -36,7 +36,28 @@ _SIGNATURES = (
     (b"MDF ", "an MDF file"),
     (b"PAR1", "a Parquet file"),
     (b"\x93NUMPY", "a NumPy file"),
+    (b"\x80\x02", "a Python pickle"),
+    (b"\x80\x03", "a Python pickle"),
+    (b"\x80\x04", "a Python pickle"),
+    (b"\x80\x05", "a Python pickle"),
 )
+_ARCHIVES = (
+    "a gzip archive",
+    "a bzip2 archive",
+    "a 7z archive",
+    "an xz archive",
+    "a RAR archive",
+)
+_PICTURES = ("a PNG image", "a JPEG image", "a GIF image", "a BMP image", "a PDF document")
+_REMEDIES = {
+    _ARCHIVES: "Unpack it, and read the files inside.",
+    _PICTURES: "Read the numbers off it, or ask its authors for them.",
+    ("a Python pickle",): (
+        "It is not read, because it may run code. In the program that wrote it, use"
+        " DataFrame.to_csv or to_parquet, or numpy.savez."
+    ),
+}
+"""What to do with a file of a kind that contains no table."""
 _NO_DATA = (
     (
         b"version https://git-lfs.github.com/spec/",
@@ -148,12 +169,22 @@ def check_text_file(path: Path) -> None:
         check_beginning(path.name, file.read(4096))
 
 
+def is_text(beginning: bytes) -> bool:
+    """Whether the first bytes of a file are those of a text with several lines."""
+    has_control = len(beginning) != len(beginning.translate(None, _CONTROL))
+    is_marked = beginning.startswith(_BYTE_ORDER_MARKS)
+    return is_marked or (not has_control and b"\n" in beginning and b"\xff" not in beginning)
+
+
 def check_beginning(origin: str, beginning: bytes) -> None:
     """Raise FileError if the first bytes are not those of a text."""
     known = next((kind for signature, kind in _SIGNATURES if beginning.startswith(signature)), "")
     has_control = len(beginning) != len(beginning.translate(None, _CONTROL))
     is_binary = has_control and not beginning.startswith(_BYTE_ORDER_MARKS)
     kind = (known or "a binary file") if is_binary else known if known == "a PDF document" else ""
+    remedy = next((text for names, text in _REMEDIES.items() if kind in names), "")
+    if kind and remedy:
+        raise FileError(f"{origin}: the file is {kind}, not a table of text. {remedy}")
     if kind:
         raise FileError(
             f"{origin}: the file is {kind}, not a table of text. Export the data as text (.csv), or"

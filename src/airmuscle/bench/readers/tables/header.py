@@ -10,6 +10,7 @@ from pathlib import Path
 from ....core import ColumnError, FileError, Hint, UnitError, conversion, listed
 from ....recording.columns import parse_heading
 from .constants import CONSTANT_UNITS, parse_constant_name
+from .sample_rate import SAMPLE_RATE, rate_in_comment
 
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 """A number with a decimal comma, without thousands separators."""
@@ -141,6 +142,9 @@ def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
         return None
     name = match["name"]
     text = match["value"].strip()
+    rate = rate_in_comment(name, f"{text} {match['unit'] or ''}")
+    if rate is not None:
+        return SAMPLE_RATE, rate
     known = name in _TEXT_CONSTANTS or parse_constant_name(name) is not None
     if not known and not name.isidentifier():
         return None

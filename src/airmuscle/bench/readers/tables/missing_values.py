@@ -105,10 +105,13 @@ def _describe_faulty(table: RawTable, faulty_cells: Sequence[tuple[int, Examined
         for row, column in faulty_cells[:MAX_LISTED]
     ]
     more = f" and {len(faulty_cells) - MAX_LISTED} more" if len(faulty_cells) > MAX_LISTED else ""
-    rows = len({row for row, _ in faulty_cells})
+    counts: dict[str, int] = {}
+    for _, column in faulty_cells:
+        counts[column.heading.text] = counts.get(column.heading.text, 0) + 1
+    shares = [f"{count} of {len(table.rows)} cells of '{text}'" for text, count in counts.items()]
     return (
-        f"{table.origin}: {len(faulty_cells)} cells in {rows} of {len(table.rows)}"
-        f" {table.row_label}s are no finite numbers: {', '.join(listed)}{more}. Correct the cells"
+        f"{table.origin}: {' and '.join(shares)} are no finite numbers:"
+        f" {', '.join(listed)}{more}. Correct the cells"
         f" or delete the {table.row_label}s."
     )
 

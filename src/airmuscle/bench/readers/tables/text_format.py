@@ -79,6 +79,8 @@ class TextHeader:
     """Number of lines, without comments, above the numbers: headings, unit row, and lines above the
     headings.
     """
+    above: tuple[str, ...] = ()
+    """Cells of the line above the headings, for each of them; empty if there is none."""
 
     def table(
         self,
@@ -90,7 +92,14 @@ class TextHeader:
         """The table of these columns, whose rows are the lines of these numbers."""
         lines = np.array(rows, dtype=np.int64)
         return RawTable(
-            origin, self.headings, self.units, columns, lines, constants=self.constants, notes=notes
+            origin,
+            self.headings,
+            self.units,
+            columns,
+            lines,
+            constants=self.constants,
+            notes=notes,
+            above=self.above,
         )
 
 
@@ -111,9 +120,15 @@ def detect_encoding(content: bytes) -> str:
     return "utf-8-sig"
 
 
+TERMINAL_BANNER = "=~=~=~="
+"""Beginning of the line that a terminal program writes above its log."""
+MIN_GRID = 2
+"""Least number of columns of numbers of a grid (chosen)."""
+
+
 def is_comment(line: str) -> bool:
-    """Whether a line with content is a comment."""
-    return line.lstrip().startswith(("#", "%"))
+    """Whether a line with content is a comment, or the banner of a terminal program."""
+    return line.lstrip().startswith(("#", "%", TERMINAL_BANNER))
 
 
 def has_content(line: str) -> bool:
@@ -188,8 +203,21 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     constants = [header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
     constants += [header.parse_constant_comment(line) for _, line in comments]
     return TextHeader(
-        tuple(headings), units, dict(filter(None, constants)), delimiter, above + count
+        tuple(headings),
+        units,
+        dict(filter(None, constants)),
+        delimiter,
+        above + count,
+        _cells_above(preamble, delimiter, len(headings)),
     )
+
+
+def _cells_above(preamble: NumberedLines, delimiter: str, width: int) -> tuple[str, ...]:
+    """The cells of the line above the headings, one for each; empty where there is none."""
+    if not preamble:
+        return ()
+    cells = split_cells(preamble[-1][1], delimiter)
+    return tuple([*cells, *[""] * width][:width]) if len(cells) > 1 else ()
 
 
 def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
@@ -200,9 +228,13 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
     if stated is not None:
         return stated
     rows: list[tuple[str, list[str]]] = []
-    for _, line in body:
+    for index, (_, line) in enumerate(body):
         delimiter = text_format.detect_delimiter(line)
         cells = split_cells(line, delimiter)
+        if _is_grid_heading(
+            cells, [split_cells(row, delimiter) for _, row in body[index + 1 : index + 3]]
+        ):
+            return index
         if _is_numeric(cells):
             before = rows[-1][1] if rows else []
             if not rows or (
@@ -227,6 +259,20 @@ def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int
         widest = max(map(header.count_cells, last))
         return len(rows) - 2 if widest >= width else None
     return len(rows) - 1 if header.count_cells(last[-1]) >= width else None
+
+
+def _is_grid_heading(cells: list[str], below: list[list[str]]) -> bool:
+    """Whether cells are the headings of a grid: a text and rising numbers, above rows of numbers
+    alone.
+    """
+    numbers = [cell.replace(",", ".") for cell in cells[1:]]
+    if len(numbers) < MIN_GRID or not cells[0] or header.is_number(cells[0]):
+        return False
+    if not all(map(header.is_number, numbers)) or not any(map(str.isalpha, cells[0])):
+        return False
+    rises = bool(np.all(np.diff([float(number) for number in numbers]) > 0))
+    is_grid = all(len(row) == len(cells) and all(map(header.is_number, row)) for row in below)
+    return rises and bool(below) and is_grid
 
 
 def _is_numeric(cells: list[str]) -> bool:
