@@ -24,7 +24,10 @@ from .comparison import select_for_both as select_for_both
 from .diagnosis import DataUse as DataUse
 from .diagnosis import Diagnosis as Diagnosis
 from .diagnosis import LevelRecord as LevelRecord
+from .diagnosis import RecordCheck as RecordCheck
+from .diagnosis import RecordFault as RecordFault
 from .diagnosis import Support as Support
+from .diagnosis import check_record as check_record
 from .diagnosis import diagnose as diagnose
 from .diagnosis import level_record as level_record
 from .diagnosis import read as read

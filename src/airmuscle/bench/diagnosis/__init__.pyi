@@ -12,10 +12,16 @@ from .level_records import level_tables as level_tables
 from .misfit import MAX_ACCEPTED as MAX_ACCEPTED
 from .misfit import LawMisfit as LawMisfit
 from .misfit import misfit_warning as misfit_warning
+from .record_check import RecordCheck as RecordCheck
+from .record_check import RecordFault as RecordFault
+from .record_check import check_record as check_record
+from .record_check import is_exchanged as is_exchanged
 from .recording_rules import RECORDING_RULES as RECORDING_RULES
 from .recording_rules import Findings as Findings
 from .recording_rules import diagnose as diagnose
 from .recording_rules import examine_recordings as examine_recordings
+from .response_to_command import CommandResponse as CommandResponse
+from .response_to_command import command_response as command_response
 from .rules import Diagnosis as Diagnosis
 from .rules import DiagnosisRule as DiagnosisRule
 from .rules import Subject as Subject

@@ -24,9 +24,9 @@ from ...physics import (
 )
 from ...recording import Recording
 from ...report import Chapter, Table, TableColumn
-from ..diagnosis import DataUse, support_of_transients
+from ..diagnosis import DataUse, command_response, is_exchanged, support_of_transients
 from ..estimation import MAX_RELATIVE_ERROR
-from ..inspection import EDGE, SAME_READING, distinct_readings, rounding
+from ..inspection import EDGE, SAME_READING, analyse_sampling, distinct_readings, rounding
 from ..reported import Reported
 from .experiment import Experiment, PriorValue
 from .fit import fit_dynamic
@@ -165,6 +165,7 @@ def fit_regulator(
     support_of_transients(recordings, ("pressure",)).check(DataUse.FIT)
     for recording in recordings:
         _check_excitation(recording, noise)
+        _check_order(recording)
     zeros = tuple(_settled_difference(recording) for recording in recordings)
     circuit = initial or _initial_regulator(recordings, supply_pressure, volume)
     plant = Plant(Muscle.ideal(Vessel(volume)), circuit, Isometric(0.0), Isothermal())
@@ -298,6 +299,20 @@ def _check_excitation(recording: Recording, noise: float) -> None:
                 " steps up and down over the range of use, some of them reversed after 50 to"
                 " 200 ms."
             )
+
+
+def _check_order(recording: Recording) -> None:
+    """Raise IdentificationError where the pressure precedes its command: no parameters explain it,
+    and the search for them would take minutes.
+    """
+    response = command_response(recording["time"], recording["setpoint"], recording["pressure"])
+    if response is None or not is_exchanged(response, analyse_sampling(recording)):
+        return
+    raise IdentificationError(
+        f"{recording.origin}: the pressure precedes its command by"
+        f" {-1e3 * response.delay:.3g} ms: the columns are exchanged, or the command was logged"
+        " late. Exchange setpoint and pressure in the headings or in a mapping file."
+    )
 
 
 def _changes(recording: Recording) -> tuple[Array, Array]:

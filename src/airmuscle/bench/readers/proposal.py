@@ -250,8 +250,15 @@ def _description(cells: Cells) -> str:
 
 def merged(proposals: Iterable[Proposal]) -> Proposal:
     """One mapping for several files: the lines of each, once."""
-    files = list(proposals)
-    lines = {column.key: column for proposal in files for column in proposal.columns}
-    names = dict.fromkeys(proposal.file for proposal in files if proposal)
-    grid = next((proposal.grid for proposal in files if proposal.grid), "")
-    return Proposal(", ".join(names), tuple(lines.values()), grid=grid)
+    files = [proposal for proposal in proposals if proposal]
+    lines: dict[str, ProposedColumn] = {}
+    for proposal in files:
+        for column in proposal.columns:
+            lines[column.key] = column
+    grids = [proposal.grid for proposal in files if proposal.grid]
+    names = dict.fromkeys(proposal.file for proposal in files)
+    return Proposal(
+        ", ".join(names),
+        tuple(lines.values()),
+        grid=grids[0] if grids else "",
+    )

@@ -64,6 +64,9 @@ COMMANDS = (
         "inspect",
         "Inspect measurement files: columns, runs, sampling, outliers.",
     ),
+    CommandRow(
+        "check", "check", "check", "Check whether records are usable, right after a measurement."
+    ),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("approximate", "fit", "approximate", "Approximate one characteristic by another."),
     CommandRow(

@@ -81,6 +81,8 @@ _CODE: Mapping[str, Instruction] = {"files.allow_code": lambda hint: "use --allo
 INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     **dict.fromkeys(RUN_CODE, _CODE),
     "inspect": _FILES,
+    "check": _FILES,
+    "fit-regulator": _FILES,
     "fit": {
         **_FILES,
         **_CODE,

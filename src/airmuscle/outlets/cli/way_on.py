@@ -14,19 +14,14 @@ from ...report.chapter import Chapter, Table
 
 MAPPING_FILE = "rig.toml"
 """Name under which a proposed mapping is saved in the lines that are printed."""
-MIN_ROWS_FOR_LAW = 8
-"""Rows below which no fit is proposed (chosen)."""
 
 
 class Use(NamedTuple):
-    """What files can be used for: a command, the quantities that it needs as alternatives, and a
-    remark.
-    """
+    """What files can be used for: a command, and the quantities that it needs as alternatives."""
 
     command: str
     purpose: str
     needed: tuple[tuple[str, ...], ...]
-    remedies: tuple[str, ...] = ()
 
 
 USES = (
@@ -51,24 +46,35 @@ def way_on(files: Sequence[str], recordings: Sequence[Recording]) -> Chapter:
     """The chapter of what can be done with the recordings now, and what is missing for the rest."""
     names = " ".join(shlex.quote(name) for name in files)
     rows: dict[str, list[str]] = {"purpose": [], "command": [], "missing": []}
-    quantities = [{name.rpartition(".")[2] for name in recording} for recording in recordings]
-    bare = [set(recording) for recording in recordings]
     for use in USES:
-        if use.command.startswith("campaign") and len(recordings) < 2:
+        lacking = _lacking_of_all(use, recordings)
+        if lacking is None:
             continue
-        names_of = quantities if use.command.startswith("fit-joint") else bare
-        lacking = min((_lacking(use, known) for known in names_of), key=len, default=["a table"])
-        if len(lacking) == len(use.needed):
-            continue
+        command = f"airmuscle {use.command.format(files=names)}"
         rows["purpose"].append(use.purpose)
-        rows["command"].append("" if lacking else f"airmuscle {use.command.format(files=names)}")
+        rows["command"].append("" if lacking else command)
         rows["missing"].append(", ".join(lacking))
-    possible = [line for line in rows["command"] if line]
-    summary = "" if rows["purpose"] else f"No quantity of a muscle: {_quantities(recordings)}."
-    if rows["purpose"] and not possible:
+    if not rows["purpose"]:
+        summary = f"No quantity of a muscle: {_quantities(recordings)}."
+        return Chapter("way-on", "The way on", summary)
+    summary = ""
+    if not any(rows["command"]):
         summary = "No fit is possible yet: the table says what is missing."
-    tables = (Table("uses", "Possible now", rows, brief=len(USES)),) if rows["purpose"] else ()
-    return Chapter("way-on", "The way on", summary, tables=tables)
+    table = Table("uses", "Possible now", rows, brief=len(USES))
+    return Chapter("way-on", "The way on", summary, tables=(table,))
+
+
+def _lacking_of_all(use: Use, recordings: Sequence[Recording]) -> list[str] | None:
+    """What the recording that is closest to a use lacks; None where all lack everything."""
+    if use.command.startswith("campaign") and len(recordings) < 2:
+        return None
+    is_of_joint = use.command.startswith("fit-joint")
+    candidates = []
+    for recording in recordings:
+        columns = {name.rpartition(".")[2] for name in recording} if is_of_joint else {*recording}
+        candidates.append(_lacking(use, columns))
+    closest = min(candidates, key=len)
+    return None if len(closest) == len(use.needed) else closest
 
 
 def _lacking(use: Use, known: set[str]) -> list[str]:

@@ -4,6 +4,7 @@ in chunks.
 
 import codecs
 import itertools
+import operator
 import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -77,31 +78,35 @@ def parse_text(origin: str, text: str, text_format: TextFormat) -> tuple[RawTabl
     FileError or ColumnError.
     """
     lines = re.split(r"\r\n|\n|\r", text)
-    numbered = [(i, line) for i, line in enumerate(lines, 1) if has_content(line)]
-    numbered = with_headings_of_cells(numbered)
+    filled = [(number, line) for number, line in enumerate(lines, 1) if has_content(line)]
+    numbered = with_headings_of_cells(filled)
     header = parse_header(origin, numbered, text_format)
-    body = [(i, line) for i, line in numbered if not is_comment(line)]
+    body = [(number, line) for number, line in numbered if not is_comment(line)]
     parts = sections(body, header.headings, header.delimiter)
-    if len(parts) == 1 and not parts[0].note:
+    if len(parts) > 1:
+        tables = []
+        for number, part in enumerate(parts, 1):
+            title = part.title or f"table {number}"
+            tables.append(_table_of(f"{origin}, {title}", part.lines, text_format))
+        return tuple(tables)
+    if not parts[0].note:
         rows = body[header.header_lines :]
         cells = parse_columns(origin, header, rows, text_format)
-        return (header.table(origin, cells, [i for i, _ in rows]),)
-    if len(parts) == 1:
-        comments = [(i, line) for i, line in numbered if is_comment(line)]
-        complete = sorted([*comments, *parts[0].lines], key=lambda line: line[0])
-        return (_table_of(origin, complete, text_format).noted(*filter(None, [parts[0].note])),)
-    return tuple(
-        _table_of(f"{origin}, {part.title or f'table {number}'}", part.lines, text_format)
-        for number, part in enumerate(parts, 1)
-    )
+        return (header.table(origin, cells, [number for number, _ in rows]),)
+    comments = [(number, line) for number, line in numbered if is_comment(line)]
+    complete = sorted([*comments, *parts[0].lines], key=operator.itemgetter(0))
+    table = _table_of(origin, complete, text_format)
+    return (table.noted(parts[0].note),)
 
 
 def _table_of(origin: str, numbered: NumberedLines, text_format: TextFormat) -> RawTable:
+    """The table of the lines of one table, with comments."""
     header = parse_header(origin, numbered, text_format)
-    body = [(i, line) for i, line in numbered if not is_comment(line)][header.header_lines :]
-    return header.table(
-        origin, parse_columns(origin, header, body, text_format), [i for i, _ in body]
-    )
+    lines = [(number, line) for number, line in numbered if not is_comment(line)]
+    body = lines[header.header_lines :]
+    cells = parse_columns(origin, header, body, text_format)
+    numbers = [number for number, _ in body]
+    return header.table(origin, cells, numbers)
 
 
 def _header_and_body(

@@ -82,15 +82,23 @@ def resampled(columns: Mapping[str, Array], rate: float) -> tuple[dict[str, Arra
     steps = np.diff(time)
     if len(time) < 2 or not np.all(steps > 0.0):
         raise ColumnError("rows are resampled to a sample rate only where time rises.")
-    grid = time[0] + np.arange(int((time[-1] - time[0]) * rate + 1e-6) + 1) / rate
-    held = np.clip(np.searchsorted(time, grid + 1e-9 / rate, side="right") - 1, 0, None)
+    duration = float(time[-1] - time[0])
+    count = int(duration * rate + 1e-6) + 1
+    grid = time[0] + np.arange(count) / rate
+    before = np.searchsorted(time, grid + 1e-9 / rate, side="right") - 1
+    held = np.clip(before, 0, None)
     uniform: dict[str, Array] = {}
     for name, values in columns.items():
         is_held = bool(np.all(values == np.round(values)))
-        uniform[name] = values[held] if is_held else np.interp(grid, time, values)
+        if is_held:
+            uniform[name] = values[held]
+        else:
+            uniform[name] = np.interp(grid, time, values)
     uniform["time"] = grid
+    shortest = 1e3 * float(steps.min())
+    longest = 1e3 * float(steps.max())
     note = (
-        f"The intervals of the time stamps are {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g}"
-        f" ms; {len(time)} rows are interpolated to {len(grid)} at {rate:.6g} Hz."
+        f"The intervals of the time stamps are {shortest:.4g} to {longest:.4g} ms;"
+        f" {len(time)} rows are interpolated to {count} at {rate:.6g} Hz."
     )
     return uniform, note

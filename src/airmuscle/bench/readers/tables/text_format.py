@@ -265,14 +265,18 @@ def _is_grid_heading(cells: list[str], below: list[list[str]]) -> bool:
     """Whether cells are the headings of a grid: a text and rising numbers, above rows of numbers
     alone.
     """
+    first = cells[0]
     numbers = [cell.replace(",", ".") for cell in cells[1:]]
-    if len(numbers) < MIN_GRID or not cells[0] or header.is_number(cells[0]):
+    if len(numbers) < MIN_GRID or not below:
         return False
-    if not all(map(header.is_number, numbers)) or not any(map(str.isalpha, cells[0])):
+    if header.is_number(first) or not any(map(str.isalpha, first)):
         return False
-    rises = bool(np.all(np.diff([float(number) for number in numbers]) > 0))
-    is_grid = all(len(row) == len(cells) and all(map(header.is_number, row)) for row in below)
-    return rises and bool(below) and is_grid
+    if not all(map(header.is_number, numbers)):
+        return False
+    values = [float(number) for number in numbers]
+    if not np.all(np.diff(values) > 0):
+        return False
+    return all(len(row) == len(cells) and all(map(header.is_number, row)) for row in below)
 
 
 def _is_numeric(cells: list[str]) -> bool:

@@ -61,11 +61,20 @@ def _period(headings: Sequence[str]) -> tuple[int, int]:
     for shared in (0, 1):
         rest = headings[shared:]
         for width in range(2, len(rest) // 2 + 1):
-            groups = [tuple(rest[i : i + width]) for i in range(0, len(rest), width)]
-            is_repeated = len(rest) % width == 0 and len(set(groups)) == 1
-            if is_repeated and len(set(groups[0])) == width and all(groups[0]):
+            if _repeats(rest, width):
                 return shared, width
     return 0, 0
+
+
+def _repeats(headings: Sequence[str], width: int) -> bool:
+    """Whether headings consist of equal groups of a width, of different ones each."""
+    if len(headings) % width:
+        return False
+    first = headings[:width]
+    if not all(first) or len(set(first)) < width:
+        return False
+    groups = range(0, len(headings), width)
+    return all(headings[i : i + width] == first for i in groups)
 
 
 def _labels(table: RawTable) -> list[str]:
@@ -168,16 +177,19 @@ def parse_grid(text: str) -> GridHeadings:
 
 
 def is_grid(table: RawTable) -> bool:
-    """Whether all headings but the first are different numbers, and all cells below are numbers."""
+    """Whether all headings but the first are numbers that rise or fall, and no column numbers."""
     numbers = [heading.replace(",", ".") for heading in table.headings[1:]]
-    if len(numbers) < MIN_GRID or len(table.rows) < MIN_GRID:
+    if min(len(numbers), len(table.rows)) < MIN_GRID:
         return False
-    if is_number(table.headings[0]) or not all(map(is_number, numbers)):
+    if is_number(table.headings[0]):
+        return False
+    if not all(map(is_number, numbers)):
         return False
     values = [float(number) for number in numbers]
     steps = np.diff(values)
-    rises = bool(np.all(steps > 0) or np.all(steps < 0))
-    return rises and not all(value == i for i, value in enumerate(values, 1))
+    is_sorted = bool(np.all(steps > 0) or np.all(steps < 0))
+    is_numbering = values == list(range(1, len(values) + 1))
+    return is_sorted and not is_numbering
 
 
 def grid_of(table: RawTable) -> GridHeadings | None:
