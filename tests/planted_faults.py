@@ -142,7 +142,8 @@ def simulated(name: str, noisy: bool = True) -> Columns:
     schedule = {}
     for i, variable in enumerate(plant.input_variables):
         if variable.name.endswith("setpoint"):
-            levels = (9e4, 1.5e5 - 7e4 * (i % 2), 9e4)
+            size = 1.0 if name == "joint-straight-fibre" else 2.4
+            levels = (9e4 * size, (1.5e5 - 7e4 * (i % 2)) * size, 9e4 * size)
             schedule[variable.name] = tuple(zip((0.0, 2.0, 5.0), levels, strict=True))
     run = am.simulate(plant, am.Schedule(schedule), duration=8.0, output_times=0.01)
     columns = {column: np.array(values) for column, values in run.columns.items()}

@@ -25,7 +25,7 @@ MIN_LEAD = 2.0
 (chosen)."""
 MIN_LEAD_GAIN = 1e-3
 """Least gain of the correlation by that lead (chosen)."""
-MAX_DEAD_TIME = 0.25
+MAX_DEAD_TIME = 0.2
 """Greatest dead time of a pressure regulator [s] (chosen; published ones are below 0.06 s)."""
 MIN_CORRELATION = 0.7
 MAX_DEVIATION = 0.1
@@ -36,6 +36,8 @@ MAX_DROOP = 0.06
 MAX_SUPPLY_DROOP = 0.15
 """Greatest zero of a pressure, greatest loss between holds of one command, both as fractions of the
 range, and greatest loss of the supply pressure (chosen)."""
+LEAST_SPAN = 0.25
+"""Least range to which deviations refer, as a fraction of the greatest command (chosen)."""
 MIN_SETTLED = 20
 """Least number of settled rows that are judged (chosen)."""
 MIN_STUCK = 30
@@ -265,7 +267,7 @@ def _delay(name: str, response: CommandResponse) -> Iterator[RecordFault]:
 def _settled_rows(
     name: str, command: Array, pressure: Array, settled: Array
 ) -> Iterator[RecordFault]:
-    span = float(np.ptp(command))
+    span = max(float(np.ptp(command)), LEAST_SPAN * float(np.max(np.abs(command))))
     rows = np.flatnonzero(settled)
     if len(rows) < MIN_SETTLED:
         return
@@ -342,7 +344,9 @@ def _stuck(name: str, values: Array, noise: float) -> Iterator[RecordFault]:
     others = np.delete(lengths, longest)
     repeats = 1.0 - len(others) / max(len(values) - count, 1)
     if count == len(values):
-        text = f"the {name} has one reading in all {count} rows"
+        if values[0] != 0.0:  # a length, load or pressure that was held and written in every row
+            return
+        text = f"the {name} is zero in all {count} rows"
         yield RecordFault("dead sensor", text, "Check that the sensor is connected.")
     elif count >= MIN_STUCK and repeats < 0.5 and _alternates(values):
         value = values[starts[longest]]
@@ -372,7 +376,11 @@ def _spikes(name: str, values: Array, noise: float) -> Iterator[RecordFault]:
     after = values[2:]
     low, high = np.quantile(values, [0.01, 0.99])
     size = np.abs(values[1:-1] - 0.5 * (before + after))
-    is_alone = np.abs(after - before) < 0.3 * size
+    steps = np.abs(np.diff(values))
+    quiet = 0.3 * size
+    is_alone = np.abs(after - before) < quiet
+    is_alone[1:] &= steps[:-2] < quiet[1:]  # ripple is no spike
+    is_alone[:-1] &= steps[2:] < quiet[:-1]
     limit = max(SPIKE * float(high - low), SPIKE_DEVIATIONS * noise)
     if limit == 0.0:
         return

@@ -19,6 +19,10 @@ MOVED = 0.05
 """Change of a command that counts as none, that of a step, and the change of the pressure that
 shows a response, as fractions of the range of the command (chosen)."""
 
+MIN_STEP = 4e4
+"""Least step of a command whose dead time is judged [Pa] (chosen): regulators leave smaller ones
+inside their dead band."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CommandResponse:
@@ -26,7 +30,7 @@ class CommandResponse:
 
     delay        [s] of the pressure, at which both agree best; negative where it precedes
     correlation  at this delay; lead_gain: by how much it exceeds that without delay
-    dead_time    [s] median time from a step of the command to the first motion, None without steps
+    dead_time    [s] shortest time from a step of the command to the first motion, None without steps
     settled      rows (N,) whose command has not changed for a while
     """
 
@@ -89,7 +93,9 @@ def _settled(time: Array, command: Array) -> Array:
 
 
 def _dead_time(time: Array, command: Array, pressure: Array) -> float | None:
-    """The median time from a step of the command until the pressure moves towards it."""
+    """The shortest time from a step of the command until the pressure moves towards it: other
+    muscles of a joint may delay it, nothing hastens it.
+    """
     span = float(np.ptp(command))
     jumps = np.diff(command)
     rows = np.flatnonzero(np.abs(jumps) > STEP * span) + 1
@@ -97,6 +103,8 @@ def _dead_time(time: Array, command: Array, pressure: Array) -> float | None:
     times = []
     for row, end in zip(rows, ends, strict=True):
         jump = float(jumps[row - 1])
+        if abs(jump) < MIN_STEP:
+            continue
         motion = np.sign(jump) * (pressure[row:end] - pressure[row - 1])
         goal = max(MOVED * span, STEP * abs(jump))
         late = np.flatnonzero(motion > goal)
@@ -105,4 +113,4 @@ def _dead_time(time: Array, command: Array, pressure: Array) -> float | None:
             times.append(float(time[first] - time[row]))
     if not times:
         return None
-    return float(np.median(times))
+    return min(times)

@@ -36,6 +36,7 @@ import numpy as np
 from ...core import Array, ColumnError, FileError, alternatives, check_known, counted, quantity
 from ..readers import Arrays, read_toml
 from .episode_formats import find_episode_files, read_arrays
+from .episode_units import QUESTION, UNITS
 from .episodes import Episode, Episodes, join, speed_of
 
 TABLES = ("angles", "speeds", "pressures", "commands", "arm")
@@ -51,21 +52,6 @@ SAME_TIME = 0.02
 """Difference of the decimal logarithms of two sample times, over 3, up to which they are the same
 (chosen).
 """
-_DEGREE = 0.017453292519943295
-UNITS = {
-    "angles": {"rad": 1.0, "deg": _DEGREE},
-    "speeds": {"rad": 1.0, "deg": _DEGREE, "rad/s": 1.0, "deg/s": _DEGREE, "rpm": 6.0 * _DEGREE},
-    "pressures": {
-        "Pa": 1.0,
-        "hPa": 100.0,
-        "kPa": 1e3,
-        "MPa": 1e6,
-        "bar": 1e5,
-        "mbar": 100.0,
-        "psi": 6894.757293168361,
-    },
-}
-"""Units of gauge pressures, angles and their speeds, in SI units."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,6 +151,11 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
             f'{path}: {name}.columns must be a name or a list of names, columns = ["q1", "q2"].'
         )
     allowed = UNITS.get(name, {})
+    if table.get("unit") == QUESTION:
+        raise FileError(
+            f"{path}: the unit of the {name} is open. Write it in place of the question mark, one"
+            f" of {', '.join(allowed)}; the comment beside it says which are possible."
+        )
     if "unit" in table and table["unit"] not in tuple(allowed):
         raise FileError(
             f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}."

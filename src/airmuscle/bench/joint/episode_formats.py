@@ -14,8 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Array, ColumnError, FileError
+from ...recording import read_heading
 from ..readers import EPISODE_EXTENSIONS, TEXT, Arrays, Selection, arrays_of_table, format_of
 from .episode_inspection import TURN
+from .episode_units import QUESTION, UNITS
 
 METADATA = "metadata.yaml"
 MAX_GAP = 5.0
@@ -118,8 +120,20 @@ ROLES = {
 """Words in the names of arrays, by what they contain; the first role whose word a name has."""
 STEP_WORDS = {"sample", "time", "dt", "step", "period"}
 """Words in the name of a single number that is the sample time [s]."""
-PRESSURE_SCALES = ((30.0, "1 bar"), (3000.0, "1 kPa"))
-"""Units of pressures that stay below a limit (chosen); others are Pa, or counts."""
+USUAL_PRESSURES = (2e4, 2e6)
+"""Range of the greatest pressure of a record [Pa] in which a unit is possible (chosen)."""
+SIZES_OF_UNITS = 3000.0
+"""Numbers above which pressures are in Pa, or counts (chosen)."""
+PRESSURE_UNITS = {"bar": 1e5, "kPa": 1e3, "MPa": 1e6, "psi": 6894.757293168361}
+"""Units of pressures that are offered [Pa]."""
+ROLES_OF_QUANTITIES = {
+    "pressure": "pressures",
+    "setpoint": "commands",
+    "angle": "angles",
+    "angular_speed": "speeds",
+    "time": "time",
+}
+"""Roles of the quantities that the words of a name state."""
 
 
 def propose_mapping(source: str | Path) -> str:
@@ -156,8 +170,20 @@ def propose_mapping(source: str | Path) -> str:
 
 
 def _role(name: str) -> str:
+    """The role of an array by the words in its name."""
     words = set(re.findall("[a-z]+", name.lower()))
-    return next((role for role, known in ROLES.items() if words & set(known.split())), "")
+    role = next((role for role, known in ROLES.items() if words & set(known.split())), "")
+    reading = None if role else read_heading(name)
+    return role if reading is None else ROLES_OF_QUANTITIES.get(reading.quantity, "")
+
+
+def _unit_in_names(names: Sequence[str]) -> str:
+    """The unit that the names of arrays state alike, `wrist_angle_deg`; empty if they state none."""
+    units = set[str]()
+    for name in names:
+        reading = read_heading(name)
+        units.add("" if reading is None else reading.unit or "")
+    return units.pop() if len(units) == 1 else ""
 
 
 def _size(names: Iterable[str], arrays: Arrays) -> float:
@@ -194,17 +220,25 @@ def _sample_time(arrays: Arrays, names_by_role: Mapping[str, list[str]]) -> str:
 
 
 def _scale(role: str, names_by_role: Mapping[str, list[str]], arrays: Arrays) -> list[str]:
+    stated = _unit_in_names(names_by_role[role])
+    if stated in UNITS.get(role, {}):
+        return [f'unit = "{stated}"  # by the names']
     if role in ("angles", "speeds"):
         unit = "deg" if _size(names_by_role["angles"], arrays) > TURN else "rad"
         return [f'unit = "{unit}"  # guessed from the size of the angles']
     if role == "commands":
         return []
     divisors = [f'divisors = "{name}"' for name in arrays if _role(name) == "divisors"]
-    unit = next(
-        (unit for limit, unit in PRESSURE_SCALES if _size(names_by_role[role], arrays) < limit),
-        "1 Pa",
-    )
-    return [
-        *divisors,
-        f'scale = "{unit}"  # guessed from the size; counts need the pressure of one count',
-    ]
+    return [*divisors, _unit_of_pressures(_size(names_by_role[role], arrays))]
+
+
+def _unit_of_pressures(size: float) -> str:
+    """The line for the unit of pressures of a size: a question where several are possible."""
+    if size >= SIZES_OF_UNITS:
+        return 'scale = "1 Pa"  # guessed from the size; counts need the pressure of one count'
+    low, high = USUAL_PRESSURES
+    possible = [unit for unit, factor in PRESSURE_UNITS.items() if low <= size * factor <= high]
+    if len(possible) == 1:
+        return f'unit = "{possible[0]}"  # guessed: no other unit gives a usual pressure'
+    offered = possible or list(PRESSURE_UNITS)
+    return f'unit = "{QUESTION}"  # {" or ".join(offered)}? the numbers reach {size:.3g}'
