@@ -260,6 +260,10 @@ def test_a_mapping_is_proposed_from_names_and_sizes(tmp_path, mapping):
         note=np.zeros(3),
     )
     text = propose_mapping(tmp_path / "all.npz")
+    assert 'unit = "?"  # bar or psi? the numbers reach' in text
+    with pytest.raises(FileError, match="the unit of the pressures is open"):
+        read_episodes(tmp_path / "all.npz", mapping(text))
+    text = text.replace('unit = "?"', 'unit = "bar"')
     read = read_episodes(tmp_path / "all.npz", mapping(text))
     assert read.sample_time == pytest.approx(
         STEP, rel=0.05

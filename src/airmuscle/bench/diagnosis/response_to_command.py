@@ -30,7 +30,8 @@ class CommandResponse:
 
     delay        [s] of the pressure, at which both agree best; negative where it precedes
     correlation  at this delay; lead_gain: by how much it exceeds that without delay
-    dead_time    [s] shortest time from a step of the command to the first motion, None without steps
+    dead_time    [s] shortest time from a step of the command to the first motion; None without
+                 steps
     settled      rows (N,) whose command has not changed for a while
     """
 

@@ -178,7 +178,7 @@ def _role(name: str) -> str:
 
 
 def _unit_in_names(names: Sequence[str]) -> str:
-    """The unit that the names of arrays state alike, `wrist_angle_deg`; empty if they state none."""
+    """The unit that all names of arrays state, `wrist_angle_deg`; empty if they state none."""
     units = set[str]()
     for name in names:
         reading = read_heading(name)
