@@ -135,7 +135,7 @@ def test_a_folder_without_a_readable_file_is_refused_with_each_reason(tmp_path):
     (tmp_path / "a.csv").write_text("nothing\n", encoding="utf-8")
     done = run(tmp_path, "--out", tmp_path / "out")
     assert done.exit_code == 1
-    assert "no file of the campaign could be read. a.csv" in done.stderr
+    assert "no file of the campaign could be read (1 text).\n1 file: a.csv" in done.stderr
 
 
 def test_contradictory_units_are_refused(tmp_path):

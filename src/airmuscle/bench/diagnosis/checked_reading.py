@@ -52,8 +52,9 @@ def read(
     stated = as_mapping(mapping, fields)
     parts = [read_one(path, stated, downsampling, progress) for path in find_files(source)]
     recordings = [recording for part in parts for recording in part.recordings]
-    present = {name for part in parts for name in part.present}
-    check_mapped_columns(stated, present, parts[0].table)
+    if len(parts) > 1 or not stated.sections:  # a dictionary of a rig names more than one file has
+        present = {name for part in parts for name in part.present}
+        check_mapped_columns(stated, present, parts[0].table)
     return tuple(complete_bench(recordings, stated))
 
 

@@ -84,7 +84,8 @@ def read_rig(
         paths += [path] * len(part.recordings)
         present |= part.present
         table = table or part.table
-    if table is not None and not failures:
+    is_dictionary = bool(mapping.sections) and len(set(paths)) < 2
+    if table is not None and not failures and not is_dictionary:
         check_mapped_columns(mapping, present, table)
     return RigFiles(tuple(recordings), tuple(paths), tuple(failures))
 
@@ -100,7 +101,7 @@ def kind_of_file(path: Path) -> str:
 def _cause(failure: Failure) -> str:
     """The cause of a failure without the name of its file and without numbers."""
     text = str(failure.error.message)
-    for name in (str(failure.path), failure.path.name, failure.path.stem):
+    for name in (str(failure.path), failure.path.name):
         text = text.replace(name, "")
     return re.sub(r"\d+(\.\d+)?", "#", text)
 

@@ -12,10 +12,9 @@ import numpy as np
 from ...bench.campaign import Campaign, LeftOutStage, StaticStage, ValidationRow, identify_campaign
 from ...bench.campaign.campaign_chapters import campaign_chapters, stage_data
 from ...bench.diagnosis.checked_reading import complete_bench
-from ...bench.readers import ColumnMapping
-from ...bench.readers.reader import find_files, read_file
-from ...core import atomic_folder, check_writable
-from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
+from ...bench.readers import ColumnMapping, describe_files, find_files, read_file, read_rig
+from ...core import atomic_folder, check_writable, counted, listed
+from ...core.errors import ColumnError, FileError, IdentificationError
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
 from ...files.scenario.write import campaign_scenarios
 from ...physics.muscle.geometry import Braid, Geometry
@@ -162,22 +161,25 @@ def _other_muscles(result: Campaign) -> dict[str, str]:
 def _read_each(
     files: Sequence[Path], mapping: ColumnMapping
 ) -> tuple[list[Recording], list[tuple[str, str]]]:
-    """The recordings, and the files that cannot be read with the reason. Raises FileError if none
-    can be read.
+    """The recordings, and the files that cannot be read with the reason, each reason once. Raises
+    FileError if none can be read.
     """
-    recordings = list[Recording]()
-    unread = list[tuple[str, str]]()
     with progress_bars("reading") as show:
-        for i, path in enumerate(files):
-            show("files", i / len(files))
-            try:
-                recordings += read_file(path, mapping)
-            except AirmuscleError as error:
-                unread.append((path.name, in_options(error.message, "campaign")))
-    if not recordings:
-        reasons = (reason if name in reason else f"{name}: {reason}" for name, reason in unread)
-        raise FileError(f"no file of the campaign could be read. {' '.join(reasons)}")
-    return recordings, unread
+        rig = read_rig(files, mapping, progress=show)
+    unread = []
+    for message, paths in rig.causes():
+        names = listed([path.name for path in paths])
+        unread.append((names, in_options(message, "campaign")))
+    if not rig.recordings:
+        reasons = "\n".join(
+            f"{counted(len(paths), 'file')}: {in_options(message, 'campaign')}"
+            for message, paths in rig.causes()
+        )
+        raise FileError(
+            f"no file of the campaign could be read ({describe_files(files)}).\n{reasons}\n"
+            "`airmuscle inspect` proposes a mapping for all of them."
+        )
+    return list(rig.recordings), unread
 
 
 def _identify(
