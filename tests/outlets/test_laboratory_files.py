@@ -57,6 +57,7 @@ ROWS = (
 )
 SHORTENING = {"Weg": "shortening [mm]"}
 READING = (
+    "check",
     "inspect",
     "fit",
     "hysteresis",
