@@ -448,7 +448,11 @@ def read_heading(text: str, unit_below: str = "") -> Reading | None:
         quantity = _chosen([name for _, name in letters[:1]], unit)
         named = letters[:1] if quantity else []
     is_commanded = bool(set(tokens) & _SETS["commanded"])
-    if by_letter and (is_commanded or MATRIX_COLUMN.search(text)):  # the side of `cmd_L`
+    is_component = quantity in ("position", "angle") and unit is None and len(tokens) > 1
+    if by_letter and (is_component or is_commanded):  # of a vector, or the side of `cmd_L`
+        quantity = ""
+        named = []
+    if by_letter and MATRIX_COLUMN.search(text):
         quantity = ""
         named = []
     qualifiers = _qualifiers(tokens, {i for i, _ in named})

@@ -17,10 +17,12 @@ class ReadColumn:
 
     heading  with quantity and unit, as they are read
     reading  of the words of the heading; None where its whole name is a quantity, or no word is one
+    is_first whether it is the first column of its table
     """
 
     heading: Heading
     reading: Reading | None = None
+    is_first: bool = False
 
     @property
     def is_open(self) -> bool:
@@ -40,6 +42,7 @@ def read_columns(table: RawTable, user_units: Mapping[str, str]) -> list[ReadCol
             columns.append(ReadColumn(Heading(text, text, None, False)))
         else:
             columns.append(_column(text, below, user_units))
+    columns[:1] = [dataclasses.replace(column, is_first=True) for column in columns[:1]]
     return _named_apart(_one_time(columns))
 
 

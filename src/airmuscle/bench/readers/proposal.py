@@ -6,6 +6,7 @@ What several readings fit is a question, written as '?', which the user answers 
 
 import dataclasses
 import json
+import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -86,14 +87,21 @@ class Proposal:
     columns: tuple[ProposedColumn, ...] = ()
     unused: tuple[str, ...] = ()
     grid: str = ""
+    decimal: str = ""
 
     def __bool__(self) -> bool:
-        return bool(self.columns or self.grid)
+        return bool(self.columns or self.grid or self.decimal)
 
     @property
     def questions(self) -> int:
         """Number of lines that the user must answer."""
         return sum(column.is_question for column in self.columns) + (QUESTION in self.grid)
+
+    @property
+    def open_units(self) -> list[str]:
+        """The quantities whose unit is open."""
+        names = [c.reading.partition(" [")[0] for c in self.columns if f"[{QUESTION}]" in c.reading]
+        return list(dict.fromkeys(name.rpartition(".")[2] for name in names if name != QUESTION))
 
     @property
     def toml(self) -> str:
@@ -103,6 +111,9 @@ class Proposal:
             lines.append(f"# answer each {QUESTION} : it stands for what the file does not state")
         if self.grid:
             lines.append(f"grid = {json.dumps(self.grid)}  # cells over first column, headings")
+        if self.decimal:
+            remark = "guess: the last dot is the decimal point; ',' if all separate thousands"
+            lines.append(f"decimal = {json.dumps(self.decimal)}  # {remark}")
         if self.columns:
             lines += ["[columns]", *(column.line for column in self.columns)]
         if self.unused:
@@ -112,14 +123,12 @@ class Proposal:
     @property
     def options(self) -> str:
         """The same as options of a command."""
-        grid = [f"--grid {shlex.quote(self.grid)}"] if self.grid else []
-        return " ".join(
-            grid
-            + [
-                f"--column {shlex.quote(f'{column.key}={column.reading}')}"
-                for column in self.columns
-            ]
-        )
+        stated = [f"--decimal {self.decimal}"] if self.decimal else []
+        if self.grid:
+            stated.append(f"--grid {shlex.quote(self.grid)}")
+        for column in self.columns:
+            stated.append(f"--column {shlex.quote(f'{column.key}={column.reading}')}")
+        return " ".join(stated)
 
 
 def propose(path: str | Path, mapping: ColumnMapping = ColumnMapping()) -> Proposal:
@@ -129,13 +138,28 @@ def propose(path: str | Path, mapping: ColumnMapping = ColumnMapping()) -> Propo
     path = Path(path)
     numbered = dataclasses.replace(mapping, columns={**mapping.columns, 1: ""})
     tables = read_tables(path, numbered, Decimation())
+    decimal = ""
+    if mapping.decimal is None and any(map(_has_dots_for_thousands, tables)):
+        decimal = "."
+        numbered = dataclasses.replace(numbered, decimal=decimal)
+        tables = read_tables(path, numbered, Decimation())
     parts = []
     for table in tables:
         parts += [propose_for_table(part, mapping) for part in split_groups(table)]
     lines = {column.key: column for part in parts for column in part.columns}
     unused = dict.fromkeys(name for part in parts for name in part.unused)
     grid = next((part.grid for part in parts if part.grid), "")
-    return Proposal(path.name, tuple(lines.values()), tuple(unused), grid)
+    return Proposal(path.name, tuple(lines.values()), tuple(unused), grid, decimal)
+
+
+_DOTS = re.compile(r"[-+]?\d{1,3}(\.\d{3}){2,}")
+"""A number with dots for thousands and for decimals, or for thousands alone."""
+
+
+def _has_dots_for_thousands(table: RawTable) -> bool:
+    """Whether numbers of a table have several dots, `1.003.000`."""
+    texts = (cells for cells in table.columns if isinstance(cells, list))
+    return any(_DOTS.fullmatch(cell) for cells in texts for cell in cells)
 
 
 def propose_for_table(table: RawTable, mapping: ColumnMapping) -> Proposal:
@@ -213,8 +237,16 @@ def _line(
     is_of_matrix = MATRIX_COLUMN.search(heading.text) is not None
     if (is_understood and not is_of_matrix) or isinstance(cells, list):
         return None
+    guess = guessed_time_unit(cells) if column.is_first and not _is_counter(cells) else None
+    if guess is not None:
+        return ProposedColumn(key, f"time [{guess.unit}]", "guess: it rises evenly")
     remark = f"quantity and unit, or empty to leave out; {_description(cells)}"
     return ProposedColumn(key, QUESTION, remark)
+
+
+def _is_counter(cells: Cells) -> bool:
+    """Whether a column counts rows."""
+    return not isinstance(cells, list) and bool(np.all(np.diff(cells) == 1.0))
 
 
 def _with_unit(key: str, name: str, cells: Cells) -> ProposedColumn:
@@ -261,4 +293,5 @@ def merged(proposals: Iterable[Proposal]) -> Proposal:
         ", ".join(names),
         tuple(lines.values()),
         grid=grids[0] if grids else "",
+        decimal="".join({proposal.decimal for proposal in files})[:1],
     )

@@ -120,5 +120,7 @@ def print_mapping(
     ask = f"; answer its {open_count} question marks" if open_count else ""
     echo(f"\nA mapping for what the files do not state ({verb}{ask}):\n")
     echo(proposal.toml)
-    echo(f"then: airmuscle inspect {names} --mapping {shlex.quote(target)}")
+    answers = " ".join(f"--unit {quantity}=..." for quantity in proposal.open_units)
+    then = f"then: airmuscle inspect {names} --mapping {shlex.quote(target)}"
+    echo(f"{then} {answers}  # one answer for all columns of a quantity" if answers else then)
     echo(f"or:   airmuscle inspect {names} {proposal.options}")

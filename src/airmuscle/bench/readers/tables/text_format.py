@@ -269,14 +269,20 @@ def _is_grid_heading(cells: list[str], below: list[list[str]]) -> bool:
     numbers = [cell.replace(",", ".") for cell in cells[1:]]
     if len(numbers) < MIN_GRID or not below:
         return False
-    if header.is_number(first) or not any(map(str.isalpha, first)):
+    if first and not any(map(str.isalpha, first)):
         return False
     if not all(map(header.is_number, numbers)):
         return False
     values = [float(number) for number in numbers]
-    if not np.all(np.diff(values) > 0):
+    steps = np.diff(values)
+    if not (np.all(steps > 0) or np.all(steps < 0)):
         return False
-    return all(len(row) == len(cells) and all(map(header.is_number, row)) for row in below)
+    return all(len(row) == len(cells) and _is_grid_row(row) for row in below)
+
+
+def _is_grid_row(cells: list[str]) -> bool:
+    """Whether cells are a number, and numbers or empty cells."""
+    return bool(cells[0]) and all(header.is_number(cell) for cell in cells if cell)
 
 
 def _is_numeric(cells: list[str]) -> bool:
