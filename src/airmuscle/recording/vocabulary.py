@@ -513,21 +513,24 @@ def _quantity(token: str) -> str:
 def _with_unit_inside(
     tokens: list[str], named: list[tuple[int, str]]
 ) -> tuple[list[str], list[tuple[int, str]], str | None]:
-    """The words without the one, or the two, at their end or beginning that are a unit."""
+    """The words without the last two, or the last, where they are a unit that fits the others."""
     for count in (2, 1):
-        if len(tokens) <= count - 1:
+        first = len(tokens) - count
+        if first < 0:
             continue
-        tail = "".join(tokens[-count:])
+        tail = "".join(tokens[first:])
         unit = _UNITS.get(tail)
-        taken = range(len(tokens) - count, len(tokens))
-        if unit is None or (count == 2 and any(i in taken for i, _ in named)):
+        before = [(i, name) for i, name in named if i < first]
+        is_word_of_quantity = len(before) < len(named)
+        if unit is None or (count == 2 and is_word_of_quantity):
             continue
-        rest = [(i, name) for i, name in named if i not in taken]
-        letters = [_LETTERS[token] for token in tokens[:-count] if token in _LETTERS]
-        fits = _chosen([name for _, name in rest] or letters[:1], unit)
-        alone = len(tokens) == count
-        if fits or alone or len(tail) > 1:
-            return tokens[:-count], rest if not alone else named, unit
+        if first == 0:
+            return [], named, unit
+        names = [name for _, name in before]
+        if not names:
+            names = [_LETTERS[token] for token in tokens[:first] if token in _LETTERS][:1]
+        if _chosen(names, unit) or len(tail) > 1:
+            return tokens[:first], before, unit
     return tokens, named, None
 
 

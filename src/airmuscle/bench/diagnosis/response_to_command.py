@@ -8,6 +8,8 @@ from ...core import Array
 
 MAX_LAG = 2.0
 """Greatest delay that is sought [s] (chosen)."""
+MIN_ROWS = 20
+"""Least number of rows that are judged (chosen)."""
 MAX_LAGS = 400
 """Greatest number of delays that are tried (chosen)."""
 SETTLED_TIME = 0.5
@@ -47,23 +49,28 @@ def command_response(time: Array, command: Array, pressure: Array) -> CommandRes
     command or the pressure does not vary, or time does not rise.
     """
     steps = np.diff(time)
-    if len(time) < 20 or not (np.all(steps > 0.0) and np.ptp(command) > 0 and np.ptp(pressure) > 0):
+    if len(time) < MIN_ROWS or not np.all(steps > 0.0):
+        return None
+    if not (np.ptp(command) > 0.0 and np.ptp(pressure) > 0.0):
         return None
     step = float(np.median(steps))
     uniform = np.arange(time[0], time[-1], step)
-    held = command[np.clip(np.searchsorted(time, uniform, side="right") - 1, 0, None)]
+    rows = np.searchsorted(time, uniform, side="right") - 1
+    held = command[np.clip(rows, 0, None)]
     response = np.interp(uniform, time, pressure)
     most = min(int(MAX_LAG / step), len(uniform) // 3)
     stride = max(1, most // MAX_LAGS)
-    lags = np.arange(-most // stride, most // stride + 1) * stride
+    count = most // stride
+    lags = stride * np.arange(-count, count + 1)
     values = np.array([_correlation(held, response, int(lag)) for lag in lags])
     best = int(np.argmax(values))
+    without_delay = float(values[count])
     return CommandResponse(
-        float(lags[best] * step),
-        float(values[best]),
-        float(values[best] - values[int(np.argmin(np.abs(lags)))]),
-        _dead_time(time, command, pressure),
-        _settled(time, command),
+        delay=float(lags[best] * step),
+        correlation=float(values[best]),
+        lead_gain=float(values[best]) - without_delay,
+        dead_time=_dead_time(time, command, pressure),
+        settled=_settled(time, command),
     )
 
 

@@ -475,20 +475,23 @@ def _misspelt(text: str) -> str:
 
 def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
     """Keep the numbers of a few different texts that repeat; the note on a column of texts."""
-    labels = fixed.label_texts(cells)
-    values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
     bad = [cell for cell in cells if cell.strip() and not is_number(cell)]
     if len(bad) < len(cells) / 2:
-        examples = listed([f"'{text}'" for text in dict.fromkeys(bad)], MAX_QUOTED)
+        quoted = [f"'{text}'" for text in dict.fromkeys(bad)]
         return (
-            f"{len(bad)} of {len(cells)} cells of '{heading.text}' are no numbers ({examples}),"
-            " so that the column is not read."
+            f"{len(bad)} of {len(cells)} cells of '{heading.text}' are no numbers"
+            f" ({listed(quoted, MAX_QUOTED)}), so that the column is not read."
         )
-    if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
+    labels = fixed.label_texts(cells)
+    values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    is_few = 2 <= values.size <= MAX_LABELS
+    if not is_few or counts.min() < MIN_LABEL_ROWS:
         return f"Column '{heading.text}' contains text and is ignored."
     columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
-    texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
-    return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."
+    named = []
+    for number, value in enumerate(values.tolist(), 1):
+        named.append(f"{number} {value or 'empty'}")
+    return f"Column '{heading.text}' contains text and is kept as numbers: {', '.join(named)}."
 
 
 def _field_note(heading: Heading) -> str:

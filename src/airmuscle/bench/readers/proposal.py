@@ -166,23 +166,28 @@ def propose_for_table(table: RawTable, mapping: ColumnMapping) -> Proposal:
     """The mapping that completes a table."""
     if mapping.grid is None and is_grid(table):
         grid = grid_of(table) or UNKNOWN_GRID
-        return Proposal(table.origin, grid=grid.text if QUESTION in grid.text else "")
-    few = table.of_rows(np.arange(min(len(table.rows), MAX_ROWS)))
+        is_open = QUESTION in grid.text
+        return Proposal(table.origin, grid=grid.text if is_open else "")
+    rows = min(len(table.rows), MAX_ROWS)
+    few = table.of_rows(np.arange(rows))
     columns = read_columns(few, quantities_of_units(mapping.units))
     counts = Counter(few.headings)
     names = _names(columns)
+    mapped = set(map(str, mapping.columns))
     is_understood = any(column.heading.known or column.is_open for column in columns)
     lines = []
     unused = []
     for i, (column, cells) in enumerate(zip(columns, few.columns, strict=True)):
         text = column.heading.text
-        key = text if text and counts[text] == 1 else str(few.number(i))
-        if {text, str(few.number(i))} & set(map(str, mapping.columns)):
+        number = str(few.number(i))
+        if mapped & {text, number}:
             continue
+        key = text if text and counts[text] == 1 else number
         line = _line(key, names[i], column, cells, is_understood)
+        is_left_out = not column.heading.known and not isinstance(cells, list)
         if line is not None:
             lines.append(line)
-        elif not column.heading.known and text and not isinstance(cells, list):
+        elif text and is_left_out:
             unused.append(text)
     return Proposal(table.origin, tuple(lines), tuple(unused))
 
