@@ -36,6 +36,8 @@ MAX_DROOP = 0.06
 MAX_SUPPLY_DROOP = 0.15
 """Greatest zero of a pressure, greatest loss between holds of one command, both as fractions of the
 range, and greatest loss of the supply pressure (chosen)."""
+LEVEL_STEP = 0.02
+"""Width of a level of the command, as a fraction of its range (chosen)."""
 LEAST_SPAN = 0.25
 """Least range to which deviations refer, as a fraction of the greatest command (chosen)."""
 MIN_SETTLED = 20
@@ -267,34 +269,44 @@ def _delay(name: str, response: CommandResponse) -> Iterator[RecordFault]:
 def _settled_rows(
     name: str, command: Array, pressure: Array, settled: Array
 ) -> Iterator[RecordFault]:
+    """What the rows say whose command has not changed for a while."""
     span = max(float(np.ptp(command)), LEAST_SPAN * float(np.max(np.abs(command))))
     rows = np.flatnonzero(settled)
     if len(rows) < MIN_SETTLED:
         return
     deviation = (pressure - command)[rows] / span
-    level = np.round((command[rows] - command.min()) / span / 0.02)
-    droop = 0.0
-    for value in np.unique(level):
-        of_level = deviation[level == value]
-        if value > 0 and len(of_level) >= MIN_SETTLED:
-            quarter = max(len(of_level) // 4, 3)
-            change = np.median(of_level[-quarter:]) - np.median(of_level[:quarter])
-            droop = max(droop, -float(change))
+    level = np.round((command[rows] - command.min()) / (LEVEL_STEP * span))
+    droop = _droop(deviation, level)
     if droop > MAX_DROOP:
         text = f"at one command, the {name} falls by {100 * droop:.0f} % of the range"
         yield RecordFault("supply", text, "Check the supply, and the tightness.")
         return
-    lowest = deviation[level == level.min()]
-    highest = deviation[level == level.max()]
-    zero = float(np.median(lowest))
-    gain = float(np.median(highest)) - zero
+    zero = float(np.median(deviation[level == level.min()]))
+    gain = float(np.median(deviation[level == level.max()])) - zero
+    typical = float(np.median(np.abs(deviation)))
     if abs(zero) > MAX_ZERO and abs(gain) < MAX_ZERO:
         text = f"the {name} differs from its command by {100 * zero:.1f} % of the range everywhere"
         yield RecordFault("zero", text, "Set the zero of the sensor.")
-    elif float(np.median(np.abs(deviation))) > MAX_DEVIATION or abs(gain) > MAX_DEVIATION:
+    elif max(typical, abs(gain)) > MAX_DEVIATION:
         worst = float(deviation[np.argmax(np.abs(deviation))])
         text = f"settled, the {name} differs by up to {100 * worst:.0f} % of the range"
         yield RecordFault("following", text, "Check the supply pressure and the scale.")
+
+
+def _droop(deviation: Array, level: Array) -> float:
+    """The greatest fall of a pressure from the first to the last holds of one command, as a
+    fraction of the range.
+    """
+    droop = 0.0
+    for value in np.unique(level[level > 0]):
+        of_level = deviation[level == value]
+        if len(of_level) < MIN_SETTLED:
+            continue
+        quarter = max(len(of_level) // 4, 3)
+        first = float(np.median(of_level[:quarter]))
+        last = float(np.median(of_level[-quarter:]))
+        droop = max(droop, first - last)
+    return droop
 
 
 def _supply(subject: _Subject) -> Iterator[RecordFault]:

@@ -172,9 +172,13 @@ def propose_mapping(source: str | Path) -> str:
 def _role(name: str) -> str:
     """The role of an array by the words in its name."""
     words = set(re.findall("[a-z]+", name.lower()))
-    role = next((role for role, known in ROLES.items() if words & set(known.split())), "")
-    reading = None if role else read_heading(name)
-    return role if reading is None else ROLES_OF_QUANTITIES.get(reading.quantity, "")
+    for role, known in ROLES.items():
+        if words & set(known.split()):
+            return role
+    reading = read_heading(name)
+    if reading is None:
+        return ""
+    return ROLES_OF_QUANTITIES.get(reading.quantity, "")
 
 
 def _unit_in_names(names: Sequence[str]) -> str:
