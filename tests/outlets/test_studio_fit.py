@@ -974,9 +974,13 @@ def sheet_of(app, name, content, **settings):
 @pytest.mark.parametrize("folder", ["episodes/", "a/b/", ""])
 def test_an_archive_of_episodes_is_read_by_the_mapping_that_is_proposed(app, folder):
     _, answer = sheet_of(app, "episodes.zip", archive(folder))
+    asked = answer.json()
+    assert not asked["ready"]
+    assert 'columns = ["pressure1", "pressure2"]\nunit = "?"  # kPa or psi?' in asked["mapping"]
+    mapping = asked["mapping"].replace('unit = "?"', 'unit = "kPa"')
+    _, answer = sheet_of(app, "episodes.zip", archive(folder), mapping=mapping)
     sheet = answer.json()
     assert sheet["ready"], sheet["problems"]
-    assert 'columns = ["pressure1", "pressure2"]\nscale = "1 kPa"' in sheet["mapping"]
     text = " ".join(sheet["lines"])
     assert text.startswith("20 episodes of 95 rows at 100")
     assert "pressure 1 raises angle 1 (t = " in text
@@ -986,7 +990,10 @@ def test_several_files_are_a_folder_of_episodes(app):
     files = upload(app, "00.csv", csv(MADE.runs[0]).encode()).json()["set"]
     for number, run in enumerate(MADE.runs[1:], start=1):
         upload(app, f"{number:02d}.csv", csv(run).encode(), files)
-    sheet = post(app, "read", set=files, settings={"record": "arm"}).json()
+    asked = post(app, "read", set=files, settings={"record": "arm"}).json()
+    mapping = asked["mapping"].replace('unit = "?"', 'unit = "kPa"')
+    settings = {"record": "arm", "mapping": mapping}
+    sheet = post(app, "read", set=files, settings=settings).json()
     assert sheet["ready"]
     assert "20 episodes from 20 files (.csv)" in sheet["lines"]
 

@@ -269,7 +269,7 @@ def _is_grid_heading(cells: list[str], below: list[list[str]]) -> bool:
     numbers = [cell.replace(",", ".") for cell in cells[1:]]
     if len(numbers) < MIN_GRID or not below:
         return False
-    if first and not any(map(str.isalpha, first)):
+    if header.is_number(first) or not any(map(str.isalpha, first)):
         return False
     if not all(map(header.is_number, numbers)):
         return False
