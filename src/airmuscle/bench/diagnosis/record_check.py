@@ -481,8 +481,10 @@ def _sizes(subject: _Subject) -> Iterator[RecordFault]:
 
 def _suspicious(subject: _Subject) -> Iterator[RecordFault]:
     """What no muscle explains, by the checks of a bench."""
+    remedies = {rule.name: rule.remedy for rule in VALUE_RULES}
     for finding in apply_rules(VALUE_RULES, bench_data([subject.recording])):
-        yield RecordFault("value", finding.text, finding.rule)
+        remedy = remedies[finding.rule]
+        yield RecordFault("value", finding.text, f"{remedy[0].upper()}{remedy[1:]}.")
 
 
 RULES: Sequence[Rule] = (
