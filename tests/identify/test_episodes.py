@@ -597,3 +597,30 @@ def test_a_window_reads_no_pressure_after_its_end():
     windows = cut(ramp, delay=3)
     assert windows.pressure[0, 10, 0] == windows.first[0] + 3
     assert windows.pressure[0, -4:, 0].tolist() == [windows.first[0] + 40.0] * 4
+
+
+def test_a_dataset_of_lerobot_is_read_with_the_names_of_its_features(tmp_path, mapping):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    names = ["elbow_angle_deg", "p_upper_kPa", "p_lower_kPa"]
+    info = {"fps": 1 / STEP, "features": {"observation.state": {"names": names}}}
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "info.json").write_text(json.dumps(info), encoding="utf-8")
+    chunk = tmp_path / "data" / "chunk-000"
+    chunk.mkdir(parents=True)
+    angle = np.degrees(MADE.rows("angle")[:, 0])
+    pressure = MADE.rows("pressure")[:, :2] / 1e3
+    state = np.column_stack([angle, pressure])
+    index = np.concatenate([np.full(len(run), i) for i, run in enumerate(MADE.runs)])
+    table = {
+        "observation.state": state.tolist(),
+        "timestamp": np.concatenate([STEP * np.arange(len(run)) for run in MADE.runs]),
+        "episode_index": index,
+    }
+    parquet.write_table(pyarrow.table(table), chunk / "episode_000000.parquet")
+    text = propose_mapping(tmp_path)
+    assert 'unit = "deg"  # by the names' in text
+    assert 'unit = "kPa"  # by the names' in text
+    read = read_episodes(tmp_path, mapping(text))
+    assert len(read) == len(MADE.runs)
+    np.testing.assert_allclose(read.rows("pressure"), MADE.rows("pressure")[:, :2], rtol=1e-9)

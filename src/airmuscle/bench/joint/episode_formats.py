@@ -15,7 +15,16 @@ import numpy as np
 
 from ...core import Array, ColumnError, FileError
 from ...recording import read_heading
-from ..readers import EPISODE_EXTENSIONS, TEXT, Arrays, Selection, arrays_of_table, format_of
+from ..readers import (
+    EPISODE_EXTENSIONS,
+    TEXT,
+    Arrays,
+    Selection,
+    arrays_of_table,
+    dataset_files,
+    format_of,
+    is_dataset,
+)
 from .episode_inspection import TURN
 from .episode_units import QUESTION, UNITS
 
@@ -35,6 +44,8 @@ def find_episode_files(path: Path) -> list[Path]:
     """
     if not path.is_dir() or _is_bag(path):
         return [path]
+    if is_dataset(path):
+        return dataset_files(path)
     files = sorted(entry for entry in path.iterdir() if _is_episode(entry))
     if not files:
         steps = any(".tfrecord" in entry.name for entry in path.iterdir())
@@ -175,7 +186,7 @@ def _role(name: str) -> str:
     for role, known in ROLES.items():
         if words & set(known.split()):
             return role
-    reading = read_heading(name)
+    reading = read_heading(name.rpartition(".")[2])
     if reading is None:
         return ""
     return ROLES_OF_QUANTITIES.get(reading.quantity, "")
@@ -185,7 +196,7 @@ def _unit_in_names(names: Sequence[str]) -> str:
     """The unit that all names of arrays state, `wrist_angle_deg`; empty if they state none."""
     units = set[str]()
     for name in names:
-        reading = read_heading(name)
+        reading = read_heading(name.rpartition(".")[2])
         units.add("" if reading is None else reading.unit or "")
     return units.pop() if len(units) == 1 else ""
 

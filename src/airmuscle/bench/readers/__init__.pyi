@@ -36,7 +36,9 @@ from .writer import write as write
 from .formats import EPISODE_EXTENSIONS as EPISODE_EXTENSIONS
 from .formats import TEXT as TEXT
 from .formats import Progress as Progress
+from .formats import dataset_files as dataset_files
 from .formats import format_of as format_of
+from .formats import is_dataset as is_dataset
 from .mapping import check_mapped_columns as check_mapped_columns
 from .missing_codes import CODES as CODES
 from .missing_codes import code_of as code_of

@@ -2,6 +2,8 @@ from .format_table import EPISODE_EXTENSIONS as EPISODE_EXTENSIONS
 from .format_table import EXTENSIONS as EXTENSIONS
 from .format_table import TEXT as TEXT
 from .format_table import format_of as format_of
+from .lerobot import dataset_files as dataset_files
+from .lerobot import is_dataset as is_dataset
 from .mat_contents import MatlabObject as MatlabObject
 from .mat_contents import find_objects as find_objects
 from .mat_contents import read_contents as read_contents

@@ -19,6 +19,7 @@ from ..tables import (
     merge_channels,
     reading,
 )
+from .lerobot import named_episodes
 
 
 def read_parquet_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
@@ -63,7 +64,7 @@ def read_parquet_arrays(path: Path) -> list[Arrays]:
                 values = _rows(pyarrow, path, part, column.combine_chunks())
                 if values is not None:
                     arrays[part] = values
-        return [arrays]
+        return named_episodes(path, arrays)
 
 
 def _flat_columns(pyarrow: Any, name: str, column: Any) -> Iterator[tuple[str, Any]]:
