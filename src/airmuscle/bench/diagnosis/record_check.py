@@ -13,9 +13,9 @@ from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table
 from ..inspection import Sampling, analyse_sampling, inspect
 from ..reported import Reported
-from .recording_rules import VALUE_RULES, bench_data
 from .response_to_command import CommandResponse, command_response
 from .rules import apply_rules
+from .value_rules import VALUE_RULES, bench_data
 
 MIN_ROWS = 30
 MAX_JITTER = 0.3
@@ -270,7 +270,8 @@ def _settled_rows(
     name: str, command: Array, pressure: Array, settled: Array
 ) -> Iterator[RecordFault]:
     """What the rows say whose command has not changed for a while."""
-    span = max(float(np.ptp(command)), LEAST_SPAN * float(np.max(np.abs(command))))
+    greatest = float(np.max(np.abs(command)))
+    span = max(float(np.ptp(command)), LEAST_SPAN * greatest)
     rows = np.flatnonzero(settled)
     if len(rows) < MIN_SETTLED:
         return
@@ -281,8 +282,10 @@ def _settled_rows(
         text = f"at one command, the {name} falls by {100 * droop:.0f} % of the range"
         yield RecordFault("supply", text, "Check the supply, and the tightness.")
         return
-    zero = float(np.median(deviation[level == level.min()]))
-    gain = float(np.median(deviation[level == level.max()])) - zero
+    at_lowest = deviation[level == level.min()]
+    at_highest = deviation[level == level.max()]
+    zero = float(np.median(at_lowest))
+    gain = float(np.median(at_highest)) - zero
     typical = float(np.median(np.abs(deviation)))
     if abs(zero) > MAX_ZERO and abs(gain) < MAX_ZERO:
         text = f"the {name} differs from its command by {100 * zero:.1f} % of the range everywhere"
@@ -481,10 +484,14 @@ def _sizes(subject: _Subject) -> Iterator[RecordFault]:
 
 def _suspicious(subject: _Subject) -> Iterator[RecordFault]:
     """What no muscle explains, by the checks of a bench."""
-    remedies = {rule.name: rule.remedy for rule in VALUE_RULES}
-    for finding in apply_rules(VALUE_RULES, bench_data([subject.recording])):
+    remedies = {}
+    for rule in VALUE_RULES:
+        first = rule.remedy[:1].upper()
+        remedies[rule.name] = f"{first}{rule.remedy[1:]}."
+    bench = bench_data([subject.recording])
+    for finding in apply_rules(VALUE_RULES, bench):
         remedy = remedies[finding.rule]
-        yield RecordFault("value", finding.text, f"{remedy[0].upper()}{remedy[1:]}.")
+        yield RecordFault("value", finding.text, remedy)
 
 
 RULES: Sequence[Rule] = (

@@ -88,13 +88,11 @@ def _correlation(command: Array, response: Array, lag: int) -> float:
 def _settled(time: Array, command: Array) -> Array:
     """Rows whose command has been constant for the time of settling."""
     band = COMMAND_BAND * float(np.ptp(command))
-    changes = np.flatnonzero(np.abs(np.diff(command)) > band) + 1
-    rows = np.arange(len(time))
-    last = np.searchsorted(changes, rows, side="right") - 1
-    since = time - time[0]
-    if len(changes):
-        after_change = last >= 0
-        since[after_change] = (time - time[changes[last]])[after_change]
+    is_change = np.abs(np.diff(command)) > band
+    last_change = np.full(len(time), time[0])
+    changes = np.flatnonzero(is_change) + 1
+    last_change[changes] = time[changes]
+    since = time - np.maximum.accumulate(last_change)
     before = np.searchsorted(time, time - SETTLED_TIME)
     is_slow = np.abs(command - command[before]) <= band
     return np.asarray((since > SETTLED_TIME) & is_slow)

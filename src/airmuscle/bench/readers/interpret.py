@@ -490,8 +490,10 @@ def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) 
     columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
     named = []
     for number, value in enumerate(values.tolist(), 1):
-        named.append(f"{number} {value or 'empty'}")
-    return f"Column '{heading.text}' contains text and is kept as numbers: {', '.join(named)}."
+        shown = value or "empty"
+        named.append(f"{number} {shown}")
+    texts = ", ".join(named)
+    return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."
 
 
 def _field_note(heading: Heading) -> str:
