@@ -250,8 +250,9 @@ class FitProblem(LeastSquaresProblem):
             )
             degree = min(levels) - 1  # the greatest for the pure powers of each quantity
             if 0 < degree < self.law.degree:
-                blank = "characteristic.ContractileSurface.blank"
-                hint = Hint(DEGREE_REMEDY, "degree", degree, blank)
+                hint = Hint(
+                    DEGREE_REMEDY, "degree", degree, "characteristic.ContractileSurface.blank"
+                )
         return IdentificationError(
             f"{self.origin}: the data {deficiency.statement} of {self.name} ({ranks} parameters)."
             f" Number of levels: {', '.join(counts)}. {text}Measure at more levels, or choose a"
