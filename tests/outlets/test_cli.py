@@ -82,6 +82,7 @@ NAMES = (
     "cite",
     "evaluate",
     "inspect",
+    "check",
     "fit",
     "approximate",
     "convert",
