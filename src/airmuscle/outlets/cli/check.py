@@ -15,7 +15,7 @@ from .terminal import echo
 
 @with_requests
 def check(files: AnyFiles, reading: ReadingRequest, json: Json = False) -> None:
-    """Check whether records are usable, right after they were measured.
+    """Check whether records are usable, right after a measurement.
 
     \b
     Looks at length, gaps, sample time, delay of the pressure behind its command, loss of supply,
