@@ -13,10 +13,10 @@ from typing import Any
 from airmuscle.core.annotation import describe, type_hints
 from airmuscle.core.declaration import Parameter, parameters
 from airmuscle.core.reference import Reference
+from airmuscle.files import load
 from airmuscle.files.library import files
 from airmuscle.files.library.entry import Entry
 from airmuscle.files.library.fields import PACKAGES, model_class, model_names
-from airmuscle.files.library.loading import load
 from airmuscle.physics import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 
 from .docstrings import docstring, parts, symbol, to_markdown

@@ -109,7 +109,9 @@ COMMANDS = (
     CommandRow(
         "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
     ),
-    CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
+    CommandRow(
+        "size", "size", "size", "Size muscles of the catalogue for a lift, a joint or a gripper."
+    ),
     CommandRow(
         "body",
         "body",
