@@ -101,7 +101,7 @@ def _nominal_diameter(choice: MuscleChoice) -> float:
     return choice.muscle.diameter(0.0) or 0.0
 
 
-class Place(NamedTuple):
+class DrawnPlace(NamedTuple):
     """Place of the muscles in one state of a drawing [mm]: middle and width of all, distance
     between two.
     """
@@ -126,8 +126,8 @@ def _draw_pull(axes: Any, choice: MuscleChoice, scale: Scale) -> None:
     pitch = (1.0 + GAP) * scale.diameter
     width = pitch * (choice.count - 1) + scale.diameter
     distance = max(5.0 * scale.unit + scale.diameter, 0.3 * scale.length)
-    start = Place(0.0, width, pitch)
-    end = Place(width + distance, width, pitch)
+    start = DrawnPlace(0.0, width, pitch)
+    end = DrawnPlace(width + distance, width, pitch)
     start_low = _draw_state(axes, choice, choice.design.extended, start, scale)
     end_low = _draw_state(axes, choice, choice.design.contracted, end, scale)
     height = _fitting(choice) + 2.2 * scale.unit
@@ -183,7 +183,7 @@ def _each_text(name: str, point: EndPoint) -> str:
 
 
 def _draw_state(
-    axes: Any, choice: MuscleChoice, point: EndPoint, place: Place, scale: Scale
+    axes: Any, choice: MuscleChoice, point: EndPoint, place: DrawnPlace, scale: Scale
 ) -> float:
     """All muscles at one end point; return the height of their lower ends [mm]."""
     low = 0.0
