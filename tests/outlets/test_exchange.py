@@ -12,6 +12,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import ColumnMapping, Decimation, from_pandas, read, read_csv, to_xarray, write
+from airmuscle.bench.readers import read_rig
 from airmuscle.bench.readers.formats import raw_csv
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError
 from airmuscle.recording import Recording
@@ -205,9 +206,14 @@ def test_the_command_converts_one_file_and_several(tmp_path):
 
 
 def reduce_from(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let `read` reduce files of more than `rows` rows by default."""
+    """Let `read` and `airmuscle inspect` reduce files of more than `rows` rows by default."""
     function = inspect.unwrap(read)  # `read` checks the names of its arguments first
     monkeypatch.setitem(function.__kwdefaults__, "downsampling", Decimation(rows))
+    defaults = tuple(
+        Decimation(rows) if isinstance(default, Decimation) else default
+        for default in read_rig.__defaults__
+    )
+    monkeypatch.setattr(read_rig, "__defaults__", defaults)
 
 
 def test_convert_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch):

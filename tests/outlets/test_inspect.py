@@ -238,4 +238,29 @@ def test_many_files_have_one_line_each_and_each_finding_once(tmp_path: Path, mon
     assert [row[0] for row in levels] == ["a.csv", "b.csv", "c.csv"], "what each record gives"
     assert text.count("saturates at its lower limit") == 1
     assert "resting length   300 mm" in lines
+    assert "Possible now: airmuscle fit, hysteresis, campaign." in text
     assert len(lines) <= 24
+
+
+@pytest.mark.parametrize(
+    ("known", "again"), [("force [N]", "|F| [N]"), ("elongation [mm]", "Extension (mm)")]
+)
+def test_a_quantity_that_is_read_is_not_proposed_for_a_second_column(
+    tmp_path: Path, known: str, again: str
+):
+    path = tmp_path / "run.csv"
+    rows = "\n".join(f"{k},{k % 7},{k % 7}" for k in range(20))
+    path.write_text(f"time [s],{known},{again}\n{rows}\n", encoding="utf-8")
+    assert "mapping" not in airmuscle("inspect", path).stdout
+    path.write_text(f"time [s],pressure [kPa],{again}\n{rows}\n", encoding="utf-8")
+    assert f'"{again}" = "{known}"' in airmuscle("inspect", path).stdout
+
+
+def test_the_way_on_is_in_the_brief_view_where_a_file_is_not_understood(tmp_path: Path):
+    for name in ("a", "b"):
+        bench(tmp_path / f"{name}.csv")
+    (tmp_path / "c.csv").write_text("time [s],pressure [kPa]\n0,x\n1,y\n2,z\n", encoding="utf-8")
+    text = airmuscle("inspect", tmp_path).stdout
+    assert "The way on" in text
+    assert "airmuscle fit " in text
+    assert "resting length" not in text.partition("The way on")[2], "the files state it"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import ColumnMapping, read
+from airmuscle.bench import ColumnMapping, read, read_csv
 from airmuscle.errors import AirmuscleWarning, ColumnError
 from airmuscle.physics import Braid, TonduLopez2000
 
@@ -119,17 +119,23 @@ def test_the_absolute_pressures_of_a_fill_without_force_are_noticed(tmp_path):
     )
 
 
-def test_equal_columns_are_read_once_and_two_tables_side_by_side_are_refused(tmp_path):
+def test_equal_columns_are_read_once_and_two_tables_side_by_side_are_a_recording_each(tmp_path):
     one = columns()
     other = columns(pressure=400.0)
     double = {**one, "clock": one["time"]}
     (recording,) = read(write(tmp_path / "double.csv", double, f"{HEAD},time [s]"))
     assert any("read once: 'time [s]'" in note for note in recording.notes)
     both = {**one, **{f"{name} of the other": values for name, values in other.items()}}
+    path = write(tmp_path / "both.csv", both, f"{HEAD},{HEAD}")
+    recordings = read(path)
+    assert len(recordings) == 2
+    for recording, table in zip(recordings, (one, other), strict=True):
+        assert recording["pressure"] == pytest.approx(1e3 * table["pressure"])
+        assert recording["force"] == pytest.approx(table["force"], abs=1e-4)
     with pytest.raises(
         ColumnError, match=r"2 quantities are in several columns .*two tables side by side"
     ):
-        read(write(tmp_path / "both.csv", both, f"{HEAD},{HEAD}"))
+        read_csv(path)
 
 
 def test_a_displacement_is_not_taken_for_a_contraction_but_explained(tmp_path):

@@ -49,6 +49,10 @@ OPEN = {
     "cmd_L": "setpoint",
     "Pump (psi)": "pressure",
     "Extension (mm)": "elongation",
+    "|F| [N]": "force",
+    "|Force| (N)": "force",
+    "|axial| [N]": "force",
+    "|p| / bar": "pressure",
 }
 NONE = (
     "pressure error (kPa)",

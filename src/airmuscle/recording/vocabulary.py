@@ -353,7 +353,8 @@ class Certainty(enum.Enum):
 
     WORD   a word names it, and the unit is one of it
     UNIT   the unit alone, which one quantity has
-    OPEN   the unit, the zero or the sign is not stated, so that a user must answer
+    OPEN   the unit, the zero or the sign is not stated, as of a magnitude, so that a user must
+           answer
     """
 
     WORD = "by its words"
@@ -419,6 +420,8 @@ _BEHIND_SIGN = re.compile(r"(?P<name>.+)[,/](?P<unit>[^,/]+)")
 _BRACKETS = re.compile(r"\[([^\[\]]*)\]|\(([^()]*(?:\([ag]\))?)\)")
 _OTHER_UNIT = re.compile(r"[\[(][^\])]*[a-zA-Z0-9%][/·*^²³][^\])]*[\])]")
 """A compound unit in brackets that no quantity of the vocabulary has, such as (g/s)."""
+_MAGNITUDE = re.compile(r"\|[^|]+\|")
+"""A name between bars, `|F|`: a magnitude has lost the sign of its quantity."""
 MATRIX_COLUMN = re.compile(r"\(:,\d+\)$")
 """Column of a matrix of MATLAB, `y(:,2)`."""
 MAX_CHARACTERS = 200
@@ -431,6 +434,14 @@ def read_heading(text: str, unit_below: str = "") -> Reading | None:
     """
     if len(text) > MAX_CHARACTERS:
         return None
+    reading = _read_words(text, unit_below)
+    if reading is not None and _MAGNITUDE.search(text):
+        return dataclasses.replace(reading, certainty=Certainty.OPEN)
+    return reading
+
+
+def _read_words(text: str, unit_below: str) -> Reading | None:
+    """The reading of a heading, as that of `read_heading`, where bars state nothing."""
     words, unit = _split(text)
     unit = unit_named(unit_below) or unit
     if unit is None and _OTHER_UNIT.search(text):

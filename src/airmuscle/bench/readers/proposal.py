@@ -175,6 +175,7 @@ def propose_for_table(table: RawTable, mapping: ColumnMapping) -> Proposal:
     names = _names(columns)
     mapped = set(map(str, mapping.columns))
     is_understood = any(column.heading.known or column.is_open for column in columns)
+    read_already = {column.heading.name for column in columns if column.heading.known}
     lines = []
     unused = []
     for i, (column, cells) in enumerate(zip(columns, few.columns, strict=True)):
@@ -183,6 +184,9 @@ def propose_for_table(table: RawTable, mapping: ColumnMapping) -> Proposal:
         if mapped & {text, number}:
             continue
         key = text if text and counts[text] == 1 else number
+        if column.is_open and names[i] in read_already:
+            unused.append(text)
+            continue
         line = _line(key, names[i], column, cells, is_understood)
         is_left_out = not column.heading.known and not isinstance(cells, list)
         if line is not None:
@@ -234,7 +238,9 @@ def _line(
             )
             return ProposedColumn(key, f"{name} [{reading.unit}]", remark)
         if reading.unit:
-            return ProposedColumn(key, f"{name} [{reading.unit}]", "guess, by the unit alone")
+            return ProposedColumn(
+                key, f"{name} [{reading.unit}]", "guess: quantity or sign is not stated"
+            )
         return _with_unit(key, name, cells)
     unit = unit_named(heading.text) or (heading.unit and unit_named(heading.unit))
     if unit and dimension(unit) == "m":

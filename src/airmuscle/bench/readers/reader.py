@@ -53,10 +53,13 @@ def read_csv(
     and remedy.
     """
     mapping = as_mapping(mapping, fields)
-    mapping = mapping.of_file(Path(path))
+    if not isinstance(path, str | Path):
+        raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
+    path = Path(path)
+    mapping = mapping.of_file(path)
     table = read_csv_table(path, mapping.text_format)
     check_mapped_columns(mapping, mapped_columns(table, mapping), table)
-    return interpret(apply_mapping(table, mapping), mapping, mapping.constants_of(Path(path)))
+    return interpret(apply_mapping(table, mapping), mapping, mapping.constants_of(path))
 
 
 def as_mapping(mapping: str | Path | ColumnMapping, fields: Mapping[str, Any]) -> ColumnMapping:

@@ -37,7 +37,7 @@ from .options import Json, OptionalFolder, complete_data
 from .parser import Argument
 from .requested import with_requests
 from .terminal import echo, print_json, progress_bars
-from .way_on import print_mapping, proposed_mapping, way_on
+from .way_on import possible_commands, print_mapping, proposed_mapping, way_on
 
 MEASURED = (
     "CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
@@ -190,6 +190,12 @@ def _inspected(
             Chapter("level-records", "Isometric and isobaric records", "", tables=tables)
         )
     further = way_on(files, recordings)
+    possible = possible_commands(recordings)
+    is_understood = not problems and not proposal
+    if len(recordings) > 1 and is_understood and possible:
+        commands = f"Possible now: airmuscle {', '.join(possible)}."
+        chapters[0] = dataclasses.replace(chapters[0], summary=f"{chapters[0].summary} {commands}")
+        further = dataclasses.replace(further, brief=False)
     if proposal:
         further = dataclasses.replace(
             further, values=(NamedValue("mapping", proposal.toml, brief=False),)

@@ -64,17 +64,27 @@ def way_on(files: Sequence[str], recordings: Sequence[Recording]) -> Chapter:
     return Chapter("way-on", "The way on", summary, tables=(table,))
 
 
+def possible_commands(recordings: Sequence[Recording]) -> list[str]:
+    """The names of the commands that the recordings are sufficient for."""
+    return [use.command.split()[0] for use in USES if _lacking_of_all(use, recordings) == []]
+
+
 def _lacking_of_all(use: Use, recordings: Sequence[Recording]) -> list[str] | None:
     """What the recording that is closest to a use lacks; None where all lack everything."""
     if use.command.startswith("campaign") and len(recordings) < 2:
         return None
-    is_of_joint = use.command.startswith("fit-joint")
-    candidates = []
-    for recording in recordings:
-        columns = {name.rpartition(".")[2] for name in recording} if is_of_joint else {*recording}
-        candidates.append(_lacking(use, columns))
+    candidates = [_lacking(use, _known(use, recording)) for recording in recordings]
     closest = min(candidates, key=len)
     return None if len(closest) == len(use.needed) else closest
+
+
+def _known(use: Use, recording: Recording) -> set[str]:
+    """The quantities of a use that a recording has, or gives with its resting length; those of a
+    joint are in the columns of its muscles.
+    """
+    if use.command.startswith("fit-joint"):
+        return {name.rpartition(".")[2] for name in recording}
+    return {name for alternatives in use.needed for name in alternatives if name in recording}
 
 
 def _lacking(use: Use, known: set[str]) -> list[str]:

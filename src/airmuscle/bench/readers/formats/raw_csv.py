@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ....core import ColumnError, FileError, Hint, abridged, listed
+from ....core import ColumnError, FileError, Hint, listed
 from ....recording.recording import list_rows
 from ..tables import (
     COMMA_NUMBER,
@@ -48,11 +48,8 @@ Progress = Callable[[str, float], None]
 """Called with the name of a file and the fraction that has been read, 0 to 1."""
 
 
-def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> RawTable:
+def read_csv_table(path: Path, text_format: TextFormat = TextFormat()) -> RawTable:
     """Read the table in a text file. Raises FileError or ColumnError."""
-    if not isinstance(path, str | Path):
-        raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
-    path = Path(path)
     check_text_file(path)
     tables = parse_text(path.name, read_text(path), text_format)
     if len(tables) > 1:
