@@ -17,7 +17,7 @@ import airmuscle as am
 from airmuscle.core.arrays import Array
 from airmuscle.core.plotting import DASHES, LINES, MARKERS, new_figure, save
 from airmuscle.engine import RungeKutta4
-from airmuscle.files.library.files import DATA
+from airmuscle.files.library.folders import DATA
 
 PICTURE = Path(__file__).parents[2] / "docs" / "images" / "regulator.png"
 FACTS = tomllib.loads((DATA / "smc-itv2050.toml").read_text(encoding="utf-8"))

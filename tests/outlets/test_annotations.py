@@ -97,6 +97,6 @@ def test_annotations_are_read_in_one_place():
             readers.add(path.relative_to(root).as_posix())
     assert readers == {
         "core/annotation_parts.py",
-        "outlets/cli/options.py",
+        "outlets/cli/requested.py",
         "outlets/cli/parser.py",
     }

@@ -25,7 +25,8 @@ COMPILED = ("--build", "--to fmu", "--to ssp")
 WAITING = ("fit-live", "studio")
 """Commands that run until they are stopped."""
 MADE = ("bench.csv", "my/muscle.toml", "fit/muscle.toml", "dmsp-20-300")
-"""Files of a user that the fixture makes, and entries of the library."""
+"""Files of a user that the fixture makes, and entries of the library. Bodies (.xml) need MuJoCo: the
+tests of the body run them."""
 
 
 def example_lines() -> list[str]:
@@ -54,7 +55,9 @@ def is_run(line: str) -> bool:
     if command in LONG or any(part in line for part in COMPILED):
         return False
     files = [
-        word for word in words_of(line) if re.search(r"\*|/$|\.(csv|toml|mat|npz|tdms|h5)$", word)
+        word
+        for word in words_of(line)
+        if re.search(r"\*|/$|\.(csv|toml|mat|npz|tdms|h5|xml)$", word)
     ]
     return all(
         word in MADE or word.startswith("examples/") or line.endswith(f"--out {word}")

@@ -70,6 +70,7 @@ VALUES = {
     "missing": DropMissing((-999.0,)),
     "displacement_zero": "12 mm",
     "all_rows": True,
+    "grid": "force [N] over contraction [%], pressure [kPa]",
     "law": ...,
     "censoring": ...,
     "free": ("circuit.fill.conductance",),

@@ -144,6 +144,7 @@ SCOPES = {
 """What each command asks of the data."""
 WITHOUT_JUDGEMENT = {
     "inspect": "it tells of any file what it contains",
+    "check": "it says of each record whether it is usable: test_check.py",
     "convert": "it writes any file",
     "fit-volume": "it takes no force; its points of volume are judged in test_volume_fit.py",
     "fit-joint": "it takes episodes, which are judged in test_fit_joint.py",

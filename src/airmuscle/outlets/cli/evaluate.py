@@ -17,9 +17,12 @@ from .terminal import echo
 
 def read_tension(text: str, where: str) -> float:
     """A force [N], also of a load in g or kg by standard gravity. Raises UnitError."""
-    with contextlib.suppress(UnitError):
-        return float(quantity(text, "kg", where=where)) * STANDARD_GRAVITY
-    return float(quantity(text, "N", where=where))
+    try:
+        return float(quantity(text, "N", where=where))
+    except UnitError:
+        with contextlib.suppress(UnitError):
+            return float(quantity(text, "kg", where=where)) * STANDARD_GRAVITY
+        raise
 
 
 @request
