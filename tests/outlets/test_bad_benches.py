@@ -272,7 +272,7 @@ def test_a_mapping_that_names_a_missing_column(tmp_path, command):
 def test_a_warning_is_not_repeated_by_a_note_on_the_same_screen(
     tmp_path, monkeypatch, one_screen, notes
 ):
-    monkeypatch.setattr("airmuscle.outlets.cli.delivery.on_one_screen", lambda: one_screen)
+    monkeypatch.setattr("airmuscle.outlets.cli.printing.on_one_screen", lambda: one_screen)
     files = [ramp(tmp_path / f"{p}.csv", 1e3 * p, seed=p) for p in (200, 300, 400, 500)]
     (run,) = read(files[0])
     write(

@@ -208,6 +208,7 @@ def test_declared_values_and_numbers_in_a_text_are_converted():
     assert scaled_numbers("1 to 2.5", 0.01) == "0.01 to 0.025"
 
 
+@pytest.mark.drawn  # looks at the axes, which are relabelled as they are drawn
 def test_the_axes_of_a_report_have_round_numbers_in_the_chosen_unit():
     figure, axes = new_figure()
     axes.plot([0.0, 700.0], [0.0, 1.0])

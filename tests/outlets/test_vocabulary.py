@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import pytest
 
+from airmuscle import read
 from airmuscle.errors import UnitError
 from airmuscle.recording import (
     QUANTITIES,
@@ -15,6 +16,7 @@ from airmuscle.recording import (
     read_heading,
     unit_named,
 )
+from airmuscle.recording.columns import find_quantity_name, parse_heading, split_unit
 from airmuscle.units import quantity
 
 READ = {
@@ -108,6 +110,33 @@ def test_each_word_of_the_table_names_its_quantity_with_and_without_its_neighbou
                 assert reading is not None, said
                 alike = {quantity, "setpoint"} if reading.quantity == "setpoint" else {quantity}
                 assert reading.quantity in alike, said
+
+
+def headings_that_name_no_quantity() -> list[str]:
+    """Headings with words of a quantity, or its unit alone, whose names are those of a laboratory."""
+    names = [*READ, *(f"{word} [{unit}]" for word, unit in (("p1", "bar"), ("pressure2", "psi")))]
+    return [
+        text
+        for text in names
+        if not parse_heading(text).known and READ.get(text, ("",))[0] != "time"
+    ]
+
+
+@pytest.mark.parametrize("text", headings_that_name_no_quantity())
+def test_a_column_that_is_read_by_its_words_keeps_its_name_of_the_file(tmp_path, text: str):
+    column = "time [s];" + text
+    (tmp_path / "run.csv").write_text(f"{column}\n0;0.01\n1;0.02\n2;0.03\n", encoding="utf-8")
+    (recording,) = read(tmp_path / "run.csv")
+    (name,) = set(recording) - {"time"}
+    unit = QUANTITIES[name.rpartition(".")[2]].unit
+    for asked in (text, split_unit(text)[0]):
+        assert find_quantity_name(asked) is None
+        assert asked in recording
+        assert asked in recording.names()
+        assert list(recording.in_unit(asked, unit)) == list(recording[name])
+        assert list(recording.rows(slice(1, None))[asked]) == list(recording[name][1:])
+        with pytest.raises(UnitError):
+            recording.in_unit(asked, "kg/s")
 
 
 def test_every_unit_of_the_table_is_converted():

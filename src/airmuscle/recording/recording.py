@@ -45,6 +45,8 @@ class Recording(NotebookDisplay):
     notes      notes for the user, such as assumptions made by the reader
     units      units stated in the file, before conversion to SI
     references sources: of published measurements, or of the models of a simulation
+    headings   in the file, by column name, of columns whose quantity the words of the heading
+               state; such a column has the name in its heading, too: `p1` of `p1 [kPa]`
     """
 
     columns: Mapping[str, Array]
@@ -53,6 +55,7 @@ class Recording(NotebookDisplay):
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
     references: tuple[Reference, ...] = ()
+    headings: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -92,6 +95,7 @@ class Recording(NotebookDisplay):
             notes=notes,
             units={},
             references=references,
+            headings={},
         )
         return recording
 
@@ -121,8 +125,9 @@ class Recording(NotebookDisplay):
         raise ColumnError(HintedText(text, remedy))
 
     def _column(self, name: str) -> Array | None:
-        if name in self.columns:
-            return self.columns[name]
+        column = self._name_of(name)
+        if column in self.columns:
+            return self.columns[column]
         length = self.constants.get("resting_length")
         if name not in ("contraction", "length") or not isinstance(length, float | int):
             return None
@@ -137,6 +142,17 @@ class Recording(NotebookDisplay):
             else length * (1.0 - contraction)
         )
 
+    def _name_of(self, name: str) -> str:
+        """The name of the column that a file has under another name, complete or without unit;
+        `name` itself if there is none.
+        """
+        if name in self.columns:
+            return name
+        for column, heading in self.headings.items():
+            if column in self.columns and name in (heading, split_unit(heading)[0]):
+                return column
+        return name
+
     def __contains__(self, name: str) -> bool:
         return isinstance(name, str) and self._column(name) is not None
 
@@ -146,12 +162,20 @@ class Recording(NotebookDisplay):
     def __iter__(self) -> Iterator[str]:
         return iter(self.columns)
 
+    def names(self) -> set[str]:
+        """The names that `in_unit` takes: those of the columns, complete or without unit, and those
+        in the file.
+        """
+        texts = [*self.columns, *(self.headings[name] for name in self if name in self.headings)]
+        return {*texts, *(split_unit(text)[0] for text in texts)}
+
     def in_unit(self, name: str, unit: str | None) -> Array:
         """A column in the given SI unit, shape (N,).
 
         A column of an unknown quantity, such as `height [mm]`, is stored without conversion. It is
         converted here from the unit in its heading, unless `unit` is None; its name may be
-        'height'. Raises ColumnError or UnitError.
+        'height'. A column that was read as a quantity by the words of its heading is in SI, and may
+        be asked for by its name in the file. Raises ColumnError or UnitError.
         """
         for heading, values in self.columns.items():
             plain, heading_unit = split_unit(heading)
@@ -162,6 +186,10 @@ class Recording(NotebookDisplay):
                     else np.asarray
                 )
                 return np.asarray(convert(values))
+        column = self._name_of(name)
+        quantity = quantity_of(column)
+        if unit and quantity and column != name:
+            conversion(quantity.unit, unit, where=f"{self.origin}, {self.headings[column]}")
         return self[name]
 
     def rows(self, selection: Any) -> "Recording":

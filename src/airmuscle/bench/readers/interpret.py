@@ -102,7 +102,10 @@ def interpret(
         table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered
     )
     written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
-    return Recording(columns, table.origin, run_constants, tuple(notes), written)
+    own_names = {h.name: h.text for h in headings if h.evidence and h.name in columns}
+    return Recording(
+        columns, table.origin, run_constants, tuple(notes), written, headings=own_names
+    )
 
 
 def _with_rate(

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...bench.diagnosis import read
 from ...bench.dynamics import CrossPrediction, DynamicFit, cross_predict, fit_dynamic
-from ...bench.dynamics.experiment import Experiment, InitialValue, stated_ambient
+from ...bench.dynamics.experiment import Experiment, InitialValue, make_unknowns, stated_ambient
 from ...bench.readers import ColumnMapping, mapping_of_tables, read_mapping
 from ...core import ParameterError, ShortRepr, abridged, ambient_pressure
 from ...engine.run.problem import check_signal
@@ -181,6 +181,19 @@ class DynamicFitSetup(ShortRepr):
     search: values.FitTable
     origin: str = ""
     """Name of the file, for messages."""
+
+    def names_of_unknowns(self) -> list[str]:
+        """The names of the estimates of the fit, known before the search."""
+        search = self.search
+        with located_errors(self.origin or self.title):
+            unknowns = make_unknowns(
+                self.plant,
+                self.experiments,
+                search.free,
+                search.unknowns(self.plant),
+                search.bounds,
+            )
+        return [unknown.name for unknown in unknowns]
 
     def fit(self) -> DynamicFit:
         """The result of the fit; see `airmuscle.bench.fit_dynamic`."""

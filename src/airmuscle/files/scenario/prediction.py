@@ -21,7 +21,6 @@ from ...engine.run import Integrator
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.geometry.base import LENGTH_TOLERANCE
 from ...recording import Recording
-from ...recording.columns import split_unit
 from ..library import Entry, Location, check_keys, located_errors, read_toml, scale_to_length
 from .identification import build_experiment, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
@@ -61,8 +60,8 @@ class PlantModel:
         observed = self._observed
         outputs = {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
         with located_errors(recording.origin):
-            headings = [split_unit(heading)[0] for heading in recording]
-            recorded = {name: column for name, column in observed.items() if column[1] in headings}
+            present = recording.names()
+            recorded = {name: column for name, column in observed.items() if column[1] in present}
             recording = with_observed(recording, recorded, plant)
             known = observed or [
                 n for kind in PREDICTABLE for n in outputs if n.rpartition(".")[2] == kind

@@ -333,7 +333,7 @@ def _read_file_points(
         return {}
     with located_errors(location):
         recording = read_csv(location.folder / keys.file)
-        names = {*recording, *(split_unit(heading)[0] for heading in recording)}
+        names = recording.names()
         same = {name: name for name in inputs if name in names}
         if columns is None and not same:
             raise ColumnError(

@@ -9,7 +9,7 @@ from ...bench import DynamicFit
 from ...bench.dynamics import fit_regulator
 from ...bench.dynamics.dynamic_chapter import dynamic_chapters, regulator_chapters
 from ...bench.inspection import inspect
-from ...core import check_writable, counted
+from ...core import check_known, check_writable, counted
 from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...recording.recording import row_notes
@@ -72,6 +72,9 @@ def fit_dynamic(
         loaded = dataclasses.replace(
             loaded, search=dataclasses.replace(loaded.search, starts=request.starts)
         )
+    for name in request.profile:
+        if name != WEAK:
+            check_known("the fit has no unknown", name, loaded.names_of_unknowns(), "it has")
     check_writable(out)
     recordings = [experiment.recording for experiment in loaded.experiments]
     notes = row_notes(recordings)
