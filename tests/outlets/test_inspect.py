@@ -238,7 +238,7 @@ def test_many_files_have_one_line_each_and_each_finding_once(tmp_path: Path, mon
     assert [row[0] for row in levels] == ["a.csv", "b.csv", "c.csv"], "what each record gives"
     assert text.count("saturates at its lower limit") == 1
     assert "resting length   300 mm" in lines
-    assert "Possible now: airmuscle fit, hysteresis, campaign." in text
+    assert "Possible now: airmuscle hysteresis, campaign." in text, "no law of one length"
     assert len(lines) <= 24
 
 
@@ -260,7 +260,20 @@ def test_the_way_on_is_in_the_brief_view_where_a_file_is_not_understood(tmp_path
     for name in ("a", "b"):
         bench(tmp_path / f"{name}.csv")
     (tmp_path / "c.csv").write_text("time [s],pressure [kPa]\n0,x\n1,y\n2,z\n", encoding="utf-8")
+    further = airmuscle("inspect", tmp_path).stdout.partition("The way on")[2]
+    assert "airmuscle hysteresis " in further
+    assert "resting length" not in further, "the files state it"
+
+
+def test_a_fit_is_proposed_only_where_the_records_support_a_law(tmp_path: Path):
+    for length in ("270", "285", "294"):
+        path = bench(tmp_path / f"{length}.csv", glitch=None)
+        content = path.read_text(encoding="utf-8")
+        path.write_text(content.replace(",270,", f",{length},"), encoding="utf-8")
     text = airmuscle("inspect", tmp_path).stdout
-    assert "The way on" in text
-    assert "airmuscle fit " in text
-    assert "resting length" not in text.partition("The way on")[2], "the files state it"
+    assert "Possible now: airmuscle fit, hysteresis, campaign." in text
+    text = " ".join(airmuscle("inspect", path).stdout.split())
+    assert "airmuscle fit " not in text
+    assert "there is one contraction: measure the same at two further lengths" in text
+    refused = airmuscle("fit", *2 * [path], "--compare")
+    assert "two further lengths" in " ".join(refused.stderr.split())

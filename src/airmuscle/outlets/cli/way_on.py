@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from ...bench.diagnosis import support_of
 from ...bench.readers import ColumnMapping, Failure, Proposal, merged, propose
 from ...core import AirmuscleError, listed
 from ...recording import Recording
@@ -70,11 +71,16 @@ def possible_commands(recordings: Sequence[Recording]) -> list[str]:
 
 
 def _lacking_of_all(use: Use, recordings: Sequence[Recording]) -> list[str] | None:
-    """What the recording that is closest to a use lacks; None where all lack everything."""
+    """What the recording that is closest to a use lacks, or the cause for which all together
+    support no law; None where all lack everything.
+    """
     if use.command.startswith("campaign") and len(recordings) < 2:
         return None
     candidates = [_lacking(use, _known(use, recording)) for recording in recordings]
     closest = min(candidates, key=len)
+    if not closest and use.command.startswith("fit "):
+        cause = support_of(recordings).cause
+        return [] if cause is None else [f"{cause.name}: {cause.remedy}"]
     return None if len(closest) == len(use.needed) else closest
 
 
