@@ -214,6 +214,7 @@ ARGUMENTS = {
     "origin": "source of a recording",
     "location": "place in a file or in arguments that an error message begins with",
     "notes": "remarks on a recording or a fit",
+    "headings": "headings in the file, by column name, that are no names of a quantity",
     "references": "sources: of published measurements, or of the models of a simulation",
     "selection": "selected rows",
     "specimen": "name of the measured muscle",
