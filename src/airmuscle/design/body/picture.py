@@ -1,8 +1,13 @@
 """Picture of a body with its routes in colours, rendered by MuJoCo where it can, else drawn."""
 
+import contextlib
 import functools
 import os
+import subprocess
+import sys
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +22,9 @@ HEIGHT = 1100
 """Size of a rendered picture [pixels] (chosen)."""
 BACKENDS = ("egl", "osmesa")
 """Backends of MuJoCo that render without a screen."""
+PROGRAM = Path(__file__).with_name("render_model.py")
+TIME_LIMIT = 60.0
+"""Time that a picture may take [s] (chosen)."""
 AZIMUTH = 125.0
 ELEVATION = -12.0
 """Direction of view [degrees] (chosen)."""
@@ -72,21 +80,44 @@ def middle_pose(body: Body) -> Poses:
 
 @functools.cache
 def _backend() -> str:
-    """The backend that can render, tried in this process; empty without."""
-    mujoco = load_simulator()
-    model = mujoco.MjSpec().compile()
+    """The backend that can render, tried on a small model; empty without."""
+    model = load_simulator().MjSpec().compile()
     stated = os.environ.get("MUJOCO_GL")
+    view = _view(model.qpos0, np.zeros(3), 1.0, (8, 8))
     for name in (stated,) if stated else BACKENDS:
-        os.environ["MUJOCO_GL"] = name
-        try:
-            renderer = mujoco.Renderer(model, 8, 8)
-        except Exception:
-            continue
-        renderer.close()
-        return name
-    if stated is None:
-        os.environ.pop("MUJOCO_GL", None)
+        if _picture_by(name, model, view) is not None:
+            return name
     return ""
+
+
+def _view(
+    positions: Array, target: Array, distance: float, size: tuple[int, int]
+) -> dict[str, Any]:
+    """What the program that renders reads: pose, camera and size (height, width)."""
+    camera = (distance, AZIMUTH, ELEVATION)
+    return {"positions": positions, "target": target, "camera": camera, "size": size}
+
+
+def _picture_by(backend: str, model: Any, view: dict[str, Any]) -> Array | None:
+    """A picture (height, width, 3) by a backend in a process of its own; None where it fails."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        model_path, view_path, picture_path = (
+            folder / file for file in ("model.mjb", "view.npz", "picture.npy")
+        )
+        load_simulator().mj_saveModel(model, str(model_path), None)
+        np.savez(view_path, **view)
+        command = [sys.executable, PROGRAM, model_path, view_path, picture_path]
+        with contextlib.suppress(OSError, subprocess.SubprocessError):
+            subprocess.run(
+                list(map(str, command)),
+                env={**os.environ, "MUJOCO_GL": backend},
+                capture_output=True,
+                timeout=TIME_LIMIT,
+                check=True,
+            )
+            return np.asarray(np.load(picture_path))
+    return None
 
 
 def _rendered(body: Body, shares: Sequence[float], pose: Poses) -> Array | None:
@@ -110,27 +141,11 @@ def _rendered(body: Body, shares: Sequence[float], pose: Poses) -> Array | None:
             tendon.group = 0
     _light(mujoco, spec)
     model = body.file.compiled(spec)
-    data = mujoco.MjData(model)
-    data.qpos[:] = kinematics.rows(pose)[0]
-    mujoco.mj_forward(model, data)
-    camera = mujoco.MjvCamera()
     low, high = _extent(body, pose)
-    camera.lookat[:] = 0.5 * (low + high)
-    camera.distance = 1.75 * size
-    camera.azimuth = AZIMUTH
-    camera.elevation = ELEVATION
-    options = mujoco.MjvOption()
-    options.flags[mujoco.mjtVisFlag.mjVIS_TENDON] = True
-    options.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
-    options.sitegroup[:] = 0
-    renderer = mujoco.Renderer(model, HEIGHT, WIDTH)
-    try:
-        renderer.update_scene(data, camera, options)
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
-        return _cropped(np.array(renderer.render()))
-    finally:
-        renderer.close()
+    positions = kinematics.rows(pose)[0]
+    view = _view(positions, 0.5 * (low + high), 1.75 * size, (HEIGHT, WIDTH))
+    image = _picture_by(_backend(), model, view)
+    return None if image is None else _cropped(image)
 
 
 def _cropped(image: Array) -> Array:
