@@ -39,7 +39,7 @@ def read_columns(table: RawTable, user_units: Mapping[str, str]) -> list[ReadCol
     columns = []
     for text, below in zip(table.headings, below_all, strict=False):
         if text in table.fields:
-            columns.append(ReadColumn(Heading(text, text, None, False)))
+            columns.append(ReadColumn(Heading(text, text, below or None, False)))
         else:
             columns.append(_column(text, below, user_units))
     columns[:1] = [dataclasses.replace(column, is_first=True) for column in columns[:1]]
