@@ -14,7 +14,7 @@ from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.bench import write
-from airmuscle.bench.comparison import error_interval
+from airmuscle.bench.comparison import LawSelection, compare, error_interval, result_chapter
 
 
 @pytest.fixture(scope="module")
@@ -82,3 +82,17 @@ def test_the_interval_of_an_error_contains_it_and_narrows_with_equal_parts():
     assert error_interval(Model()) == pytest.approx((3.0, 3.0))
     Model.fold_scores = (Part(3.0),) * 3
     assert error_interval(Model()) is None
+
+
+@pytest.mark.parametrize("misfit", [None, "The law does not follow the data."])
+def test_a_law_is_recommended_only_where_it_follows_the_data(misfit, monkeypatch):
+    bench = am.load_data("dmsp-20-300")
+    comparison = compare(bench)
+    model = comparison.recommended
+    fitted = model.fit.chapter()
+    monkeypatch.setattr(am.Fit, "misfit", misfit)
+    selection = LawSelection((comparison,), (model,), "")
+    chapter = result_chapter.result_chapter("T", model.fit, fitted, [bench], selection)
+    words = "the best of those compared" if misfit else "recommended"
+    assert f", {words} by cross-validation," in chapter.paragraphs[0]
+    assert chapter.paragraphs[1:] == ((misfit,) if misfit else ())

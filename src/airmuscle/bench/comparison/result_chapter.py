@@ -124,12 +124,20 @@ def _sentence(fit: Fit, selection: LawSelection | None) -> str:
     quantity = fit.fitted_quantity
     greatest = float(np.abs(measured[quantity.name]).max())
     share = 100 * fit.rmse / greatest
-    chosen = "" if selection is None else ", recommended by cross-validation,"
+    chosen = "" if selection is None else _rank(fit)
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
     return (
         f"The law {name} with {len(fit.estimates)} parameters{chosen} has an rms error of"
-        f" {format_number(fit.rmse, 3)} {quantity.unit} on {len(measured)} measured rows:"
+        f" {format_number(fit.rmse, 3)}{unit} on {len(measured)} measured rows:"
         f" {format_number(share, 2)} % of the greatest {quantity.name}."
     )
+
+
+def _rank(fit: Fit) -> str:
+    """The words on a law that a comparison chose: one that misses the data is not recommended."""
+    if fit.misfit is None:
+        return ", recommended by cross-validation,"
+    return ", the best of those compared by cross-validation,"
 
 
 def _misfit(fit: Fit) -> tuple[str, ...]:
