@@ -47,9 +47,9 @@ RESERVE = 8e-3
 m of tube and two samples that nobody knows. Without it the loop amplifies errors near its
 bandwidth."""
 HORIZON = 40
-MAX_RATE = 6e6
-"""Samples of the horizon of the predictive controller, and greatest rate [Pa/s] of the half
-pressure difference that it plans, about that of the model with its valves fully open (chosen)."""
+"""Samples of the horizon of the predictive controller (chosen). Its command has a range and no
+limit of the rate: what the valves permit depends on the pressures and on the feed-forward beside
+it, and is told to it by the command that was attained."""
 ZERO_DRIFT = 1.0
 """Deviation of the rate of a reading's zero error after 1 s [rad/s2] (chosen): 7 mrad/s of the
 speed, as predictive control needs an unknown disturbance for each reading."""
@@ -145,7 +145,7 @@ class JointDesign(LawDesign):
     joint.
 
     `law` is that of `control.design_lqg`, `predictive` that of `control.design_predictive` with the
-    same weights and the range and the rate of the command as limits; references there.
+    same weights and the range of the command as its limit; references there.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998, RAWLINGS2017)
@@ -172,9 +172,7 @@ class JointDesign(LawDesign):
     @functools.cached_property
     def predictive(self) -> LinearModelPredictive:
         """The predictive controller with its observer."""
-        return self.designed(
-            design_predictive, (SPEED_READING,), horizon=HORIZON, max_rate={DIFFERENCE: MAX_RATE}
-        )
+        return self.designed(design_predictive, (SPEED_READING,), horizon=HORIZON)
 
     def designed(
         self, design: Callable[..., Law], drifting: tuple[str, ...] = (), **further: Any
