@@ -178,6 +178,7 @@ def test_a_urdf_with_named_routes_is_read(tmp_path):
     body = read_body(written(tmp_path, bodies.URDF, "robot.urdf"), routes=routes)
     sweep = sweep_routes(body)[0]
     assert sweep.length == pytest.approx(law_of_cosines(sweep.poses.positions[:, 0]), abs=1e-12)
+    assert study_body(body).clearances == (None,)  # of a body without geoms
 
 
 def test_an_included_body_with_defaults_has_the_same_routes(tmp_path):

@@ -1,32 +1,63 @@
-"""The example lines of every `--help`: each is understood by its command; each whose files are
-those of the project, or a muscle and a record, runs.
+"""The example lines of every `--help`: each is understood by its command and runs, with files that
+the test makes and with smaller numbers where it would take long.
 """
 
 from __future__ import annotations
 
 import inspect
+import json
 import re
 import shlex
 import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import bodies
 import pytest
 from command_line import airmuscle, command_names
+from user_files import serial_rows, write_study, write_user_files
 
-from airmuscle import load as load_muscle
-from airmuscle import load_data, save, write
 from airmuscle.outlets.cli import app
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
-LONG = ("reproduce", "benchmark", "study", "tune", "campaign")
-"""Commands whose examples take minutes; their own tests run them with smaller numbers."""
-COMPILED = ("--build", "--to fmu", "--to ssp")
-"""Parts of lines that need a compiler, which tests of exports have."""
-WAITING = ("fit-live", "studio")
-"""Commands that run until they are stopped."""
-MADE = ("bench.csv", "my/muscle.toml", "fit/muscle.toml", "dmsp-20-300")
-"""Files of a user that the fixture makes, and entries of the library. Bodies (.xml) need MuJoCo: the
-tests of the body run them."""
+COMPARED = "--characteristic Sarosi2012 --characteristic Hunt2017"
+SHORTER = {
+    "--bootstrap 1000": "--bootstrap 20",
+    "--starts 20": "--starts 2",
+    "--budget 20000": "--budget 24",
+    "--compare": f"--compare {COMPARED}",
+    "--rules": "--rules --budget 24",
+    "--cluster scheduler.json": "--cluster scheduler.json --budget 24",
+    "--workers 8": "--workers 2",
+    "--trials 10": "--trials 2 --truths 1 --budget 0 --runs 0",
+    "--budget 40": "--budget 0 --controller PID --task step --runs 0",
+    "--runs 0": "--runs 0 --truths 1 --budget 0 --task step",
+    "fit-live": "fit-live --idle 0 --degree 2 --max-contraction 0.15",
+    "--plugins": "",
+}
+"""Parts of lines, and what takes their place so that a line takes seconds."""
+FURTHER = {
+    "tune": "--draws 0 --loads '' --supplies ''",
+    "benchmark": "--controller PID --task step --truths 1 --budget 0 --runs 0",
+    "fit-regulator": "--starts 1",
+}
+"""Further options of a command whose lines contain none of its shorter parts."""
+CLUSTER = "tcp://head-node:8786"
+SLOW = re.compile(
+    r"reproduce|benchmark|--cluster|campaign bench|fit-regulator|--to (?:fmu|ssp)|--build"
+    r"|--starts 20|--workers|--rules|valve_study|--known|--separate|muscles/\*"
+)
+QUICK = (
+    "airmuscle reproduce saga hosovsky --out report",
+    "airmuscle campaign bench --out identified",
+    "airmuscle fit-regulator steps.csv sines.csv --supply",
+    "airmuscle study examples/valve_study.toml --out study",
+)
+"""Beginnings of lines that would be slow by their command, of which one runs by default."""
+SERVERS = ("airmuscle studio", "airmuscle studio dmsp-20-300 my/muscle.toml")
+"""Lines that run until they are stopped."""
 
 
 def example_lines() -> list[str]:
@@ -48,32 +79,50 @@ def words_of(line: str) -> list[str]:
 LINES = example_lines()
 
 
-def is_run(line: str) -> bool:
+def marks_of(line: str) -> list[pytest.MarkDecorator]:
+    needs_mujoco = words_of(line)[0] in ("body", "fit-out")
+    is_slow = SLOW.search(line) and not line.startswith(QUICK)
+    marks = [pytest.mark.tool] if needs_mujoco or "--processor" in line else []
+    return [*marks, pytest.mark.slow] if is_slow else marks
+
+
+def shortened(line: str) -> str:
+    """The line with smaller numbers, and with further options of its command."""
+    for part, shorter in SHORTER.items():
+        if part in line:
+            return line.replace(part, shorter) + further(line)
+    return line + further(line)
+
+
+def further(line: str) -> str:
     command = words_of(line)[0]
-    if command in WAITING:
-        return "--export" in line
-    if command in LONG or any(part in line for part in COMPILED):
-        return False
-    files = [
-        word
-        for word in words_of(line)
-        if re.search(r"\*|/$|\.(csv|toml|mat|npz|tdms|h5|xml)$", word)
-    ]
-    return all(
-        word in MADE or word.startswith("examples/") or line.endswith(f"--out {word}")
-        for word in files
-    ) and not (command.startswith("fit-") or command == "hysteresis")
+    names = re.findall(r"--[\w-]+", FURTHER.get(command, ""))
+    return "" if any(name in line for name in names) else f" {FURTHER.get(command, '')}"
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files of a user."""
-    folder = tmp_path_factory.mktemp("bench")
-    shutil.copytree(EXAMPLES, folder / "examples")
-    write(load_data("dmsp-20-300"), folder / "bench.csv")
-    for name in ("my", "fit"):
-        (folder / name).mkdir()
-        save(load_muscle("dmsp-20-300").muscle, folder / name / "muscle.toml")
+    folder = tmp_path_factory.mktemp("made")
+    write_user_files(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[str]:
+    """The address of a cluster of one worker."""
+    distributed = pytest.importorskip("distributed")
+    quiet = {"dashboard_address": None, "worker_dashboard_address": None}
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, **quiet) as local:
+        yield local.scheduler_address
+
+
+@pytest.fixture
+def bench(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the files, in which a line runs."""
+    folder = tmp_path / "bench"
+    shutil.copytree(made, folder)
+    monkeypatch.chdir(folder)
     return folder
 
 
@@ -90,8 +139,25 @@ def in_bar(text: str) -> str:
     return "\n".join([*notes, *map(",".join, [names, *cells])])
 
 
+def prepare(line: str, folder: Path) -> None:
+    """Write what a line needs beside the common files."""
+    if "--unit pressure=bar" in line:  # the heading of this one names no unit
+        path = folder / "bench.csv"
+        path.write_text(in_bar(path.read_text(encoding="utf-8")), encoding="utf-8")
+    write_study(words_of(line)[0], folder)
+
+
 def test_there_are_example_lines_of_every_command():
     assert {words_of(line)[0] for line in LINES} >= set(command_names())
+
+
+def test_every_command_has_a_line_that_runs_by_default():
+    by_default = {
+        words_of(line)[0]
+        for line in LINES
+        if not any(mark.name == "slow" for mark in marks_of(line))
+    }
+    assert by_default >= set(command_names()) - {"benchmark"}  # its quick form is in its own tests
 
 
 @pytest.mark.parametrize("line", LINES)
@@ -103,12 +169,34 @@ def test_an_example_line_is_understood(line: str):
     assert parsed.args == []
 
 
-@pytest.mark.parametrize("line", [line for line in LINES if is_run(line)])
-def test_an_example_line_runs(line: str, bench: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.chdir(bench)
-    text = (bench / "bench.csv").read_text(encoding="utf-8")
-    if "--unit pressure=bar" in line:  # the heading of this one names no unit
-        (bench / "plain.csv").write_text(in_bar(text), encoding="utf-8")
-        line = line.replace("bench.csv", "plain.csv")
-    result = airmuscle(*words_of(line), input=text)
+@pytest.mark.filterwarnings("ignore::airmuscle.errors.AirmuscleWarning")
+@pytest.mark.parametrize(
+    "line",
+    [pytest.param(line, marks=marks_of(line)) for line in LINES if line not in SERVERS],
+)
+def test_an_example_line_runs(line: str, bench: Path, request: pytest.FixtureRequest):
+    if words_of(line)[0] in ("body", "fit-out"):
+        bodies.require_mujoco()
+    if "--processor" in line and shutil.which("qemu-system-arm") is None:
+        pytest.skip("needs the emulator QEMU")
+    prepare(line, bench)
+    if CLUSTER in line or "scheduler.json" in line:
+        address = request.getfixturevalue("cluster")
+        (bench / "scheduler.json").write_text(json.dumps({"address": address}), encoding="utf-8")
+        line = line.replace(CLUSTER, address)
+    record = (bench / "bench.csv").read_text(encoding="utf-8")
+    standard_input = serial_rows() if "--follow -" in line else record
+    result = airmuscle(*words_of(shortened(line)), input=standard_input)
     assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("line", SERVERS)
+def test_the_studio_runs_until_it_is_stopped(line: str, bench: Path):
+    words = [*words_of(line), "--port", "0", "--no-browser"]
+    command = [sys.executable, "-m", "airmuscle", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as server:
+        assert server.stdout is not None
+        assert b"http://" in server.stdout.readline()
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=30)
+    assert server.returncode in (0, 130)

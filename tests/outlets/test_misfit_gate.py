@@ -143,3 +143,9 @@ def test_a_few_rows_must_exceed_the_limit_by_the_uncertainty_of_their_rms_error(
     scatter = Scatter(1.0, None)
     assert scatter.misfit(3.5, 1000, 100.0) is not None
     assert scatter.misfit(3.5, 8, 100.0) is None
+
+
+def test_the_scatter_of_equal_files_judges_no_law():
+    """Copies of a file differ by nothing, which is no repeatability."""
+    assert Scatter(None, 0.0).misfit(3.5, 1000, 100.0) is None
+    assert Scatter(1.0, 0.0).misfit(3.5, 1000, 100.0) is not None

@@ -58,7 +58,8 @@ class Scatter:
         greatest  maximum force of the data [N]
         lengths   number of resting lengths that a law without an effect of the length is fitted to
         """
-        known = [each for each in (self.noise, self.repeatability) if each is not None]
+        # a scatter of zero is that of equal files
+        known = [each for each in (self.noise, self.repeatability) if each]
         noise = known[0] if known else 0.0
         within = max(noise, 0.5 * self.branches)
         expected = max([*known, within])

@@ -61,7 +61,8 @@ class _Probe:
 
     def __init__(self, body: Body) -> None:
         spec = body.file.specification()
-        cylinder = spec.worldbody.add_geom(name="airmuscle_probe", contype=0, conaffinity=0)
+        # a URDF loses geoms that cannot collide
+        cylinder = spec.worldbody.add_geom(name="airmuscle_probe", contype=1, conaffinity=1)
         self.kinematics = BodyKinematics(body)
         mujoco = self.kinematics.mujoco
         cylinder.type = mujoco.mjtGeom.mjGEOM_CYLINDER
@@ -83,7 +84,7 @@ class _Probe:
             and self.model.geom_rgba[geom, 3] > 0.0
             and self.model.geom_group[geom] <= SHOWN_GROUPS
             and int(self.model.geom_type[geom]) not in left_out
-            and geom not in wrapped
+            and geom not in {*wrapped, self.cylinder}
         ]
 
     def _wrapped(self) -> set[int]:

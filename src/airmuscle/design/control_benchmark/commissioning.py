@@ -16,6 +16,7 @@ from ...engine.run import RungeKutta4, simulate
 from ...recording import Recording
 from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
 from ..tuning.case import GainRange, with_gains
+from ..tuning.optimisation import MIN_SETS
 from .contenders import Contender, SensedController, complete
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import task_loop, task_signals, valve_travel
@@ -110,7 +111,7 @@ def find_gains(
         duration=joint.tuning_tasks[0].duration,
         index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN),
         objective=joint.objective,
-        budget=sets_per_gain * len(completed.bounds) * len(cases),
+        budget=max(sets_per_gain * len(completed.bounds), MIN_SETS) * len(cases),
         seed=seed,
         integrator=None if joint.switching else TUNING_INTEGRATOR,
         progress=lambda done, total: progress(f"tuning {contender.name}", done, total),
