@@ -43,6 +43,7 @@ from airmuscle.physics import (
     LinearInPressure,
     LinearSpring,
     LogarithmicLength,
+    MooneyRivlinTube,
     Muscle,
     MuscleRoute,
     MusclesInSeries,
@@ -87,6 +88,7 @@ OTHER = Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)
 BRAID = geometry.Braid(0.01, 0.4363, 0.2)
 FIBRES = geometry.StraightFibre(0.2, 0.02)
+BRAIDED_TUBE = geometry.BraidedTube(0.0098, 0.4363, 0.2, 0.0075, 0.0015, 0.0004, 0.02)
 SPOOL = physics.SecondOrderLag(20.0, 0.7)
 STOP = EndStop(0.1, HuntCrossley(1e9))
 SLIPS = ((4e4, 2e4), (2e-4, 8e-4))
@@ -122,9 +124,20 @@ EXAMPLES = {
     # characteristics
     **{
         name: listed(name)
-        for name in ("chou-hannaford", "dmsp-20-300", "reynolds2003", "serres2009", "tondu-lopez")
+        for name in (
+            "braided-silicone-9mm",
+            "chou-hannaford",
+            "dmsp-20-300",
+            "reynolds2003",
+            "serres2009",
+            "tondu-lopez",
+        )
     },
     "sarosi": listed("sarosi-dmsp-20-200n"),
+    "braided tube": of(
+        MooneyRivlinTube(BRAIDED_TUBE, 3e5, 2e4),
+        BRAIDED_TUBE,
+    ),
     "surface": of(SURFACE),
     "stand-in": of(as_force_law(VirtualWork(BRAID), ValidityRange(0.0, 6e5, 0.0, 0.25), degree=3)),
     "dead length": of(EffectiveLength(SURFACE, 0.2, 0.02, 0.001)),

@@ -1,4 +1,6 @@
-"""Design: parameter studies, sizing, tuning of controllers, and the benchmark of controllers."""
+"""Design: bodies, recipes of muscles, parameter studies, sizing, tuning of controllers, and the
+benchmark of controllers.
+"""
 
 from ..core.stubs import attach_stub
 

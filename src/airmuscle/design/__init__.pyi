@@ -61,6 +61,11 @@ from .control_benchmark import proportional_joint as proportional_joint
 from .control_benchmark import random_truth as random_truth
 from .control_benchmark import scenario_contender as scenario_contender
 from .control_benchmark import standard_contenders as standard_contenders
+from .recipe import ModulusRange as ModulusRange
+from .recipe import MuscleRecipe as MuscleRecipe
+from .recipe import RecipePrediction as RecipePrediction
+from .recipe import modulus_of_hardness as modulus_of_hardness
+from .recipe import predict_recipe as predict_recipe
 from .sizing import SORT_KEYS as SORT_KEYS
 from .sizing import EndPoint as EndPoint
 from .sizing import GripperRequirement as GripperRequirement

@@ -93,6 +93,7 @@ from .muscle.characteristic import InverseLength as InverseLength
 from .muscle.characteristic import LinearInPressure as LinearInPressure
 from .muscle.characteristic import LogarithmicLength as LogarithmicLength
 from .muscle.characteristic import MartensBoblan2017 as MartensBoblan2017
+from .muscle.characteristic import MooneyRivlinTube as MooneyRivlinTube
 from .muscle.characteristic import PolynomialSurrogate as PolynomialSurrogate
 from .muscle.characteristic import PooledLengthLaw as PooledLengthLaw
 from .muscle.characteristic import PressureLaw as PressureLaw
@@ -117,6 +118,7 @@ from .muscle.friction import NoFriction as NoFriction
 from .muscle.friction import PrandtlIshlinskii as PrandtlIshlinskii
 from .muscle.friction import PressureScaledFriction as PressureScaledFriction
 from .muscle.geometry import Braid as Braid
+from .muscle.geometry import BraidedTube as BraidedTube
 from .muscle.geometry import Catenary as Catenary
 from .muscle.geometry import ChebyshevGeometry as ChebyshevGeometry
 from .muscle.geometry import CircularArc as CircularArc

@@ -67,6 +67,9 @@ COMMANDS = (
     CommandRow(
         "check", "check", "check", "Check whether records are usable, right after a measurement."
     ),
+    CommandRow(
+        "recipe", "recipe", "recipe", "Predict a muscle made by hand from tube, braid and length."
+    ),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("approximate", "fit", "approximate", "Approximate one characteristic by another."),
     CommandRow(

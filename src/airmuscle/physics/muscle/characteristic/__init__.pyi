@@ -20,6 +20,7 @@ from .length_family import LogarithmicLength as LogarithmicLength
 from .length_family import PooledLengthLaw as PooledLengthLaw
 from .linear_in_pressure import LinearInPressure as LinearInPressure
 from .martens_boblan2017 import MartensBoblan2017 as MartensBoblan2017
+from .mooney_rivlin_tube import MooneyRivlinTube as MooneyRivlinTube
 from .polynomial_surrogate import PolynomialSurrogate as PolynomialSurrogate
 from .polynomial_surrogate import as_force_law as as_force_law
 from .reynolds2003 import Reynolds2003 as Reynolds2003

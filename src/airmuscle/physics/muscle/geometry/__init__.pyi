@@ -1,5 +1,6 @@
 from .base import Geometry as Geometry
 from .braid import Braid as Braid
+from .braided_tube import BraidedTube as BraidedTube
 from .chebyshev import ChebyshevGeometry as ChebyshevGeometry
 from .chebyshev import TabulatedGeometry as TabulatedGeometry
 from .chebyshev import Vessel as Vessel
