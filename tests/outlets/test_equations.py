@@ -20,16 +20,21 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from airmuscle import load
+from airmuscle import geometry, load
 from airmuscle.bench import fit, fit_chapter
 from airmuscle.bench.statics.static_fit_chapter import equation_section
-from airmuscle.files import load_data
+from airmuscle.core import Value, model, ops, parameter
+from airmuscle.files import library, load_data
 from airmuscle.physics import (
     Characteristic,
     ContractileSurface,
     ContractionLaw,
+    EffectiveLength,
+    ForceLaw,
     InverseLength,
+    LinearInPressure,
     LogarithmicLength,
+    MartensBoblan2017,
     PressureLaw,
 )
 from airmuscle.physics.muscle.characteristic import modes
@@ -42,18 +47,14 @@ REFUSED_BEYOND = {"pressure": (5e4, 3.5e5), "force": (45.0, 260.0)}
 """The range of the surfaces of Borzikova et al., which refuse what lies beyond."""
 TOLERANCE = 1e-12
 NAMES = {"p": "pressure", "eps": "contraction", "F": "force"}
-ENTRIES = (
-    "tondu-lopez",
-    "chou-hannaford",
-    "dmsp-20-300",
-    "hunt2017-festo-10",
-    "reynolds2003",
-    "serres2009",
-    "saga2007",
-    "sarosi-dmsp-10",
-    "borzikova-exponential",
-    "borzikova-direct-repaired",
-)
+WITHOUT_EQUATION = {
+    "festo-tool-dmsp-10",
+    "festo-tool-dmsp-20",
+    "festo-tool-dmsp-40",
+    "saga2007-circle",
+    "saga2007-exact",
+}
+"""Laws of the library that are tables, are solved by iteration, or are too long."""
 
 
 def a_surface(degree: int, seed: int = 1) -> ContractileSurface:
@@ -63,14 +64,52 @@ def a_surface(degree: int, seed: int = 1) -> ContractileSurface:
     return ContractileSurface((600.0, *values[1:]), 3.1e4, 6.2e5, 0.007, 0.19, -1e4, 2e4, degree)
 
 
+@model
+class OperationsOfLaws(ForceLaw):
+    """A law of all operations that laws may contain and those of the library do not: choices with
+    conditions, logical operations, absolute values, accurate forms of functions near zero.
+    """
+
+    limit: float = parameter("N", "a", "force at the limit", bounds=(0.0, 1e4), default=50.0)
+    slope: float = parameter("1", "b", "slope", bounds=(-1e3, 1e3), default=-3.0)
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        scaled = pressure / 3e5
+        middle = ops.both(scaled > 0.5, ops.logical_not(contraction > 0.08))
+        rare = ops.either(ops.both(middle, scaled < 1.2), contraction == 0.0)
+        steps = ops.where(rare, self.limit, 2.0 * self.limit * contraction)
+        kink = (
+            ops.abs(scaled - 1.0)
+            - (contraction + self.limit)
+            - 3.0 * (self.slope * contraction - 2.0 * scaled)
+        )
+        smooth = ops.log1p(contraction) + ops.expm1(-scaled) + ops.arctan2(scaled, contraction)
+        return ops.where(scaled < 0.9, 0.0, steps) + kink * smooth / (contraction**3 * scaled + 1.0)
+
+
+def library_laws() -> dict[str, Characteristic]:
+    """The laws of the library that have an equation."""
+    names = {path.stem for path in library.LAWS.glob("*.toml")}
+    entries = {name: load(name) for name in sorted(names)}
+    return {name: entry.characteristic for name, entry in entries.items() if entry.characteristic}
+
+
 def laws() -> dict[str, Characteristic]:
-    named = {name: load(name).characteristic for name in ENTRIES}
+    named = {name: law for name, law in library_laws().items() if name not in WITHOUT_EQUATION}
     surfaces = {f"surface of degree {n}": a_surface(n) for n in (1, 2, 5, 9)}
     families = {
         "inverse length": InverseLength(a_surface(4), a_surface(2, 7), 0.2, 0.3),
         "logarithmic length": LogarithmicLength(a_surface(3), a_surface(3, 7), 0.2, 0.3),
+        "effective length": EffectiveLength(a_surface(3), 0.2, 0.01, 1e-4),
     }
-    return {**named, **surfaces, **families}
+    further = {
+        "Martens and Boblan": MartensBoblan2017(
+            geometry.Braid(0.01, 0.45, 0.3), 1.8e-3, 9e7, -7e8, 1.5e9, -5e8
+        ),
+        "linear in pressure": LinearInPressure((6e-4, -2e-3), (-10.0,), 5.0),
+        "operations": OperationsOfLaws(),
+    }
+    return {**named, **surfaces, **families, **further}
 
 
 LAWS = laws()
@@ -191,6 +230,9 @@ EXCEL = {
     "LN": np.log,
     "PI": lambda: math.pi,
     "IF": np.where,
+    "NOT": np.logical_not,
+    "AND": np.logical_and,
+    "OR": np.logical_or,
     **{
         name: getattr(np, name.lower())
         for name in ("SQRT", "EXP", "SIN", "COS", "TAN", "SINH", "COSH", "ABS")
@@ -216,7 +258,9 @@ def evaluate_excel(text: str, at: Values) -> npt.NDArray[np.float64]:
             continue
         assert "^" not in cell
         assert len(cell) < 8192, "Excel's limit of a formula"
-        variables[f"{chr(65 + i)}2"] = eval(cell[1:].replace("<>", "!="), dict(EXCEL), variables)
+        variables[f"{chr(65 + i)}2"] = eval(
+            cell[1:].replace(" = ", " == ").replace("<>", "!="), dict(EXCEL), variables
+        )
     return np.asarray(variables[f"{chr(64 + len(cells))}2"])
 
 
@@ -244,9 +288,20 @@ def evaluate_latex(text: str, equation: LawEquation, at: Values) -> npt.NDArray[
 
 
 TOKEN = re.compile(
-    r"\s*(\\left\(|\\right\)|\\left\||\\right\||\\frac|\\sqrt|\\cdot|\\,|\\pi\b|\\(?:ln|exp|sin|cos|tan|sinh|cosh|min|max)\b"
+    r"\s*(\\begin\{cases\}|\\end\{cases\}|\\\\|&|\\text\{otherwise\}|\\(?:le|ne|land|lor|lnot|arctan)\b|[<=()]"
+    r"|\\left\(|\\right\)|\\left\||\\right\||\\frac|\\sqrt|\\cdot|\\,|\\pi\b|\\(?:ln|exp|sin|cos|tan|sinh|cosh|min|max)\b"
     r"|\d+(?:\.\d+)?|(?:\\?[A-Za-z]+|\\text\{\w+\})(?:_\\text\{\w+\}|_\{(?:[^{}]|\{\w+\})*\})?|[-+^{},])"
 )
+
+
+RELATIONS: dict[str, Any] = {
+    "<": np.less,
+    r"\le": np.less_equal,
+    "=": np.equal,
+    r"\ne": np.not_equal,
+    r"\land": np.logical_and,
+    r"\lor": np.logical_or,
+}
 
 
 class LatexReader:
@@ -291,6 +346,22 @@ class LatexReader:
         self.take("}")
         return value
 
+    def condition(self) -> Any:
+        if self.peek() == r"\lnot" and self.take():
+            return np.logical_not(self.sum())
+        left = self.sum()
+        return RELATIONS[self.take()](left, self.sum())
+
+    def choice(self) -> Any:
+        when_true = self.sum()
+        self.take("&")
+        holds = self.sum()
+        self.take(r"\\")
+        when_false = self.sum()
+        for token in ("&", r"\text{otherwise}", r"\end{cases}"):
+            self.take(token)
+        return np.where(holds, when_true, when_false)
+
     def atom(self) -> Any:
         token = self.take()
         if token[0].isdigit():
@@ -299,19 +370,29 @@ class LatexReader:
             value = self.sum()
             self.take(r"\right)")
             return value
+        if token == "(":
+            value = self.condition()
+            self.take(")")
+            return value
+        if token == r"\left|":
+            value = np.abs(self.sum())
+            self.take(r"\right|")
+            return value
+        if token == r"\begin{cases}":
+            return self.choice()
         if token == r"\frac":
             return self.group() / self.group()
         if token in (r"\sqrt", r"\pi"):
             return np.sqrt(self.group()) if token == r"\sqrt" else math.pi
         name = token.removeprefix("\\")
-        if name in ("ln", "exp", "sin", "cos", "tan", "sinh", "cosh", "min", "max"):
+        if name in ("ln", "exp", "sin", "cos", "tan", "arctan", "sinh", "cosh", "min", "max"):
             self.take(r"\left(")
             values = [self.sum()]
             while self.peek() == ",":
                 self.take()
                 values.append(self.sum())
             self.take(r"\right)")
-            return FUNCTIONS["log" if name == "ln" else name](*values)
+            return FUNCTIONS[{"ln": "log", "arctan": "atan"}.get(name, name)](*values)
         return self.value_of(token)
 
 
@@ -374,9 +455,32 @@ def test_the_page_of_a_fit_shows_the_equation_as_mathml_and_as_text(tmp_path: Pa
     assert "<script" not in page
 
 
-def test_a_law_without_a_closed_form_shows_its_definition_and_source() -> None:
-    exact = load("saga2007-exact").characteristic
-    assert law_equation(exact, *quantity_of(exact), RANGES) == ()
+@pytest.mark.parametrize("name", sorted(WITHOUT_EQUATION))
+def test_a_law_without_a_closed_form_of_a_length_that_can_be_shown_has_no_equation(
+    name: str,
+) -> None:
+    law = load(name).characteristic
+    assert law_equation(law, *quantity_of(law), RANGES) == ()
+
+
+@pytest.mark.parametrize("name", ["inverse length", "logarithmic length"])
+def test_the_physical_form_of_a_family_of_lengths_holds_for_any_resting_length(name: str) -> None:
+    law = LAWS[name]
+    assert isinstance(law, InverseLength | LogarithmicLength)
+    _, physical = equations(law)
+    assert [(each.name, each.value) for each in physical.parameters] == [("L_0", 0.2)]
+    text = source_codes(physical, "")["MATLAB"]
+    assert "L_0 = 0.2;" in text
+    assert re.search(r"log\(L_0/0\.3\)|0\.3/L_0", text)
+    longer = text.replace("L_0 = 0.2;", "L_0 = 0.7;")
+    values = evaluate_matlab(longer, physical, arguments_of(law, physical))
+    check_values(law.with_resting_length(0.7), physical, values)
+
+
+def test_the_physical_form_contains_a_length_that_scales_the_contraction_as_a_number() -> None:
+    _, physical = equations(LAWS["effective length"])
+    assert physical.parameters == ()
+    assert physical.parts == ()
 
 
 def test_the_symbol_of_a_shared_part_is_that_of_no_parameter() -> None:

@@ -101,6 +101,8 @@ from .evaluation import Recorded as Recorded
 from .nodes import Node as Node
 from .operations import CONDITIONS as CONDITIONS
 from .operations import Operation as Operation
+from .operations import quotient as quotient
+from .operations import value_of as value_of
 from .ops import Value as Value
 from .ops import Values as Values
 from .ops import pi as pi

@@ -1,4 +1,4 @@
-"""Equation of a law: its traced expression in named symbols, with shared parts defined once."""
+"""Equation of a law: its recorded expression in named symbols, with shared parts defined once."""
 
 import dataclasses
 import itertools
@@ -8,10 +8,9 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from ...core import Leaf, ShortRepr, leaves
-from . import expression
-from .expression import Expressions, Term, assemble, depends_on, expand, fold, in_order, summands
-from .intervals import Bounds, traced_expression, within
+from ...core import CONDITIONS, Leaf, Node, Operation, ShortRepr, autodiff, leaves, nodes
+from .polynomials import Expansion, Polynomial, exact, of_atom, without_atoms
+from .reading import Bounds, within
 
 MAX_OPERATIONS = 600
 MAX_PARAMETERS = 120
@@ -24,16 +23,14 @@ MAX_INNER_TERMS = 6
 """Maximum number of terms of a sum inside a function or product; a longer one gets a symbol of its
 own (chosen).
 """
+MIN_TERMS = 4
+"""Minimum number of monomials of a sum with the coefficients as symbols (chosen)."""
 BAR = 1e5
 """Pressure unit of the physical form [Pa]."""
+LENGTH_SYMBOL = "L_0"
+"""The declared symbol of the resting length, which the physical form keeps where it can."""
 
 _INDEX = re.compile(r"\[\d+\]$")
-_POLYNOMIAL_KINDS = (
-    expression.ADD,
-    expression.NEGATIVE,
-    expression.PRODUCT,
-    expression.QUOTIENT,
-)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +52,7 @@ ARGUMENTS = {
 }
 """Arguments and results of laws."""
 PRESSURE_IN_BAR = Symbol("P", "bar", "gauge pressure")
-_PART_NAMES = {("p",): "qhn", ("eps",): "xyz", ("F",): "ywv", (): "cgsm"}
+_PART_NAMES = {("p",): "qhn", ("P",): "qhn", ("eps",): "xyz", ("F",): "ywv", (): "cgsm"}
 """Symbols of shared parts by the arguments that they depend on: the first that no parameter has."""
 _MIXED_PART_NAMES = "zwv"
 _SUM_NAMES = "uvs"
@@ -64,35 +61,35 @@ _SUM_NAMES = "uvs"
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class LawEquation(ShortRepr):
-    """A law as an equation within a validity range; symbols stand under their names in the
-    expressions.
-    """
+    """A law as an equation within a validity range."""
 
     title: str
     result: Symbol
     arguments: tuple[Symbol, ...]
     parameters: tuple[Symbol, ...]
     """With their values, in the order of their first occurrence in the law."""
-    value: Term
-    part_nodes: Mapping[Term, str]
-    """Names of the parts that occur repeatedly, each defined by the ones before it."""
+    value: Node
+    names: Mapping[Node, str]
+    """Names of the arguments, of the parameters, and of the parts that occur repeatedly, each
+    defined by the ones before it."""
 
     @property
-    def parts(self) -> tuple[tuple[Symbol, Term], ...]:
+    def parts(self) -> tuple[tuple[Symbol, Node], ...]:
         """The symbols of the parts with their definitions."""
-        return tuple((Symbol(name, "", ""), node) for node, name in self.part_nodes.items())
+        names = self.names.items()
+        return tuple((Symbol(name, "", ""), node) for node, name in names if node.arguments)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _Traced:
+class _Recorded:
     """A law within a validity range: its arguments, its parameters with their leaves, and the
     expression.
     """
 
-    new: Expressions
-    arguments: tuple[Term, ...]
-    parameters: Mapping[Term, Leaf]
-    value: Term
+    arguments: dict[Node, Symbol]
+    parameters: Mapping[Node, Leaf]
+    result: Symbol
+    value: Node
 
 
 def law_equation(
@@ -106,110 +103,100 @@ def law_equation(
     the law has no closed form, or one of more than `MAX_OPERATIONS` operations. Limits and
     extrapolations beyond the ranges are left out.
     """
-    traced = _trace(law, quantity, arguments, ranges)
-    if traced is None:
+    recorded = _record(law, quantity, arguments, ranges)
+    if recorded is None or _operations(recorded.value) > MAX_OPERATIONS:
         return ()
-    names = [ARGUMENTS[name] for name in arguments]
-    value, coefficients = _with_monomials(traced)
+    value, powers = _with_monomials(recorded)
     if _operations(value) > MAX_OPERATIONS:
         return ()
-    labels = _labels(traced, coefficients)
-    if len(depends_on(value, list(labels))) > MAX_PARAMETERS:
+    labels = _labels(recorded, powers)
+    if sum(nodes.occurring([value], list(labels))) > MAX_PARAMETERS:
         return ()
-    scaled = _named(value, traced, labels, ARGUMENTS[quantity], names)
-    physical = (
-        _physical(traced, ARGUMENTS[quantity], names) if coefficients and scaled.parts else None
-    )
-    return (scaled,) if physical is None else (scaled, physical)
+    title = "Parameters as symbols, SI units"
+    scaled = _named(recorded, title, value, recorded.arguments, labels)
+    return (scaled, _physical_form(recorded, labels)) if powers and scaled.parts else (scaled,)
 
 
-def _trace(
+def _record(
     law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
-) -> _Traced | None:
-    new = Expressions()
-    points = tuple(new.symbol(ARGUMENTS[name].name) for name in arguments)
-    parameters: dict[Term, Leaf] = {}
-    bounds: dict[Term, Bounds] = {}
-    for leaf in leaves(law):
-        symbol = new.symbol(f"parameter {leaf.path}")
-        number = float(leaf.value)
-        parameters[symbol] = leaf
-        bounds[symbol] = (number, number)
-    value = traced_expression(law, quantity, new, points, list(parameters))
-    if value is None:
+) -> _Recorded | None:
+    """The recorded law; None if it cannot be recorded, or contains what no notation has."""
+    if not law.traceable:
         return None
-    for point, name in zip(points, arguments, strict=True):
-        bounds[point] = ranges[name]
+    model, symbols = autodiff.symbolic(law)
+    points = [nodes.symbol(ARGUMENTS[name].name) for name in arguments]
+    value = nodes.as_node(getattr(model, quantity)(*points))
+    autodiff.check_finite([value], f"{type(law).__name__}.{quantity}")
+    parameters = dict(zip(symbols, leaves(law), strict=True))
+    bounds = {symbol: (float(leaf.value),) * 2 for symbol, leaf in parameters.items()}
+    bounds |= {point: ranges[name] for point, name in zip(points, arguments, strict=True)}
+    reached = within(value, bounds)
+    if reached is None:
+        return None
+    named = {point: ARGUMENTS[name] for point, name in zip(points, arguments, strict=True)}
+    return _Recorded(named, parameters, ARGUMENTS[quantity], reached)
 
-    def complete(old: Term, arguments: list[Term]) -> Term:
-        if old.kind == "if":  # a branch that has one side only is a choice between it and zero
-            return new.apply(expression.WHERE, *arguments, new.number(0.0))
-        return new.apply(old.kind, *arguments) if arguments else old
 
-    reached = within(value, new, bounds)
-    return _Traced(new, points, parameters, fold(reached, complete))
-
-
-def _with_monomials(traced: _Traced) -> tuple[Term, dict[Term, tuple[int, ...]]]:
-    """The expression with every polynomial written as a sum of monomials, and the powers by
-    coefficient.
+def _with_monomials(recorded: _Recorded) -> tuple[Node, dict[Node, tuple[int, ...]]]:
+    """The expression with the polynomials whose coefficients are parameters as sums of monomials,
+    and the powers by parameter.
     """
-    powers: dict[Term, tuple[int, ...]] = {}
-    atoms = _atoms(traced)
 
-    def coefficients(node: Term) -> dict[expression.Monomial, Term] | None:
-        if node.kind not in _POLYNOMIAL_KINDS:
-            return None
-        polynomial = expand(node, {*atoms, *traced.parameters})
-        if polynomial is None:
-            return None
-        return expression.coefficients_by_monomial(polynomial, traced.parameters)
+    def is_written(polynomial: Polynomial) -> bool:
+        coefficients = set(polynomial.values())
+        are_parameters = coefficients <= recorded.parameters.keys()
+        return are_parameters and len(coefficients) == len(polynomial) >= MIN_TERMS
 
-    def rewritten(node: Term) -> Term:
-        if node in atoms or not node.arguments:
-            return node
-        terms = coefficients(node)
-        if terms is None:
-            arguments = [rewritten(argument) for argument in node.arguments]
-            return traced.new.apply(node.kind, *arguments)
-        used = [atom for atom in atoms if any(atom in dict(monomial) for monomial in terms)]
-        for monomial, coefficient in terms.items():
-            power_of = dict(monomial)
-            powers[coefficient] = tuple(power_of.get(atom, 0) for atom in used)
-        return assemble(terms, used, traced.new)
-
-    if _operations(traced.value) > MAX_OPERATIONS:
-        return traced.value, powers
-    return rewritten(traced.value), powers
+    atoms = _atoms(recorded)
+    known = {node: without_atoms(node, atoms) for node in recorded.parameters}
+    known |= {node: of_atom(node, atoms) for node in atoms}
+    expansion = Expansion(recorded.value, atoms, known, is_written)
+    powers: dict[Node, tuple[int, ...]] = {}
+    for polynomial in expansion.sums.values():
+        used = list(map(any, zip(*polynomial, strict=True)))
+        for monomial, coefficient in polynomial.items():
+            powers[coefficient] = tuple(itertools.compress(monomial, used))
+    return expansion.value, powers
 
 
-def _atoms(traced: _Traced) -> list[Term]:
+def _atoms(recorded: _Recorded) -> list[Node]:
     """What the monomials are powers of: the shared parts of one argument, then the arguments."""
-    shared = _shared(traced.value)
-    place_of_argument: dict[Term, int] = {}
-    for node in in_order(traced.value):
-        of = depends_on(node, traced.arguments) if node in shared else ()
-        if len(of) == 1:
-            place_of_argument[node] = traced.arguments.index(of[0])
+    arguments = list(recorded.arguments)
+    shared = _shared(recorded.value)
+    place_of_argument: dict[Node, int] = {}
+    for node in nodes.in_order([recorded.value]):
+        occurring = nodes.occurring([node], arguments) if node in shared else []
+        if sum(occurring) == 1:
+            place_of_argument[node] = occurring.index(True)
     parts = sorted(place_of_argument, key=lambda part: place_of_argument[part], reverse=True)
-    return [*parts, *reversed(traced.arguments)]
+    return [*parts, *reversed(arguments)]
 
 
-def _operations(root: Term) -> int:
-    return sum(1 for node in in_order(root) if node.arguments)
+def _operations(root: Node) -> int:
+    return sum(1 for node in nodes.in_order([root]) if node.arguments)
 
 
-def _shared(root: Term) -> set[Term]:
+def summands(node: Node) -> list[Node]:
+    """The terms of a sum, in their order; any other node is one term."""
+    terms: list[Node] = []
+    while node.operation in (Operation.ADD, Operation.SUBTRACT):
+        is_sum = node.operation == Operation.ADD
+        node, last = node.arguments
+        terms.append(last if is_sum else nodes.negative(last))
+    return [node, *reversed(terms)]
+
+
+def _shared(root: Node) -> set[Node]:
     """The parts of an expression that occur repeatedly and are not short."""
-    nodes = list(in_order(root))
-    uses = Counter(argument for node in nodes for argument in node.arguments)
-    shared: set[Term] = set()
-    cost: dict[Term, int] = {}
-    for node in nodes:
-        is_operation = bool(node.arguments) and node.kind != expression.NEGATIVE
+    ordered = nodes.in_order([root])
+    uses = Counter(argument for node in ordered for argument in node.arguments)
+    shared: set[Node] = set()
+    cost: dict[Node, int] = {}
+    for node in ordered:
+        is_operation = bool(node.arguments) and node.operation != Operation.NEGATE
         repeated = set(node.arguments) - shared
-        cost[node] = is_operation + sum(cost[argument] for argument in repeated)
-        if uses[node] < 2 or node.kind in expression.COMPARISONS:
+        cost[node] = is_operation + sum(cost.get(argument, 0) for argument in repeated)
+        if uses[node] < 2 or node.operation in CONDITIONS:
             continue
         enough = MIN_SHARED_OPERATIONS if uses[node] == 2 else MIN_SHARED_OPERATIONS - 1
         if cost[node] >= enough:
@@ -217,42 +204,41 @@ def _shared(root: Term) -> set[Term]:
     return shared
 
 
-def _long_sums(root: Term) -> set[Term]:
+def _long_sums(root: Node) -> set[Node]:
     """The sums inside an expression that have too many terms to stand inside a function or
     product.
     """
+    sums = (Operation.ADD, Operation.SUBTRACT)
     inner = (
-        part for node in in_order(root) for part in node.arguments[node.kind == expression.ADD :]
+        part for node in nodes.in_order([root]) for part in node.arguments[node.operation in sums :]
     )
     return {
-        part
-        for part in inner
-        if part.kind == expression.ADD and len(summands(part)) > MAX_INNER_TERMS
+        part for part in inner if part.operation in sums and len(summands(part)) > MAX_INNER_TERMS
     }
 
 
-def _labels(traced: _Traced, powers: Mapping[Term, tuple[int, ...]]) -> dict[Term, str]:
+def _labels(recorded: _Recorded, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
     """A name for each parameter: its symbol with the powers or the number of a coefficient, unique
     in the law.
     """
-    lists: dict[str, list[Term]] = {}
-    for node, leaf in traced.parameters.items():
+    lists: dict[str, list[Node]] = {}
+    for node, leaf in recorded.parameters.items():
         path_of_list = _INDEX.sub("", leaf.path)
         lists.setdefault(path_of_list, []).append(node)
-    names: dict[Term, str] = {}
-    for nodes in lists.values():
-        leaf = traced.parameters[nodes[0]]
+    names: dict[Node, str] = {}
+    for coefficients in lists.values():
+        leaf = recorded.parameters[coefficients[0]]
         base = _as_identifier(leaf.declared.symbol).strip("_") or "c"
         if _INDEX.search(leaf.path):
             base = re.sub(r"_(ij|i|j|k)$", "", base)
-            for node, index in zip(nodes, _indices(nodes, powers), strict=True):
+            for node, index in zip(coefficients, _indices(coefficients, powers), strict=True):
                 names[node] = f"{base}_{index}"
         else:
-            names[nodes[0]] = base
+            names[coefficients[0]] = base
     counts = Counter(names.values())
     taken = {symbol.name for symbol in ARGUMENTS.values()}
     taken.add(PRESSURE_IN_BAR.name)
-    for node, leaf in traced.parameters.items():
+    for node, leaf in recorded.parameters.items():
         name = names[node]
         if counts[name] > 1 or name in taken:
             path_of_owner, _, _ = _INDEX.sub("", leaf.path).rpartition(".")
@@ -265,7 +251,7 @@ def _as_identifier(text: str) -> str:
     return re.sub(r"\W+", "_", text)
 
 
-def _indices(coefficients: Sequence[Term], powers: Mapping[Term, tuple[int, ...]]) -> list[str]:
+def _indices(coefficients: Sequence[Node], powers: Mapping[Node, tuple[int, ...]]) -> list[str]:
     """The powers of the monomial of each coefficient; its number where these are not unique."""
     indices = []
     for coefficient in coefficients:
@@ -277,45 +263,42 @@ def _indices(coefficients: Sequence[Term], powers: Mapping[Term, tuple[int, ...]
 
 
 def _named(
-    value: Term,
-    traced: _Traced,
-    labels: Mapping[Term, str],
-    result: Symbol,
-    arguments: Sequence[Symbol],
+    recorded: _Recorded,
+    title: str,
+    value: Node,
+    arguments: dict[Node, Symbol],
+    labels: Mapping[Node, str],
 ) -> LawEquation:
-    """The equation with its parameters and shared parts under their names."""
-    new = traced.new
-
-    def renamed(node: Term, inner: list[Term]) -> Term:
-        if inner:
-            return new.apply(node.kind, *inner)
-        return new.symbol(labels[node]) if node in labels else node
-
-    root = fold(value, renamed)
-    shared = _shared(root) | _long_sums(root)
-    present = set(in_order(root))
-    parameters = tuple(
-        Symbol(labels[node], leaf.declared.unit, leaf.declared.meaning, float(leaf.value))
+    """The equation with its arguments, parameters, repeated parts and long sums under their
+    names."""
+    ordered = nodes.in_order([value])
+    parts = _shared(value) | _long_sums(value)
+    parameters = {
+        node: Symbol(labels[node], leaf.declared.unit, leaf.declared.meaning, float(leaf.value))
         for node, leaf in sorted(
-            traced.parameters.items(), key=lambda item: not item[1].declared.fitted
+            recorded.parameters.items(), key=lambda item: not item[1].declared.fitted
         )
-        if new.symbol(labels[node]) in present
+        if node in set(ordered)
+    }
+    names = {node: symbol.name for node, symbol in (arguments | parameters).items()}
+    names |= _part_names(
+        [node for node in ordered if node in parts],
+        arguments,
+        {symbol.name for symbol in parameters.values()},
     )
-    names = _part_names(
-        [n for n in in_order(root) if n in shared], traced.arguments, {p.name for p in parameters}
-    )
-    return LawEquation(
-        "Parameters as symbols, SI units", result, tuple(arguments), parameters, root, names
-    )
+    symbols = tuple(arguments.values())
+    return LawEquation(title, recorded.result, symbols, tuple(parameters.values()), value, names)
 
 
 def _part_names(
-    parts: Sequence[Term], arguments: Sequence[Term], taken: Collection[str]
-) -> dict[Term, str]:
-    names: dict[Term, str] = {}
+    parts: Sequence[Node], arguments: Mapping[Node, Symbol], taken: Collection[str]
+) -> dict[Node, str]:
+    names: dict[Node, str] = {}
     used = {name.partition("_")[0] for name in taken}
+    symbols = list(arguments.values())
     for node in parts:
-        names_of_arguments = tuple(symbol.name for symbol in depends_on(node, arguments))
+        occurring = nodes.occurring([node], list(arguments))
+        names_of_arguments = tuple(symbol.name for symbol in itertools.compress(symbols, occurring))
         letters = (
             _SUM_NAMES
             if len(summands(node)) > MAX_INNER_TERMS
@@ -329,42 +312,35 @@ def _part_names(
     return names
 
 
-def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> LawEquation | None:
-    """The polynomials with numbers, in the physical arguments, pressures in bar; None if there is
-    none.
+def _physical_form(recorded: _Recorded, labels: Mapping[Node, str]) -> LawEquation:
+    """The polynomials with numbers, in the physical arguments, pressures in bar.
+
+    The resting length stays a symbol where it is apart from the arguments, as in a factor of a
+    polynomial: the equation then holds for any length.
     """
-    new = traced.new
-    bar = new.symbol(PRESSURE_IN_BAR.name)
-
-    def in_numbers(node: Term, inner: list[Term]) -> Term:
-        if node in traced.parameters:
-            return new.number(float(traced.parameters[node].value))
-        if node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
-            return new.product(new.number(BAR), bar)
-        # products and quotients of numbers are not evaluated
-        return new.node(node.kind, *inner) if inner else node
-
-    points = [bar if node.name == "p" else node for node in reversed(traced.arguments)]
-    count = 0
-
-    def rewritten(node: Term) -> Term:
-        nonlocal count
-        if not node.arguments:
-            return node
-        polynomial = expand(node, points)
-        if polynomial is None:
-            return new.apply(node.kind, *map(rewritten, node.arguments))
-        count += 1
-        terms = {monomial: new.number(float(c)) for monomial, c in polynomial.items()}
-        return assemble(terms, points, new)
-
-    value = rewritten(fold(traced.value, in_numbers))
-    if not count:
-        return None
-    symbols = tuple(
-        PRESSURE_IN_BAR if argument.unit == "Pa" else argument for argument in arguments
-    )
-    names = _part_names([n for n in in_order(value) if n in _long_sums(value)], points, ())
-    return LawEquation(
-        "Physical form: numbers, with the pressure in bar", result, symbols, (), value, names
-    )
+    bar = nodes.symbol(PRESSURE_IN_BAR.name)
+    arguments = {
+        bar if symbol.unit == "Pa" else node: PRESSURE_IN_BAR if symbol.unit == "Pa" else symbol
+        for node, symbol in recorded.arguments.items()
+    }
+    atoms = list(arguments)[::-1]
+    scaled: dict[Node, Polynomial | None] = {
+        node: of_atom(bar, atoms, BAR) if symbol.unit == "Pa" else of_atom(node, atoms)
+        for node, symbol in recorded.arguments.items()
+    }
+    numbers: dict[Node, Polynomial | None] = {
+        node: without_atoms(exact(float(leaf.value)), atoms)
+        for node, leaf in recorded.parameters.items()
+    }
+    lengths: dict[Node, Polynomial | None] = {
+        node: None
+        for node, leaf in recorded.parameters.items()
+        if leaf.declared.symbol == LENGTH_SYMBOL
+    }
+    for known in (numbers | lengths, numbers):
+        expansion = Expansion(recorded.value, atoms, scaled | known)
+        long = {id(node) for node, terms in expansion.sums.items() if len(terms) >= MIN_TERMS}
+        if not any(node in arguments for node in nodes.in_order([expansion.value], long)):
+            break
+    title = "Physical form: numbers, with the pressure in bar"
+    return _named(recorded, title, expansion.value, arguments, labels)

@@ -2,97 +2,137 @@
 its expressions.
 """
 
+import functools
 import math
-from collections.abc import Collection, Mapping
-from typing import ClassVar
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
 
+from ...core import Node, Operation, nodes
 from ..formulas import symbol_formula
-from .derivation import LawEquation, Symbol
-from .expression import POWER, Term, fold, in_order, is_number, summands
+from .derivation import LawEquation, Symbol, summands
+from .reading import READABLE
 
 SUM = 1
-TERM = 2
-BASE = 3
-ATOM = 4
-"""Binding strengths of a sum, a product, a power and what needs no parentheses."""
-_RELATIONS = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
+QUOTIENT = 2
+PRODUCT = 3
+BASE = 4
+ATOM = 5
+"""Binding strengths of a sum, a quotient, a product, a power and what needs no parentheses."""
+_SIGNS = {
+    Operation.LESS: "<",
+    Operation.LESS_EQUAL: "<=",
+    Operation.EQUAL: "==",
+    Operation.NOT_EQUAL: "!=",
+    Operation.AND: "&&",
+    Operation.OR: "||",
+}
+_FUNCTIONS = {Operation.FMIN: "min", Operation.FMAX: "max"}
+
+
+class WrittenPart(NamedTuple):
+    """The text of a part of an expression."""
+
+    text: str
+    strength: int
+    is_array: bool = False
+    """Whether the part depends on an argument of the equation, which may be an array."""
 
 
 class Notation:
-    """Writer of expressions. `names` are the texts of symbols and of parts that are defined
-    elsewhere.
-    """
+    """Writer of the expressions of an equation; `names` are the texts of its symbols and parts."""
 
-    relations: ClassVar[Mapping[str, str]] = _RELATIONS
-    logical: ClassVar[Mapping[str, str]] = {"and": "&&", "or": "||", "not": "!"}
-    functions: ClassVar[Mapping[str, str]] = {}
-    """Names of functions that differ from the kinds of their nodes; with `pow`, a power is a call
-    of a function.
+    signs: ClassVar[Mapping[Operation, str]] = _SIGNS
+    """Signs of comparisons and logical operations; those without are calls of a function."""
+    negation: ClassVar[str] = "!"
+    functions: ClassVar[Mapping[Operation, str]] = {}
+    """Names of functions that are not those of the operations; with POWER, a power is a call of a
+    function.
     """
     parentheses: ClassVar[str] = "({})"
     choice: ClassVar[str]
     """Form of a choice, from the condition, the value where it holds, and the other value."""
 
-    def __init__(self, names: Mapping[Term, str], arguments: Collection[Term] = ()) -> None:
-        self._names, self._arguments = names, set(arguments)
+    def __init__(self, names: Mapping[Node, str], arguments: Sequence[Node] = ()) -> None:
+        self._pieces = {
+            node: WrittenPart(
+                text,
+                SUM if text.startswith("-") else ATOM,
+                any(nodes.occurring([node], arguments)),
+            )
+            for node, text in names.items()
+        }
+        self._writers = {
+            operation: functools.partial(self._written, operation) for operation in READABLE
+        }
 
-    def text(self, root: Term, *, definition: bool = False) -> str:
+    def text(self, root: Node, *, definition: bool = False) -> str:
         """The expression; with `definition`, that of a part itself and not its name."""
+        known = {
+            id(node): piece
+            for node, piece in self._pieces.items()
+            if node is not root or not definition
+        }
+        [written] = nodes.replayed([root], known, self._writers)
+        return self._piece(written).text
 
-        def write(node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-            is_named = node in self._names and not (definition and node is root)
-            return (self._names[node], ATOM) if is_named else self._write(node, inner)
+    def _piece(self, value: Any) -> WrittenPart:
+        """A number, which `replayed` hands over as it is, as text."""
+        if isinstance(value, WrittenPart):
+            return value
+        text = self.number(value + 0.0)  # minus zero is zero
+        return WrittenPart(text, SUM if text.startswith("-") else ATOM)
 
-        return fold(root, write)[0]
+    def _written(self, operation: Operation, *operands: Any) -> WrittenPart:
+        pieces = [self._piece(operand) for operand in operands]
+        text, strength = self._operation(operation, *pieces)
+        return WrittenPart(text, strength, any(piece.is_array for piece in pieces))
 
-    def _write(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        texts = [text for text, _ in inner]
-        match node.kind:
-            case "number":
-                return self.number(node.value), ATOM if node.value >= 0 else SUM
-            case "symbol":
-                return self._names.get(node, node.name), ATOM
-            case "add":
+    def _operation(self, operation: Operation, *x: WrittenPart) -> tuple[str, int]:
+        texts = [piece.text for piece in x]
+        match operation:
+            case Operation.ADD:
                 return _sum_text(*texts), SUM
-            case "neg":
-                return f"-{self._bound(inner[0], TERM)}", SUM
-            case "mul":
-                strength = TERM if node.arguments[1].kind == "mul" else BASE
-                left = self._bound(inner[0], TERM)
-                right = self._bound(inner[1], strength)
-                return self._product(node, left, right), TERM
-            case "div":
-                return self._quotient(node, inner)
-            case "pow" if POWER not in self.functions:
-                return self._power(node, inner)
-            case "where":
+            case Operation.SUBTRACT:
+                return f"{texts[0]} - {self._bound(x[1], QUOTIENT)}", SUM
+            case Operation.NEGATE:
+                return f"-{self._bound(x[0], QUOTIENT)}", SUM
+            case Operation.MULTIPLY:
+                return self._product(*x), PRODUCT
+            case Operation.TWICE:
+                return self._product(self._piece(2.0), *x), PRODUCT
+            case Operation.DIVIDE:
+                return self._quotient(*x)
+            case Operation.INVERSE:
+                return self._quotient(self._piece(1.0), *x)
+            case Operation.POWER if operation not in self.functions:
+                return self._power(*x)
+            case Operation.SELECT:
                 return self.choice.format(*texts), ATOM
-        sign = self.relations.get(node.kind) or self.logical.get(node.kind)
-        if sign is None:
-            function = self.functions.get(node.kind, node.kind)
-            return self._call(function, texts), ATOM
-        if node.kind == "not":
-            return f"({sign}{texts[0]})", ATOM
-        return f"({texts[0]} {sign} {texts[1]})", ATOM
+            case Operation.NOT if self.negation:
+                return f"({self.negation}{texts[0]})", ATOM
+        sign = self.signs.get(operation)
+        if sign is not None:
+            return f"({texts[0]} {sign} {texts[1]})", ATOM
+        name = self.functions.get(operation) or _FUNCTIONS.get(operation) or operation.name.lower()
+        return self._call(name, texts), ATOM
 
-    def _bound(self, inner: tuple[str, int], strength: int) -> str:
-        return inner[0] if inner[1] >= strength else self.parentheses.format(inner[0])
+    def _bound(self, piece: WrittenPart, strength: int) -> str:
+        text = piece.text
+        return text if piece.strength >= strength else self.parentheses.format(text)
 
-    def _product(self, node: Term, left: str, right: str) -> str:
-        return f"{left}{self._dot(*node.arguments)}*{right}"
+    def _product(self, x: WrittenPart, y: WrittenPart) -> str:
+        left = self._bound(x, QUOTIENT)
+        return f"{left}{self._dot(x, y)}*{self._bound(y, PRODUCT)}"
 
-    def _quotient(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        numerator = self._bound(inner[0], TERM)
-        denominator = self._bound(inner[1], BASE)
-        dot = self._dot(node.arguments[1])
-        return f"{numerator}{dot}/{denominator}", TERM
+    def _quotient(self, x: WrittenPart, y: WrittenPart) -> tuple[str, int]:
+        return f"{self._bound(x, QUOTIENT)}{self._dot(y)}/{self._bound(y, BASE)}", QUOTIENT
 
-    def _power(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        base = self._bound(inner[0], ATOM)
-        exponent = self._bound(inner[1], ATOM)
-        return f"{base}{self._dot(node)}^{exponent}", BASE
+    def _power(self, base: WrittenPart, exponent: WrittenPart) -> tuple[str, int]:
+        dot = self._dot(base) or self._dot(exponent)
+        return f"{self._bound(base, ATOM)}{dot}^{self._bound(exponent, ATOM)}", BASE
 
-    def _dot(self, *operands: Term) -> str:
+    def _dot(self, *operands: WrittenPart) -> str:
         """The sign of an operation on each element of arrays; empty where one of the operands is a
         scalar.
         """
@@ -113,11 +153,11 @@ def _sum_text(left: str, right: str) -> str:
 class C(Notation):
     """The C language, with math.h."""
 
-    functions: ClassVar[Mapping[str, str]] = {
-        "max": "fmax",
-        "min": "fmin",
-        "abs": "fabs",
-        POWER: "pow",
+    functions: ClassVar[Mapping[Operation, str]] = {
+        Operation.FMAX: "fmax",
+        Operation.FMIN: "fmin",
+        Operation.ABS: "fabs",
+        Operation.POWER: "pow",
     }
     choice = "({} ? {} : {})"
 
@@ -125,19 +165,20 @@ class C(Notation):
 class Matlab(Notation):
     """MATLAB and Octave; arguments may be arrays of one size."""
 
-    relations: ClassVar[Mapping[str, str]] = {**_RELATIONS, "ne": "~="}
-    logical: ClassVar[Mapping[str, str]] = {"and": "&", "or": "|", "not": "~"}
+    signs: ClassVar[Mapping[Operation, str]] = {
+        **_SIGNS,
+        Operation.NOT_EQUAL: "~=",
+        Operation.AND: "&",
+        Operation.OR: "|",
+    }
+    negation = "~"
     choice = "({0}.*({1}) + (~{0}).*({2}))"
 
     def number(self, value: float) -> str:
         return "pi" if value == math.pi else repr(value).removesuffix(".0")
 
-    def _dot(self, *operands: Term) -> str:
-        return (
-            "."
-            if all(self._arguments.intersection(in_order(operand)) for operand in operands)
-            else ""
-        )
+    def _dot(self, *operands: WrittenPart) -> str:
+        return "." if all(operand.is_array for operand in operands) else ""
 
 
 class Excel(Notation):
@@ -145,9 +186,17 @@ class Excel(Notation):
     digits of a number.
     """
 
-    relations: ClassVar[Mapping[str, str]] = {**_RELATIONS, "eq": "=", "ne": "<>"}
-    logical: ClassVar[Mapping[str, str]] = {}
-    functions: ClassVar[Mapping[str, str]] = {"log": "ln", POWER: "power"}
+    signs: ClassVar[Mapping[Operation, str]] = {
+        Operation.LESS: "<",
+        Operation.LESS_EQUAL: "<=",
+        Operation.EQUAL: "=",
+        Operation.NOT_EQUAL: "<>",
+    }
+    negation = ""
+    functions: ClassVar[Mapping[Operation, str]] = {
+        Operation.LOG: "ln",
+        Operation.POWER: "power",
+    }
     choice = "IF({},{},{})"
 
     def number(self, value: float) -> str:
@@ -163,23 +212,26 @@ _MULTIPLES_OF_PI = {math.pi: r"\pi", 2 * math.pi: r"2\,\pi", 4 * math.pi: r"4\,\
 class Latex(Notation):
     """LaTeX; numbers have `digits` significant digits, or all of them."""
 
-    relations: ClassVar[Mapping[str, str]] = {"lt": "<", "le": r"\le", "eq": "=", "ne": r"\ne"}
-    logical: ClassVar[Mapping[str, str]] = {"and": r"\land", "or": r"\lor", "not": r"\lnot "}
-    functions: ClassVar[Mapping[str, str]] = {
-        "log": r"\ln",
-        "asin": r"\arcsin",
-        "acos": r"\arccos",
-        "atan": r"\arctan",
-        "asinh": r"\operatorname{arsinh}",
-        **{
-            name: rf"\{name}"
-            for name in ("exp", "sin", "cos", "tan", "sinh", "cosh", "tanh", "max", "min")
-        },
+    signs: ClassVar[Mapping[Operation, str]] = {
+        Operation.LESS: "<",
+        Operation.LESS_EQUAL: r"\le",
+        Operation.EQUAL: "=",
+        Operation.NOT_EQUAL: r"\ne",
+        Operation.AND: r"\land",
+        Operation.OR: r"\lor",
+    }
+    negation = r"\lnot "
+    functions: ClassVar[Mapping[Operation, str]] = {
+        Operation.LOG: "ln",
+        Operation.ASIN: "arcsin",
+        Operation.ACOS: "arccos",
+        Operation.ATAN: "arctan",
+        Operation.ASINH: "operatorname{arsinh}",
     }
     parentheses = r"\left({}\right)"
     choice = r"\begin{{cases}} {1} & {0} \\ {2} & \text{{otherwise}} \end{{cases}}"
 
-    def __init__(self, names: Mapping[Term, str], digits: int | None = None) -> None:
+    def __init__(self, names: Mapping[Node, str], digits: int | None = None) -> None:
         super().__init__({node: latex_symbol(name) for node, name in names.items()})
         self._digits = digits
 
@@ -194,33 +246,33 @@ class Latex(Notation):
         mantissa = mantissa.removesuffix(".0")
         return power if mantissa == "1" else rf"{mantissa} \cdot {power}"
 
-    def _write(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        if node.kind == "symbol" and node not in self._names:
-            return latex_symbol(node.name), ATOM
-        if node.kind == "number":
-            number = self.number(node.value)
-            if "cdot" in number or r"\," in number:
-                return number, TERM if node.value > 0 else SUM
-        if node.kind in ("sqrt", "abs"):
-            [(text, _)] = inner
-            root = rf"\sqrt{{{text}}}"
-            return root if node.kind == "sqrt" else rf"\left|{text}\right|", ATOM
-        return super()._write(node, inner)
+    def _piece(self, value: Any) -> WrittenPart:
+        piece = super()._piece(value)
+        is_product = piece is not value and re.search(r"cdot|\\,", piece.text)
+        return piece._replace(strength=min(piece.strength, PRODUCT)) if is_product else piece
 
-    def _product(self, node: Term, left: str, right: str) -> str:
-        return (
-            rf"{left} \cdot {right}"
-            if right[:1].isdigit() or "cdot" in right
-            else rf"{left}\,{right}"
-        )
+    def _operation(self, operation: Operation, *x: WrittenPart) -> tuple[str, int]:
+        match operation:
+            case Operation.SQRT:
+                return rf"\sqrt{{{x[0].text}}}", ATOM
+            case Operation.ABS:
+                return rf"\left|{x[0].text}\right|", ATOM
+        return super()._operation(operation, *x)
 
-    def _quotient(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return rf"\frac{{{inner[0][0]}}}{{{inner[1][0]}}}", BASE
+    def _call(self, function: str, texts: list[str]) -> str:
+        return rf"\{super()._call(function, texts)}"
 
-    def _power(self, node: Term, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        if is_number(node.arguments[1], 0.5):
-            return rf"\sqrt{{{inner[0][0]}}}", ATOM
-        return f"{self._bound(inner[0], ATOM)}^{{{inner[1][0]}}}", BASE
+    def _product(self, x: WrittenPart, y: WrittenPart) -> str:
+        left = self._bound(x, QUOTIENT)
+        right = self._bound(y, PRODUCT)
+        is_number = right[:1].isdigit() or "cdot" in right
+        return rf"{left} \cdot {right}" if is_number else rf"{left}\,{right}"
+
+    def _quotient(self, x: WrittenPart, y: WrittenPart) -> tuple[str, int]:
+        return rf"\frac{{{x.text}}}{{{y.text}}}", BASE
+
+    def _power(self, base: WrittenPart, exponent: WrittenPart) -> tuple[str, int]:
+        return f"{self._bound(base, ATOM)}^{{{exponent.text}}}", BASE
 
 
 def latex_symbol(name: str) -> str:
@@ -248,13 +300,13 @@ def displayed_lines(equation: LawEquation) -> list[str]:
     """The definitions of the parts and the equation, in LaTeX with four significant digits; long
     sums in lines.
     """
-    rows = _latex_rows(equation, Latex(equation.part_nodes, digits=4))
+    rows = _latex_rows(equation, Latex(equation.names, digits=4))
     return [rf"\begin{{align*}} {row} \end{{align*}}" for row in rows]
 
 
 def latex_source(equation: LawEquation, validity: str) -> str:
     """The equation and the values of its parameters in LaTeX (amsmath), with all digits."""
-    notation = Latex(equation.part_nodes)
+    notation = Latex(equation.names)
     lines = _latex_rows(equation, notation)
     for parameter in equation.parameters:
         unit = "" if parameter.unit == "1" else rf"\,\mathrm{{{parameter.unit.replace('^', '')}}}"
@@ -267,22 +319,13 @@ def matlab_source(equation: LawEquation, validity: str) -> str:
     """The equation as a MATLAB function of arrays."""
     names = [symbol.name for symbol in equation.arguments]
     result = equation.result
-    notation = Matlab(
-        equation.part_nodes, {node for node in _symbols(equation) if node.name in names}
-    )
+    arguments = [node for node, name in equation.names.items() if name in names]
+    notation = Matlab(equation.names, arguments)
     return "\n".join(
         [
             f"function {result.name} = muscle_{result.meaning.split()[-1]}({', '.join(names)})",
             f"% {_signature(equation)}. {validity}",
-            *(
-                f"{parameter.name} = {notation.number(parameter.value)};"
-                f"  % [{parameter.unit}] {parameter.meaning}"
-                for parameter in equation.parameters
-            ),
-            *(
-                f"{part.name} = {notation.text(node, definition=True)};"
-                for part, node in equation.parts
-            ),
+            *_definitions(equation, notation, "{} = {};", "  % [{}] {}"),
             f"{result.name} = {notation.text(equation.value)};",
             "end",
         ]
@@ -291,7 +334,7 @@ def matlab_source(equation: LawEquation, validity: str) -> str:
 
 def c_source(equation: LawEquation, validity: str) -> str:
     """The equation as a C function."""
-    notation = C(equation.part_nodes)
+    notation = C(equation.names)
     arguments = ", ".join(f"double {symbol.name}" for symbol in equation.arguments)
     return "\n".join(
         [
@@ -300,19 +343,24 @@ def c_source(equation: LawEquation, validity: str) -> str:
             f"/* {_signature(equation)}. {validity} */",
             f"double muscle_{equation.result.meaning.split()[-1]}({arguments})",
             "{",
-            *(
-                f"    const double {parameter.name} = {notation.number(parameter.value)};"
-                f" /* [{parameter.unit}] {parameter.meaning} */"
-                for parameter in equation.parameters
-            ),
-            *(
-                f"    const double {part.name} = {notation.text(node, definition=True)};"
-                for part, node in equation.parts
-            ),
+            *_definitions(equation, notation, "    const double {} = {};", " /* [{}] {} */"),
             f"    return {notation.text(equation.value)};",
             "}",
         ]
     )
+
+
+def _definitions(
+    equation: LawEquation, notation: Notation, assignment: str, remark: str
+) -> list[str]:
+    """The lines that give parameters and parts their values."""
+    lines = []
+    for parameter in equation.parameters:
+        value = assignment.format(parameter.name, notation.number(parameter.value))
+        lines.append(value + remark.format(parameter.unit, parameter.meaning))
+    for part, node in equation.parts:
+        lines.append(assignment.format(part.name, notation.text(node, definition=True)))
+    return lines
 
 
 def excel_source(equation: LawEquation) -> str:
@@ -324,11 +372,8 @@ def excel_source(equation: LawEquation) -> str:
         cells[part.name] = f"{chr(ord('A') + len(cells))}2"
     texts = Excel({}).number
     values = {parameter.name: texts(parameter.value) for parameter in equation.parameters}
-    names: dict[Term, str] = {node: cells[part.name] for part, node in equation.parts}
-    for node in _symbols(equation):
-        text = cells.get(node.name) or values[node.name]
-        names[node] = f"({text})" if text.startswith("-") else text
-    notation = Excel(names)
+    values |= cells
+    notation = Excel({node: values[name] for node, name in equation.names.items()})
     headers = [
         _headed(symbol)
         for symbol in (*equation.arguments, *(part for part, _ in equation.parts), equation.result)
@@ -347,7 +392,7 @@ def _latex_rows(equation: LawEquation, notation: Latex) -> list[str]:
     rows = []
     for symbol, node in (*equation.parts, (equation.result, equation.value)):
         is_part = symbol is not equation.result
-        terms = summands(node) if is_part or node not in equation.part_nodes else [node]
+        terms = summands(node) if is_part or node not in equation.names else [node]
         lines = [notation.text(node, definition=is_part)]
         if len(terms) > TERMS_PER_LINE:
             first, *further = map(notation.text, terms)
@@ -361,11 +406,6 @@ def _latex_rows(equation: LawEquation, notation: Latex) -> list[str]:
             ]
         rows.append(f"{latex_symbol(symbol.name)} &= " + " \\\\\n&\\quad {} ".join(lines))
     return rows
-
-
-def _symbols(equation: LawEquation) -> set[Term]:
-    roots = [equation.value, *(node for _, node in equation.parts)]
-    return {node for root in roots for node in in_order(root) if node.kind == "symbol"}
 
 
 def _signature(equation: LawEquation) -> str:

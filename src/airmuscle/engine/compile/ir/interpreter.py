@@ -11,22 +11,15 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ....core import quotient
 from .emission import FunctionBlock, nearest_single
 from .instructions import Operand
-
-
-def _divided(x: float, y: float) -> float:
-    if y != 0.0:
-        return x / y
-    sign = math.copysign(1.0, x) * math.copysign(1.0, y)
-    return math.nan if x == 0.0 or math.isnan(x) else math.copysign(math.inf, sign)
-
 
 _OPERATORS: dict[str, Callable[[float, float], float]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
-    "/": _divided,
+    "/": quotient,
     "<": operator.lt,
     "<=": operator.le,
     ">": operator.gt,
