@@ -26,6 +26,7 @@ from .library import verify as verify
 from .scenario import DynamicFitSetup as DynamicFitSetup
 from .scenario import PlantModel as PlantModel
 from .scenario import Scenario as Scenario
+from .scenario import load_arm as load_arm
 from .scenario import load_dynamic_fit as load_dynamic_fit
 from .scenario import load_plant_model as load_plant_model
 from .scenario import load_scenario as load_scenario

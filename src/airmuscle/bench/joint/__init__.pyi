@@ -1,5 +1,7 @@
 from .angle_estimate import AngleEstimate as AngleEstimate
 from .angle_estimate import estimate_angles as estimate_angles
+from .arm_prediction import ArmPrediction as ArmPrediction
+from .arm_prediction import predict_episodes as predict_episodes
 from .episode_files import Channels as Channels
 from .episode_files import EpisodeMapping as EpisodeMapping
 from .episode_files import read_episode_mapping as read_episode_mapping
@@ -15,6 +17,9 @@ from .free_run import RegulatorLag as RegulatorLag
 from .free_run import ResidualGain as ResidualGain
 from .free_run import fit_regulator_lags as fit_regulator_lags
 from .free_run import fit_residual as fit_residual
+from .identified import IdentifiedArm as IdentifiedArm
+from .identified import identified_arm as identified_arm
 from .known_joint import fit_known_joint as fit_known_joint
+from .later_episodes import UnfitEpisode as UnfitEpisode
 from .result import ArmFit as ArmFit
 from .result import ArmParameter as ArmParameter

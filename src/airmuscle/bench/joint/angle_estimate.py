@@ -10,8 +10,9 @@ import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr
 from ...physics import PressureDriven
-from .episodes import COVERAGE, Episode, Episodes, in_pairs
+from .episodes import COVERAGE, Episode, Episodes
 from .free_run import angles
+from .identified import identified_arm
 from .result import ArmFit
 
 MEMBERS = 12
@@ -99,12 +100,13 @@ def estimate_angles(
             f" pressures, the fit {len(fit.pairs)} and {len(fit.arm.muscle)}; give episodes of the"
             " same arm."
         )
-    fitted = in_pairs(fit.inspection.episodes[: fit.fitted], fit.pairs)
+    identified = identified_arm(fit)
+    fitted = identified.acting(fit.inspection.episodes[: fit.fitted])
     rng = np.random.default_rng(seed)
     rows = fitted.rows("angle") if any_pose else np.array([run.angle[0] for run in fitted.runs])
     poses = rows[rng.choice(len(rows), min(MEMBERS, len(rows)), replace=False)]
     known = fitted[-CALIBRATED:]
-    ordered = in_pairs(episodes, fit.pairs)
+    ordered = identified.acting(episodes)
     before, _ = _runs(fit.arm, known.runs, known.sample_time, fit.inspection.delay, poses)
     seen = _seen(before, known.runs)
     errors = before - _padded(known.runs, "angle")

@@ -99,7 +99,11 @@ class EpisodeMapping:
 def read_episode_mapping(path: str | Path) -> EpisodeMapping:
     """Read a mapping file (TOML). Raises FileError, which names the key and what is allowed."""
     path = Path(path)
-    tables = read_toml(path)
+    return mapping_of(read_toml(path), path)
+
+
+def mapping_of(tables: Mapping[str, Any], path: object) -> EpisodeMapping:
+    """The mapping in the tables of a mapping file; messages name its `path`. Raises FileError."""
     _check_keys(path, "", tables, KEYS)
     for name in ("angles", "pressures"):
         if name not in tables:
@@ -128,7 +132,27 @@ def read_episode_mapping(path: str | Path) -> EpisodeMapping:
     )
 
 
-def _check_keys(path: Path, prefix: str, table: Any, known: tuple[str, ...]) -> None:
+def mapping_tables(mapping: EpisodeMapping) -> dict[str, Any]:
+    """The tables of a mapping file, of which `mapping_of` makes this mapping; without the arm."""
+    single = {
+        name: getattr(mapping, name)
+        for name in ("sample_time", "time", "starts")
+        if getattr(mapping, name) is not None
+    }
+    quantities = {}
+    for name in TABLES[:4]:
+        channels: Channels | None = getattr(mapping, name)
+        if channels is not None:
+            divisors = {} if channels.divisors is None else {"divisors": channels.divisors}
+            quantities[name] = {
+                "columns": list(channels.columns),
+                "scale": channels.scale,
+                **divisors,
+            }
+    return {**single, **quantities}
+
+
+def _check_keys(path: object, prefix: str, table: Any, known: tuple[str, ...]) -> None:
     if not isinstance(table, Mapping):
         raise FileError(
             f"{path}: {prefix.rstrip('.')} must be a table with the keys {', '.join(known)}."
@@ -138,7 +162,7 @@ def _check_keys(path: Path, prefix: str, table: Any, known: tuple[str, ...]) -> 
             raise FileError(f"{path}: unknown key '{prefix}{key}'{alternatives(key, known)}")
 
 
-def _channels(path: Path, name: str, table: Any) -> Channels:
+def _channels(path: object, name: str, table: Any) -> Channels:
     _check_keys(path, f"{name}.", table, TABLE_KEYS)
     columns = table.get("columns")
     columns = (columns,) if isinstance(columns, str) else columns
@@ -167,7 +191,7 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
     return Channels(tuple(columns), factor * scale, table.get("divisors"))
 
 
-def _pairs(path: Path, pairs: Any) -> tuple[tuple[int, int], ...]:
+def _pairs(path: object, pairs: Any) -> tuple[tuple[int, int], ...]:
     is_list_of_pairs = isinstance(pairs, list | tuple) and all(
         isinstance(pair, list) and len(pair) == 2 for pair in pairs
     )

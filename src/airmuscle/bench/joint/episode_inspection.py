@@ -166,28 +166,52 @@ def inspect_episodes(
     """Inspect episodes before a fit over `rows` rows; `pairs` are the muscles said to raise and
     lower each angle.
     """
-    errors = [*_units(episodes), *_jumps(episodes), *_constant(episodes)] or _sample_time(episodes)
+    errors = [*_units(episodes), *jumps(episodes), *constant_readings(episodes)]
+    errors = errors or _sample_time(episodes)
     short = list[str]()
     try:
         _, short = long_enough(episodes, rows)
     except IdentificationError as error:
         errors.append(str(error))
-    delay, actions = (0, ()) if errors else _actions(episodes)
-    certain = {a.muscle: a for a in actions if a.certain}
-    said = [
-        (m, j, sign)
-        for j, pair in enumerate(pairs, start=1)
-        for m, sign in zip(pair, (1, -1), strict=True)
-    ]
-    errors += [
-        f"muscles are exchanged: the mapping says that pressure {muscle}"
-        f" {'raises' if sign > 0 else 'lowers'} angle {joint}, the record that {certain[muscle]}."
-        " Correct pairs in the mapping file."
-        for muscle, joint, sign in said
-        if muscle in certain and (certain[muscle].joint, certain[muscle].sign) != (joint, sign)
-    ]
+    delay, actions = (0, ()) if errors else pressure_actions(episodes)
+    for text in exchanged(actions, pairs, "the mapping"):
+        errors.append(f"{text} Correct pairs in the mapping file.")
     remarks = (*short, *saturated(episodes)[1], *_doubtful(episodes))
     return EpisodeInspection(episodes, delay, actions, tuple(errors), remarks)
+
+
+def exchanged(
+    actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int]], source: str
+) -> list[str]:
+    """What a source of pairs says of muscles, and the record contradicts with certainty."""
+    certain = {action.muscle: action for action in actions if action.certain}
+    texts = []
+    for joint, pair in enumerate(pairs, start=1):
+        for muscle, sign in zip(pair, (1, -1), strict=True):
+            seen = certain.get(muscle)
+            if seen is not None and (seen.joint, seen.sign) != (joint, sign):
+                way = "raises" if sign > 0 else "lowers"
+                texts.append(
+                    f"muscles are exchanged: {source} says that pressure {muscle} {way} angle"
+                    f" {joint}, the record that {seen}."
+                )
+    return texts
+
+
+def faults_of_readings(episodes: Episodes) -> list[str]:
+    """Units, jumps of angles and a sample time that no arm has: what makes any use of episodes
+    wrong.
+    """
+    return [*_units(episodes), *jumps(episodes)] or _sample_time(episodes)
+
+
+def faults_of_judge(episodes: Episodes) -> list[str]:
+    """Remarks on faults of the episodes that judge a fit: they change no parameter of it."""
+    return [
+        f"the episodes left out, which judge the fit, are no such record, and their errors say"
+        f" nothing: {fault}"
+        for fault in faults_of_readings(episodes)
+    ]
 
 
 def checked_inspection(
@@ -220,7 +244,8 @@ def _units(episodes: Episodes) -> list[str]:
     ]
 
 
-def _jumps(episodes: Episodes) -> list[str]:
+def jumps(episodes: Episodes) -> list[str]:
+    """The first jump of an angle that no arm makes."""
     for run in episodes.runs:
         rows, joints = np.nonzero(np.abs(np.diff(run.angle, axis=0)) > JUMP)
         if len(rows):
@@ -263,7 +288,8 @@ def _doubtful(episodes: Episodes) -> list[str]:
     return remarks
 
 
-def _constant(episodes: Episodes) -> list[str]:
+def constant_readings(episodes: Episodes) -> list[str]:
+    """Pressures and angles that never vary."""
     errors = []
     for name, unit in (("pressure", "Pa"), ("angle", "rad")):
         low, high = np.quantile(episodes.rows(name), (0.01, 0.99), axis=0)
@@ -290,9 +316,14 @@ def _sample_time(episodes: Episodes) -> list[str]:
         [run.angle[1 + TRAVEL :] - run.angle[1:-TRAVEL] for run in episodes.runs]
     )
     far = np.abs(said) >= np.maximum(np.quantile(np.abs(said), 0.75, axis=0), 1e-12)
-    ratio = np.nanmedian(
-        np.nanmedian(np.where(far, moved, np.nan) / np.where(far, said, np.nan), axis=0)
-    )
+    of_joints = [
+        np.median(moved[rows, joint] / said[rows, joint])
+        for joint, rows in enumerate(far.T)
+        if rows.any()
+    ]
+    if not of_joints:  # nothing moves
+        return []
+    ratio = np.median(of_joints)
     if 1 / SPEED_RATIO < ratio < SPEED_RATIO:
         return []
     hint = (
@@ -308,7 +339,7 @@ def _sample_time(episodes: Episodes) -> list[str]:
     ]
 
 
-def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
+def pressure_actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
     """Delay of the pressures, and what each acts on: regression of accelerations on pressures,
     angles and speeds.
     """

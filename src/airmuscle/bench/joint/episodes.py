@@ -120,17 +120,22 @@ def join(parts: Sequence[Episodes]) -> Episodes:
 
 def in_pairs(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
     """Episodes whose pressures stand in the order of the pairs."""
-    order = [muscle - 1 for pair in pairs for muscle in pair]
-    if min(order) < 0 or max(order) >= episodes.muscles or len(set(order)) < len(order):
+    order = [muscle for pair in pairs for muscle in pair]
+    if min(order) < 1 or max(order) > episodes.muscles or len(set(order)) < len(order):
         raise ParameterError(
             f"fit_joint: pairs are {tuple(pairs)}; there are pressures 1 to {episodes.muscles},"
             " each in one pair."
         )
-    runs = [dataclasses.replace(run, pressure=run.pressure[:, order]) for run in episodes.runs]
-    runs = [
-        run if run.command is None else dataclasses.replace(run, command=run.command[:, order])
-        for run in runs
-    ]
+    return in_order(episodes, order)
+
+
+def in_order(episodes: Episodes, columns: Sequence[int]) -> Episodes:
+    """Episodes whose pressures and commands are those of these columns, from 1."""
+    order = [column - 1 for column in columns]
+    runs = []
+    for run in episodes.runs:
+        command = None if run.command is None else run.command[:, order]
+        runs.append(dataclasses.replace(run, pressure=run.pressure[:, order], command=command))
     return dataclasses.replace(episodes, runs=tuple(runs))
 
 
@@ -276,15 +281,15 @@ def start_of(arm: PressureDriven, windows: Windows) -> Mapping[str, Array]:
     pressures.
     """
     mechanism = arm.mechanism
-    assert isinstance(mechanism, WithStickSlip)
     before = windows.angle[:, : HISTORY + 1]
-    state = {}
-    joints = zip(mechanism.coordinates, mechanism.elements, strict=True)
-    for j, (coordinate, element) in enumerate(joints):
-        bristle = mechanism.inner_states[j]
+    state = {variable.name: np.zeros(len(windows)) for variable in arm.states}
+    for j, coordinate in enumerate(mechanism.coordinates):
         state[coordinate.name] = before[:, -1, j]
         state[coordinate.speed] = windows.speed[:, HISTORY, j]
-        state[bristle.name] = _bristle(before[:, :, j], element.presliding_angle)
+    if isinstance(mechanism, WithStickSlip):
+        for j, element in enumerate(mechanism.elements):
+            bristle = mechanism.inner_states[j]
+            state[bristle.name] = _bristle(before[:, :, j], element.presliding_angle)
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
         readings = windows.pressure[:, : HISTORY + 1, i]
         state[f"{prefix}pressure"] = lagged(readings, lag, windows.sample_time)

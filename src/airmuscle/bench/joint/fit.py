@@ -26,7 +26,7 @@ from ...physics import (
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from ..estimation import SearchStage
 from .descent import CLIP, Descent, gradients, joint_errors, typical_size, with_values
-from .episode_inspection import checked_inspection, without_saturated
+from .episode_inspection import checked_inspection, faults_of_judge, without_saturated
 from .episodes import ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
 from .free_run import (
     baseline_errors,
@@ -66,11 +66,12 @@ def fit_joint(
     """Identify a joint, or an arm of joints, from episodes of pressures and angles.
 
     pairs     for each joint the muscles, from 1, that raise and lower its angle; found from the
-              record unless given
+              fitted episodes unless given
     axes      axes of the joints in the frames of their links, (0, 0, 1) for z: the inertial
               coupling of the links is then identified; without them every joint has its own inertia
-    left_out  share of the episodes, the last ones, on which the free run is judged; by default a
-              tenth, or 19 episodes if that is more, but a third at most
+    left_out  share of the episodes, the last ones, on which the free run is judged, and which are
+              used for nothing else; by default a tenth, or 19 episodes if that is more, but a third
+              at most
     rows      horizon of the free run
     residual  whether a hybrid law is fitted to what physics leaves (GaussianResidual); a joint has
               one if it gains 15 % on fitted episodes held back, and loses at most 5 % on the 5 % of
@@ -89,7 +90,7 @@ def fit_joint(
     """
     episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
-    inspection = checked_inspection(episodes, tuple(pairs), rows)
+    inspection = checked_inspection(episodes[:split], tuple(pairs), rows)
     muscle_pairs = tuple(pairs) or inspection.pairs
     if (axes and len(axes) != episodes.joints) or len(muscle_pairs) != episodes.joints:
         raise ParameterError(
@@ -102,12 +103,12 @@ def fit_joint(
     left = ordered[split:]
     delay = inspection.delay
     judge = cut(left, delay, rows)
-    train, clipped = without_saturated(cut(fitted, delay, rows), ordered)
+    train, clipped = without_saturated(cut(fitted, delay, rows), fitted)
     with thread_pool(len(STRENGTHS)) if workers == 1 else process_pool(workers) as executor:
         arm, paths = _search(fitted, train, tuple(axes), seed, progress, executor)
     of_joints = [separate(arm, joint, joint_paths, train) for joint, joint_paths in paths.items()]
     gain = None
-    remarks = [*short, *inspection.remarks, *clipped, SCALE]
+    remarks = [*short, *inspection.remarks, *faults_of_judge(episodes[split:]), *clipped, SCALE]
     for of_joint in of_joints:
         remarks += of_joint.remarks
     if residual:

@@ -23,8 +23,18 @@ from ...engine.distribution import stored_result
 from ...physics import PressureDriven
 from ..estimation import search_trust_region
 from .descent import CLIP, OUTLIER, with_slopes, with_values
-from .episode_inspection import checked_inspection, without_saturated
-from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
+from .episode_inspection import checked_inspection, faults_of_judge, without_saturated
+from .episodes import (
+    HISTORY,
+    ROWS,
+    Episodes,
+    Windows,
+    band,
+    count_fitted,
+    cut,
+    long_enough,
+    start_of,
+)
 from .fit import SeparatedEstimates, not_separated, separated
 from .free_run import baseline_errors
 from .result import ArmFit
@@ -119,21 +129,21 @@ def fit_known_joint(
             f" angles, the arm {count} muscles and {joints} coordinates; give two muscles for each"
             " angle, in the order of the columns."
         )
-    joint_pairs = _pairs(arm, episodes)
+    joint_pairs = _pairs(arm, episodes[:split])
     if pairs and tuple(pairs) != joint_pairs:
         raise ParameterError(
             f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has"
             f" {list(joint_pairs)}; leave pairs out of the mapping file, or order its columns of"
             " pressures as the muscles of the joint."
         )
-    inspection = checked_inspection(episodes, joint_pairs, rows)
+    inspection = checked_inspection(episodes[:split], joint_pairs, rows)
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
     judge, fit_windows = (
         cut(part, inspection.delay, rows) for part in (episodes[split:], episodes[:split])
     )
-    train, clipped = without_saturated(fit_windows, episodes)
+    train, clipped = without_saturated(fit_windows, episodes[:split])
     sample = train.part(range(0, len(train), -(-len(train) // SAMPLE)))
     search = KnownSearch(system, paths, sample)
     system = stored_result(f"{__name__}:search", (system, paths, sample), search.run)
@@ -153,9 +163,12 @@ def fit_known_joint(
         baseline_errors(episodes[:split], episodes[split:], rows),
         band(errors),
         tuple(estimates[i] for i in of_arm),
-        (*short, *inspection.remarks, *clipped, *remarks),
+        (*short, *inspection.remarks, *faults_of_judge(episodes[split:]), *clipped, *remarks),
         split,
         covariance=covariance[np.ix_(of_arm, of_arm)],
+        columns=tuple(range(1, count + 1)),
+        gains=system.gains,
+        zeros=system.zeros,
     )
 
 
@@ -210,13 +223,7 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
     """
     arm = system.arm
     step = windows.sample_time
-    state = {s.name: np.zeros(len(windows)) for s in arm.states}
-    for j, coordinate in enumerate(arm.mechanism.coordinates):
-        state[coordinate.name] = windows.angle[:, HISTORY, j]
-        state[coordinate.speed] = windows.speed[:, HISTORY, j]
-    for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
-        readings = windows.pressure[:, : HISTORY + 1, i]
-        state[f"{prefix}pressure"] = lagged(readings, lag, step)
+    state = start_of(arm, windows)
     names = [coordinate.name for coordinate in arm.mechanism.coordinates]
     inputs = windows.pressure[:, HISTORY:]
     simulated, slopes = with_slopes(system, paths, inputs, step, state, names)

@@ -38,9 +38,8 @@ class ArmFit(Reported):
     """An arm identified from the first episodes and judged on the last ones; `print` it.
 
     arm          the arm along measured pressures, with the identified parameters
-    inspection   of all episodes
-    pairs        muscles, from 1, that raise and lower each angle; muscle 2j and 2j + 1 of `arm` are
-                 the pair of joint j
+    inspection   of the fitted episodes
+    pairs        columns of pressures, from 1, that raise and lower each angle
     errors       (N, rows, J) [rad] of the free run on the episodes left out; `episode` (N,) their
                  numbers
     by_baseline  errors of the same windows by the name of the baseline
@@ -55,6 +54,9 @@ class ArmFit(Reported):
     covariance   (P, P) of `estimates` [SI] along what the record separates; with others the arm
                  moves alike
     gain         errors of the physics alone and of the hybrid law, where one was asked for, or None
+    columns      of the pressures, from 1, that the muscles of `arm` have; by default those of
+                 `pairs` in turn
+    gains        of these readings, by default 1, and their zeros [Pa]: p = gain (reading - zero)
     """
 
     arm: PressureDriven
@@ -71,6 +73,18 @@ class ArmFit(Reported):
     commanded: Array | None = None
     covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     gain: ResidualGain | None = None
+    columns: tuple[int, ...] = ()
+    gains: tuple[float, ...] = ()
+    zeros: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        count = len(self.arm.muscle)
+        of_pairs = tuple(column for pair in self.pairs for column in pair)
+        vars(self).update(
+            columns=self.columns or of_pairs,
+            gains=self.gains or (1.0,) * count,
+            zeros=self.zeros or (0.0,) * count,
+        )
 
     @property
     def rms(self) -> Array:

@@ -1,3 +1,4 @@
+from .episodes_table import load_arm as load_arm
 from .identification import DynamicFitSetup as DynamicFitSetup
 from .identification import load_dynamic_fit as load_dynamic_fit
 from .initial_state import build_initial_conditions as build_initial_conditions
@@ -19,4 +20,8 @@ from .write import scenario_text as scenario_text
 # For the other packages, not in __all__
 from .controller import path_keys as path_keys
 from .controller import signal_units as signal_units
+from .episodes_table import EPISODES as EPISODES
+from .episodes_table import arm_file as arm_file
+from .episodes_table import arm_record as arm_record
+from .episodes_table import is_identified_arm as is_identified_arm
 from .scenario import scenario_tables as scenario_tables

@@ -3,7 +3,7 @@ docs/guides/scenario.md.
 
 Components are tables with `model` and their parameters; new components need no new grammar. Beside
 these tables are [observed] and [uncertainty], which fit-dynamic writes and predict reads, see
-plant_uncertainty.py.
+plant_uncertainty.py, and [episodes] of an arm that fit-joint has identified, see episodes_table.py.
 """
 
 import dataclasses
@@ -93,6 +93,9 @@ class ScenarioTables:
     uncertainty: PlantUncertainty | None = custom_field(
         read_plant_uncertainty, "of a fit", default=None
     )
+    episodes: Mapping[str, Any] = custom_field(
+        read_table, "record of an identified arm", default_factory=dict
+    )
     # of an entry of the library, so that its copy is a scenario; a simulation does not use them
     provenance: str = ""
     note: str = ""
@@ -103,7 +106,7 @@ class ScenarioTables:
     reference: tuple[Reference, ...] = ()
 
 
-TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty")
+TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty", "episodes")
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -31,7 +31,7 @@ from ..library.check import CONDITIONS, Check
 from ..library.entry import Entry
 from ..library.fields import is_required
 from ..library.valve_entry import PATHS
-from . import controller, initial_state, plant_uncertainty, scenario, values
+from . import controller, episodes_table, initial_state, plant_uncertainty, scenario, values
 from .controller import plant_fields
 
 Schema = dict[str, Any]
@@ -54,7 +54,11 @@ def scenario_schema() -> Schema:
     """Schema of a scenario file; see docs/guides/scenario.md."""
     models = _ModelSchemas()
     tables = models.table(scenario.ScenarioTables, model_needed=None)
-    tables["properties"] |= {"plant": _plant(models), "input": _input(models)}
+    tables["properties"] |= {
+        "plant": _plant(models),
+        "input": _input(models),
+        "episodes": models.table(episodes_table.EpisodesTable, model_needed=None),
+    }
     return _document("A simulation with airmuscle", tables, models)
 
 
@@ -211,6 +215,8 @@ class _ModelSchemas:
             )
         if reader is plant_uncertainty.read_plant_uncertainty:
             return self._reference(plant_uncertainty.UncertaintyTable)
+        if reader is episodes_table.read_record_mapping:
+            return {"type": "object"}
         if reader is initial_state.read_initial_table:
             return _by_name(_quantity("m"))
         if reader is values.read_drivers:

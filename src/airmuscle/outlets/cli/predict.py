@@ -8,9 +8,12 @@ from ...bench import RecordPrediction, StartTime
 from ...bench.prediction import prediction_chapters
 from ...core import FileError, check_writable
 from ...files.library import is_path, kind_of, list_plants, load_law, read_toml
+from ...files.scenario import arm_file, is_identified_arm
 from ...files.scenario.prediction import PlantModel, load_plant_model, predict_with_entry
 from ...recording import Recording
+from ...report.chapter import Chapter
 from ..requests import ReadingRequest, RequestError, Where, many, optional, request
+from ..requests.joint import predict_later
 from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
 from .options import Folder, Json, complete_model
@@ -18,11 +21,14 @@ from .parser import Argument
 from .requested import with_requests
 
 MODEL = (
-    "A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the"
-    " library."
+    "A muscle file, a scenario of fit-dynamic or campaign, an arm of fit-joint (its folder or"
+    " scenario), or a muscle, law or plant of the library."
 )
 Model = Annotated[str, Argument("MODEL", MODEL, complete_model)]
-RECORDS = "Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic."
+RECORDS = (
+    "Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic; for an"
+    " arm its later episodes, files, bags or folders."
+)
 Records = Annotated[list[Path], Argument("FILES", RECORDS)]
 
 
@@ -38,6 +44,12 @@ class PredictRequest:
     )
     own: tuple[str, ...] = many(
         "Scenario: parameter that is estimated from each record; repeatable.", metavar="PARAMETER"
+    )
+
+    horizon: int | None = optional(
+        "Arm: rows of the free run; default: those of its fit.",
+        bounds=(5, 1000),
+        metavar="ROWS",
     )
 
     def check(self, where: Where) -> None:
@@ -76,22 +88,67 @@ def predict(
     out: Folder = Path("prediction"),
     json: Json = False,
 ) -> None:
-    """Predict further records by an identified muscle or plant.
+    """Predict further records by an identified muscle, plant or arm.
 
     \b
     A muscle predicts slow records from pressure and contraction, with its friction and creep along
     the motion. A scenario of fit-dynamic or campaign predicts transient records by simulation of
-    its input. Prints rms error, maximum error and the share of rows within the stated 95 % band.
-    Writes DIR/report.html with figures and data.
+    its input. An arm of fit-joint predicts later episodes in free run from pressures: their columns
+    are those of its record, or of the mapping file that --mapping names. Prints rms error, maximum
+    error or skill, and the share of rows within the stated 95 % band. Writes DIR/report.html with
+    figures and data; of an arm DIR/data/angles.csv has measured and predicted angles.
 
     \b
     Examples:
       airmuscle predict identified/muscle.toml later.csv --resting-length "300 mm"
       airmuscle predict dynamic/scenario.toml fill3.csv --start-time "0.2 s" --start-margin "50 ms"
       airmuscle predict dynamic/scenario.toml further-records.toml --out prediction
+      airmuscle predict joint/scenario.toml later-episodes/ --out prediction
       airmuscle predict dmsp-20-300 bench.csv --json
     """
     check_writable(out)
+    if _is_arm(model):
+        chapters = _predicted_by_arm(model, files, request, reading)
+    else:
+        chapters = _predicted_records(model, files, request, reading)
+    deliver("predict", chapters, json=json, out=out, title="Prediction")
+
+
+def _is_arm(model: str) -> bool:
+    """Whether the model is an arm that fit-joint has written."""
+    path = arm_file(model)
+    return path.is_file() and is_identified_arm(read_toml(path))
+
+
+def _predicted_by_arm(
+    model: str, sources: Sequence[Path], request: PredictRequest, reading: ReadingRequest
+) -> list[Chapter]:
+    """The prediction of later episodes by an arm."""
+    _refuse("is not for an arm, which takes --mapping and --horizon", request, ("horizon",))
+    _refuse("is not for an arm, which takes --mapping and --horizon", reading, ("mapping",))
+    prediction = predict_later(arm_file(model), sources, reading.mapping, request.horizon)
+    return [prediction.chapter()]
+
+
+def _refuse(reason: str, stated: PredictRequest | ReadingRequest, allowed: Sequence[str]) -> None:
+    """Raise RequestError for options that are stated and not allowed."""
+    default = type(stated)()
+    names = [
+        name
+        for name, value in vars(stated).items()
+        if name not in allowed and value != getattr(default, name)
+    ]
+    if names:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in names)
+        raise RequestError(f"{options} {reason}")
+
+
+def _predicted_records(
+    model: str, files: Sequence[Path], request: PredictRequest, reading: ReadingRequest
+) -> list[Chapter]:
+    """The predictions of records by a muscle, a law or a plant."""
+    if request.horizon is not None:
+        raise RequestError("--horizon is for an arm of fit-joint; MODEL is none")
     is_file = is_path(model) or Path(model).exists()
     tables = [path for path in files if path.suffix == ".toml"]
     measured = [path for path in files if path not in tables]
@@ -101,12 +158,8 @@ def predict(
         recordings = read_recordings(measured, reading) if measured else []
         predictions = _predicted_by_plant(loaded, recordings, tables, request)
         thing = loaded.scenario.plant
-    elif stated := [
-        name for name in ("start_time", "start_margin", "own") if getattr(request, name)
-    ]:
-        options = ", ".join(f"--{name.replace('_', '-')}" for name in stated)
-        raise RequestError(f"{options} is for a scenario; MODEL is a muscle or a law")
     else:
+        _refuse("is for a scenario; MODEL is a muscle or a law", request, ())
         thing = load_law(model)
         if tables:
             raise FileError(
@@ -114,8 +167,8 @@ def predict(
                 " muscle."
             )
         predictions = [
-            predict_with_entry(thing, recording) for recording in read_recordings(files, reading)
+            predict_with_entry(thing, recording)
+            for recording in read_recordings(list(files), reading)
         ]
     chapters = prediction_chapters(Path(model).name, thing, predictions)
-    chapters += reading_chapters(prediction.recording for prediction in predictions)
-    deliver("predict", chapters, json=json, out=out, title="Prediction")
+    return [*chapters, *reading_chapters(prediction.recording for prediction in predictions)]

@@ -11,19 +11,24 @@ import numpy as np
 
 from ...bench.joint import (
     ArmFit,
+    ArmPrediction,
     EpisodeMapping,
     fit_joint,
     fit_known_joint,
+    identified_arm,
+    predict_episodes,
     read_episode_mapping,
     read_episodes,
 )
 from ...bench.joint.episode_formats import propose_mapping
 from ...bench.joint.episode_inspection import EpisodeInspection, inspect_episodes
+from ...bench.joint.episodes import join
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
+from ...core import ColumnError
 from ...engine.processes import Workers
 from ...files.library import list_plants
 from ...files.library.write import entry_of, model_table, scenario_toml, to_toml
-from ...files.scenario import load_scenario
+from ...files.scenario import EPISODES, arm_record, load_arm, load_scenario
 from ...files.scenario.plant_uncertainty import uncertainty_table
 from ...physics import PressureDriven
 from ...report.chapter import Chapter
@@ -172,8 +177,33 @@ def fit_requested_arm(
     }
     return (
         dataclasses.replace(fit.chapter(), title=title),
-        _scenarios(fit, names, title, note) | muscles,
+        _scenarios(fit, rules, names, title, note) | muscles,
     )
+
+
+def predict_later(
+    arm_path: Path, sources: Sequence[Path], mapping: Path | None, horizon: int | None
+) -> ArmPrediction:
+    """The prediction of later episodes by the arm of a scenario; they are read as its record was,
+    or by a mapping file. Raises RequestError where neither says how.
+    """
+    arm = load_arm(arm_path)
+    rules = arm.mapping if mapping is None else read_episode_mapping(mapping)
+    if rules is None:
+        raise RequestError(
+            f"{arm_path}: does not state how its record was read; give --mapping arm.toml, the"
+            " mapping file of fit-joint."
+        )
+    try:
+        parts = [read_episodes(source, rules) for source in sources]
+    except ColumnError as error:
+        if mapping is not None:
+            raise
+        raise ColumnError(
+            f"{error} Columns are looked for as in the record of the fit; a mapping file"
+            " (--mapping) may name others."
+        ) from None
+    return predict_episodes(arm, join(parts), horizon)
 
 
 IN_PLACE = (
@@ -183,9 +213,11 @@ IN_PLACE = (
 SCALED = "the scale of its forces is chosen: the record contains pressures and angles alone"
 
 
-def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict[str, str]:
-    """The arm at constant set points, and with a PID controller of each angle to be tuned; `names`
-    as in the pairs.
+def _scenarios(
+    fit: ArmFit, mapping: EpisodeMapping, names: Sequence[str], title: str, note: str
+) -> dict[str, str]:
+    """The arm at constant set points, and with a PID controller of each angle to be tuned, both
+    with their record; `names` as in the pairs.
     """
     episodes = fit.inspection.episodes
     middle = np.median(episodes.rows("pressure"), axis=0)
@@ -209,10 +241,13 @@ def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict
     law = laws[0] if len(laws) == 1 else Decentralised(tuple(laws))
     controller = {**model_table(law), "sample_time": 0.01, "setpoint": wanted}
     tuned = f"{note}, and so are the gains: airmuscle tune finds better ones"
-    uncertainty = {"uncertainty": uncertainty_table(fit.uncertainty())}
+    fitted = {
+        "uncertainty": uncertainty_table(fit.uncertainty()),
+        EPISODES: arm_record(identified_arm(fit, mapping)),
+    }
     return {
-        "scenario.toml": scenario_toml(title, fit.plant(), schedule, run, note, uncertainty),
+        "scenario.toml": scenario_toml(title, fit.plant(), schedule, run, note, fitted),
         "controlled.toml": scenario_toml(
-            f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned, uncertainty
+            f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned, fitted
         ),
     }

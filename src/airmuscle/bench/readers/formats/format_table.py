@@ -51,7 +51,8 @@ class Format:
         if self.tables is None:
             raise FileError(
                 f"{path.name}: {self.name} files are read as episodes of an arm alone (airmuscle"
-                f" fit-joint). For a recording, write one of {', '.join(EXTENSIONS)}."
+                " fit-joint, and predict with the arm that it has written). For a recording, write"
+                f" one of {', '.join(EXTENSIONS)}."
             )
         tables: tuple[RawTable, ...] = self._call(self.tables, path, selection)
         return tables
