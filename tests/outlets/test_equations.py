@@ -23,7 +23,7 @@ import pytest
 from airmuscle import geometry, load
 from airmuscle.bench import fit, fit_chapter
 from airmuscle.bench.statics.static_fit_chapter import equation_section
-from airmuscle.core import Value, model, ops, parameter
+from airmuscle.core import model, ops, parameter
 from airmuscle.files import library, load_data
 from airmuscle.physics import (
     Characteristic,
@@ -73,7 +73,7 @@ class OperationsOfLaws(ForceLaw):
     limit: float = parameter("N", "a", "force at the limit", bounds=(0.0, 1e4), default=50.0)
     slope: float = parameter("1", "b", "slope", bounds=(-1e3, 1e3), default=-3.0)
 
-    def force(self, pressure: Value, contraction: Value) -> Value:
+    def force(self, pressure: Any, contraction: Any) -> Any:
         scaled = pressure / 3e5
         middle = ops.both(scaled > 0.5, ops.logical_not(contraction > 0.08))
         rare = ops.either(ops.both(middle, scaled < 1.2), contraction == 0.0)
