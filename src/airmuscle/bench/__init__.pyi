@@ -38,8 +38,12 @@ from .dynamics import DynamicFit as DynamicFit
 from .dynamics import Experiment as Experiment
 from .dynamics import InitialConditions as InitialConditions
 from .dynamics import InitialValue as InitialValue
+from .dynamics import PlannedParameter as PlannedParameter
+from .dynamics import PlannedSignal as PlannedSignal
 from .dynamics import RecordRanking as RecordRanking
 from .dynamics import RegulatorFit as RegulatorFit
+from .dynamics import SignalLimits as SignalLimits
+from .dynamics import SignalPlan as SignalPlan
 from .dynamics import StartTime as StartTime
 from .dynamics import cross_predict as cross_predict
 from .dynamics import describe_cross_predictions as describe_cross_predictions
@@ -47,6 +51,7 @@ from .dynamics import fit_dynamic as fit_dynamic
 from .dynamics import fit_regulator as fit_regulator
 from .dynamics import fit_tube as fit_tube
 from .dynamics import locate_pressure_sensor as locate_pressure_sensor
+from .dynamics import plan_signals as plan_signals
 from .dynamics import rank_records as rank_records
 from .dynamics import stated_ambient as stated_ambient
 from .estimation import UNCENSORED as UNCENSORED

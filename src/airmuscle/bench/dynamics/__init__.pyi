@@ -25,6 +25,17 @@ from .result import DynamicFit as DynamicFit
 from .result import DynamicProfile as DynamicProfile
 from .result import SensorLocation as SensorLocation
 from .result import locate_pressure_sensor as locate_pressure_sensor
+from .signal_information import ParameterKnowledge as ParameterKnowledge
+from .signal_information import SignalSimulator as SignalSimulator
+from .signal_information import held_schedule as held_schedule
+from .signal_information import knowledge_of as knowledge_of
+from .signal_limits import SignalLimits as SignalLimits
+from .signal_plan import PlannedParameter as PlannedParameter
+from .signal_plan import PlannedSignal as PlannedSignal
+from .signal_plan import SignalPlan as SignalPlan
+from .signal_plan import plan_signals as plan_signals
+from .signal_shapes import SignalShape as SignalShape
+from .signal_shapes import standard_shapes as standard_shapes
 
 # isort: split
 # For the other rooms, not in __all__

@@ -12,6 +12,7 @@ from ...bench.inspection import inspect
 from ...core import check_known, check_writable, counted
 from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import load_dynamic_fit
+from ...files.scenario.plant_uncertainty import fit_uncertainty
 from ...recording.recording import row_notes
 from ..requests import WEAK, ReadingRequest, many, option, optional, request
 from .delivery import deliver
@@ -157,7 +158,14 @@ def fit_regulator_command(
     of_scenario = "a step over the range of the first record"
     contents = {
         "regulator.toml": part_toml("circuit", result.regulator),
-        "scenario.toml": scenario_toml(title, result.plant, step, run, of_scenario),
+        "scenario.toml": scenario_toml(
+            title,
+            result.plant,
+            step,
+            run,
+            of_scenario,
+            {"uncertainty": fit_uncertainty(result.fit)},
+        ),
     }
     chapters = [*regulator_chapters(result, title), *reading_chapters(recordings)]
     deliver(
