@@ -26,7 +26,7 @@ from measurement_files import (
     WRITERS,
 )
 
-from airmuscle.bench import ColumnMapping, read, read_episodes
+from airmuscle.bench import ColumnMapping, read, read_csv, read_episodes
 from airmuscle.bench.readers.formats import format_table
 from airmuscle.bench.readers.tables import separate_process
 from airmuscle.errors import AirmuscleError, FileError
@@ -84,8 +84,42 @@ def test_every_format_gives_the_same_episode(tmp_path: Path, name: str):
 
 
 @pytest.mark.parametrize("form", format_table.FORMATS, ids=lambda form: form.name)
-def test_what_the_program_does_not_parse_itself_is_read_in_a_separate_process(form):
-    assert form.is_separate or form is format_table.TEXT
+def test_every_format_is_read_in_the_separate_process(form, tmp_path, monkeypatch):
+    """Text above the size up to which its time and memory are below the limits of the process."""
+    path = tmp_path / "run"
+    path.write_bytes(b"1,2\n" * (1 + form.size_here // 4))
+    monkeypatch.setattr(format_table, "call_in_separate_process", lambda *given, **_: given[2])
+    monkeypatch.setattr(format_table, "check_installed", lambda *_: None)
+    assert form.call("raw_csv.read_text_tables", path) == path
+
+
+def test_only_text_is_read_here_up_to_the_size_of_the_monsters_of_text():
+    """Those of test_monstrous_text.py, which are read within a quarter of the memory."""
+    here = {form.name: form.size_here for form in format_table.FORMATS if form.size_here}
+    assert here == {"text": 4_000_000}
+    assert separate_process.CPU_LIMIT >= 15.0
+    assert separate_process.MEMORY_LIMIT >= 4 * 5e8
+
+
+def test_the_limits_hold_for_text(tmp_path, monkeypatch):
+    """Lines of one digit need more of a processor than this test allows."""
+    path = tmp_path / "run.csv"
+    path.write_bytes(b"force [N]\n" + b"1\n" * 2_500_000)
+    monkeypatch.setattr(separate_process, "CPU_LIMIT", 0.05)
+    separate_process.stop()
+    with pytest.raises(FileError, match=r"run\.csv: .* need more than 0 s of a processor"):
+        read_csv(path)
+
+
+def test_a_long_text_states_its_progress(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_bytes(b"force [N],pressure [kPa]\n" + b"150.5,225.25\n" * 320_000)
+    told = []
+    (recording,) = read(path, progress=lambda name, fraction: told.append((name, fraction)))
+    assert len(recording) > 1e5
+    assert {name for name, _ in told} == {"run.csv"}
+    assert [fraction for _, fraction in told] == sorted(fraction for _, fraction in told)
+    assert told[-1][1] == 1.0
 
 
 # Monsters of any format

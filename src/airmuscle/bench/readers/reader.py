@@ -17,9 +17,7 @@ from .formats import (
     TEXT,
     Progress,
     format_of,
-    read_csv_table,
     read_text_stream,
-    read_text_tables,
 )
 from .interpret import interpret
 from .mapping import (
@@ -57,7 +55,7 @@ def read_csv(
         raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     mapping = mapping.of_file(path)
-    table = read_csv_table(path, mapping.text_format)
+    table: RawTable = TEXT.call("raw_csv.read_csv_table", path, mapping.text_format)
     check_mapped_columns(mapping, mapped_columns(table, mapping), table)
     return interpret(apply_mapping(table, mapping), mapping, mapping.constants_of(path))
 
@@ -165,10 +163,5 @@ def read_tables(
             read_text_stream(sys.stdin.buffer, "standard input", mapping.text_format, downsampling),
         )
     selection = mapping.selection(downsampling)
-    form = format_of(path)
-    tables = (
-        read_text_tables(path, selection, progress)
-        if form is TEXT
-        else form.read_tables(path, selection)
-    )
+    tables = format_of(path).read_tables(path, selection, progress)
     return tuple(downsample(table, downsampling) for table in tables)

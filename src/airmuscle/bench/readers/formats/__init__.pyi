@@ -8,7 +8,5 @@ from .mat_contents import MatlabObject as MatlabObject
 from .mat_contents import find_objects as find_objects
 from .mat_contents import read_contents as read_contents
 from .raw_csv import Progress as Progress
-from .raw_csv import read_csv_table as read_csv_table
 from .raw_csv import read_text_stream as read_text_stream
-from .raw_csv import read_text_tables as read_text_tables
 from .raw_mat import read_mat_tables as read_mat_tables

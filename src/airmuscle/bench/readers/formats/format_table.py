@@ -1,9 +1,10 @@
 """Formats of measurement files: one table of their extensions, first bytes and readers.
 
 A reader gives tables, which become recordings, or the arrays of episodes; a format without arrays
-gives an episode for each table. All but text, which the program parses itself, are read in a
-separate process with limits of its time and memory, in which links to other files are refused.
-Text has no links, and is parsed in chunks, so that its time and memory are those of its size.
+gives an episode for each table. All formats are read in a separate process with limits of its time
+and memory, in which links to other files are refused. Text, which has no links and which the
+program parses itself, is read in this process up to a size with which its time and memory are below
+these limits, because the start of a process takes longer.
 """
 
 import dataclasses
@@ -23,6 +24,7 @@ from ..tables import (
     is_text,
     named_function,
 )
+from .raw_csv import LARGE_FILE_BYTES, Progress
 
 
 @dataclasses.dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Format:
     package     that it needs
     tables, arrays  its readers, functions of modules of this package, which the process that reads
                 imports; None if it gives episodes alone, or an episode for each table
-    is_separate     whether it is read in the separate process
+    size_here       size [bytes] up to which a file is read in this process, not in the separate one
     """
 
     name: str
@@ -44,43 +46,54 @@ class Format:
     package: str | None = None
     tables: str | None = None
     arrays: str | None = None
-    is_separate: bool = True
+    size_here: int = 0
 
-    def read_tables(self, path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
-        """The uninterpreted tables of a file. Raises FileError or ColumnError."""
+    def read_tables(
+        self, path: Path, selection: Selection = Selection(), progress: Progress | None = None
+    ) -> tuple[RawTable, ...]:
+        """The uninterpreted tables of a file; a reader of text states its progress. Raises
+        FileError or ColumnError.
+        """
         if self.tables is None:
             raise FileError(
                 f"{path.name}: {self.name} files are read as episodes of an arm alone (airmuscle"
                 " fit-joint, and predict with the arm that it has written). For a recording, write"
                 f" one of {', '.join(EXTENSIONS)}."
             )
-        tables: tuple[RawTable, ...] = self._call(self.tables, path, selection)
+        report = progress if self is TEXT else None
+        tables: tuple[RawTable, ...] = self.call(self.tables, path, selection, progress=report)
         return tables
 
     def read_arrays(self, path: Path) -> list[Arrays]:
         """The arrays of every episode in a file. Raises FileError or ColumnError."""
         if self.arrays is None:
             return [arrays_of_table(table) for table in self.read_tables(path)]
-        arrays: list[Arrays] = self._call(self.arrays, path)
+        arrays: list[Arrays] = self.call(self.arrays, path)
         return arrays
 
-    def _call(self, reader: str, path: Path, *arguments: Any) -> Any:
+    def call(
+        self, reader: str, path: Path, *arguments: Any, progress: Progress | None = None
+    ) -> Any:
+        """What a function of a module of this package, `module.function`, reads in a file. Raises
+        FileError or ColumnError.
+        """
         if self.package is not None:
             check_installed(self.package, path)
         check_regular_file(path)
         check_is_data(path)
         name, _, function = reader.partition(".")
         module = f"{__package__}.{name}"
-        if not self.is_separate:
-            return named_function(module, function)(path, *arguments)
-        return call_in_separate_process(module, function, path, *arguments)
+        if path.stat().st_size > self.size_here:
+            return call_in_separate_process(module, function, path, *arguments, progress=progress)
+        last = () if progress is None else (progress,)
+        return named_function(module, function)(path, *arguments, *last)
 
 
 TEXT = Format(
     "text",
     (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".lvm"),
     tables="raw_csv.read_text_tables",
-    is_separate=False,
+    size_here=LARGE_FILE_BYTES,
 )
 WORKBOOK = Format(
     "workbook",

@@ -262,8 +262,10 @@ def _check_decimal_sign(
 
 
 LARGE_FILE_BYTES = 4_000_000
-"""Files larger than this are read in chunks (chosen: as a whole, such a file of lines of one digit
-takes 0.4 GB and 3 s, measured; in chunks, ten times as much takes 0.2 GB)."""
+"""Files larger than this are read in chunks, in a separate process (chosen: as a whole, such a file
+of lines of one digit takes 0.4 GB and 3 s, measured; in chunks, ten times as much takes 0.2 GB)."""
+LONGEST_LINE = 10_000_000
+"""Most characters of a line of a stream (chosen; a file of 100 000 columns has a tenth)."""
 _HEADER_BYTES = 65_536
 _CHUNK_ROWS = 100_000
 
@@ -335,7 +337,8 @@ def read_text_stream(
         )
     first, header = _read_header(origin, beginning, encoding, text_format)
     blocks = itertools.chain([beginning], iter(lambda: stream.read(1 << 20), b""))
-    lines = enumerate(_split_lines(codecs.iterdecode(blocks, encoding, errors="replace")), 1)
+    text = codecs.iterdecode(blocks, encoding, errors="replace")
+    lines = enumerate(_split_lines(origin, text), 1)
     body = (
         (i, line) for i, line in lines if i >= first and has_content(line) and not is_comment(line)
     )
@@ -358,11 +361,15 @@ def read_text_stream(
     return downsample(header.table(origin, _joined(parts), rows, notes), downsampling)
 
 
-def _split_lines(blocks: Iterable[str]) -> Iterator[str]:
+def _split_lines(origin: str, blocks: Iterable[str]) -> Iterator[str]:
     rest = ""
     for block in blocks:
         *lines, rest = f"{rest}{block}".split("\n")
         yield from (line.removesuffix("\r") for line in lines)
+        if len(rest) > LONGEST_LINE:
+            raise FileError(
+                f"{origin}: a line has more than {LONGEST_LINE} characters. It is no table."
+            )
     yield rest
 
 

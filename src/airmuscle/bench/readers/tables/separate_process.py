@@ -68,8 +68,9 @@ except ImportError:  # Windows, where the time is limited alone
 
 TIME_LIMIT = 60.0
 CPU_LIMIT = 15.0
-"""Limits of time and processor time [s] of a file, and of every further 100 MB (chosen: 20 MB take
-less than 1 s).
+FURTHER = 25e6
+"""Limits of time and processor time [s] of a file, and of every further 25 MB (chosen: as text with
+a column of words they take 5 s, in other formats 1 s).
 """
 MEMORY_SETTING = "AIRMUSCLE_READER_MEMORY"
 """Environment variable with the limit of the memory of a reader, such as `8 GB`."""
@@ -117,20 +118,29 @@ def check_installed(package: str, path: Path) -> None:
         raise _missing_package(package, path)
 
 
-def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:
-    """Return `function(path, *arguments)` of a module, evaluated in the separate process. An
-    exception of the function is raised here. Raises FileError if the process ends or exceeds its
-    limits of time and memory.
+def call_in_separate_process(
+    module: str,
+    function: str,
+    path: Path,
+    *arguments: Any,
+    progress: Callable[[str, float], None] | None = None,
+) -> Any:
+    """Return `function(path, *arguments)` of a module, evaluated in the separate process; with
+    `progress`, the function receives one as last argument. An exception of the function is raised
+    here. Raises FileError if the process ends or exceeds its limits of time and memory.
     """
     path = Path(path).absolute()
     size = path.stat().st_size
-    longer = 1.0 + size / 1e8
+    longer = 1.0 + size / FURTHER
     memory = memory_limit(size)
     limits = Limits(CPU_LIMIT * longer, memory)
     try:
         with _lock:
             return _worker.call(
-                call_function, (limits, module, function, path, *arguments), TIME_LIMIT * longer
+                call_function,
+                (limits, module, function, path, *arguments),
+                TIME_LIMIT * longer,
+                None if progress is None else _of_files(progress),
             )
     except WorkerError as error:
         cause = (
@@ -149,6 +159,16 @@ def call_in_separate_process(module: str, function: str, path: Path, *arguments:
         f"{path.name}: the file is damaged or too large ({cause}). Copy it again from its source,"
         " or export it as text."
     )
+
+
+def _of_files(progress: Callable[[str, float], None]) -> Callable[..., None]:
+    """The report to a worker of the fractions of files that it has read, without its start."""
+
+    def report(*told: Any) -> None:
+        if isinstance(told[0], str):
+            progress(*told)
+
+    return report
 
 
 class Limits(NamedTuple):
