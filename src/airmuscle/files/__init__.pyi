@@ -1,10 +1,12 @@
 from .library import CheckResult as CheckResult
 from .library import Entry as Entry
+from .library import EntryDifference as EntryDifference
 from .library import ParameterUncertainty as ParameterUncertainty
 from .library import PlantEntry as PlantEntry
 from .library import ProductEntry as ProductEntry
 from .library import ValveEntry as ValveEntry
 from .library import allow_code as allow_code
+from .library import compare_entries as compare_entries
 from .library import entries_of_product as entries_of_product
 from .library import list_data as list_data
 from .library import list_laws as list_laws

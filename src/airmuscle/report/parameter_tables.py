@@ -43,14 +43,14 @@ def leaf_table(
         finite = [_finite_bounds(field.bounds) for field in declared]
         columns["bounds"] = TableColumn(finite, BY_ROW, digits=6)
         columns["fitted"] = TableColumn([field.fitted for field in declared], brief=False)
-    return Table(name, title, columns, brief=_ends_of_lists(paths) if brief else 0)
+    return Table(name, title, columns, brief=ends_of_lists(paths) if brief else 0)
 
 
 def _finite_bounds(bounds: tuple[float, float]) -> tuple[float, float] | None:
     return bounds if any(map(math.isfinite, bounds)) else None
 
 
-def _ends_of_lists(paths: Sequence[str]) -> list[int]:
+def ends_of_lists(paths: Sequence[str]) -> list[int]:
     """The rows of all parameters, without the middle of long lists."""
     stems = [path.partition("[")[0] for path in paths]
     rows = []

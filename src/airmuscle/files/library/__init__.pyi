@@ -1,4 +1,6 @@
 from ..scenario.prediction import predict_with_entry as predict_with_entry
+from .difference import EntryDifference as EntryDifference
+from .difference import compare_entries as compare_entries
 from .entry import Entry as Entry
 from .entry_by_name import load as load
 from .fields import PACKAGES as PACKAGES
@@ -6,6 +8,7 @@ from .fields import allow_code as allow_code
 from .fields import is_code_allowed as is_code_allowed
 from .fields import model_class as model_class
 from .fields import model_names as model_names
+from .file_format import FORMAT as FORMAT
 from .files import Location as Location
 from .files import entries_of_product as entries_of_product
 from .files import located_errors as located_errors

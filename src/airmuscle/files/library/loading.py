@@ -11,6 +11,7 @@ from ...physics.muscle.geometry.base import Geometry
 from .. import library
 from .build import build
 from .entry import Entry, issue_warning
+from .file_format import without_format
 from .files import (
     Location,
     check_keys,
@@ -155,6 +156,8 @@ def build_entry(tables: Mapping[str, Any], location: Location, kind: str = LAW) 
         )
         tables = {key: value for key, value in tables.items() if key not in keys}
     cited: tuple[Reference, ...] = ()
+    if kind == LAW:
+        tables = without_format(tables, location)
     if kind == LAW and "product" in tables:
         if "ratings" in tables:
             raise ParameterError(

@@ -14,6 +14,7 @@ from ...physics import Characteristic, Muscle, Ratings, ValidityRange
 from .check import Check
 from .entry import OPTIONAL_PARTS, Entry
 from .fields import model_name
+from .file_format import FORMAT, FORMAT_KEY
 from .fitted_entry import fitted_entry
 from .uncertainty import ParameterUncertainty, StatedBand
 
@@ -32,7 +33,8 @@ def to_toml(entry: Entry) -> str:
         if entry.geometry == getattr(entry.characteristic, "geometry", None)
         else entry.geometry
     )
-    return tables_toml(stated_table(dataclasses.replace(entry, geometry=geometry)))
+    stated = stated_table(dataclasses.replace(entry, geometry=geometry))
+    return tables_toml({FORMAT_KEY: FORMAT, **stated})
 
 
 def stated_table(thing: Any) -> dict[str, Any]:

@@ -30,6 +30,7 @@ from ..library import (
 from ..library.check import CONDITIONS, Check
 from ..library.entry import Entry
 from ..library.fields import is_required
+from ..library.file_format import FORMAT, FORMAT_KEY
 from ..library.valve_entry import PATHS
 from . import controller, episodes_table, initial_state, plant_uncertainty, scenario, values
 from .controller import plant_fields
@@ -68,7 +69,13 @@ def muscle_schema() -> Schema:
     """
     models = _ModelSchemas()
     tables = models.table(Entry, model_needed=None)
-    tables["properties"] |= {"product": _TEXT}
+    version = {
+        "description": "version of the format of muscle files; 1 if it is not stated",
+        "type": "integer",
+        "minimum": 1,
+        "maximum": FORMAT,
+    }
+    tables["properties"] |= {FORMAT_KEY: version, "product": _TEXT}
     return _document("A muscle or a law in airmuscle", tables, models)
 
 

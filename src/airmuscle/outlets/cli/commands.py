@@ -51,6 +51,7 @@ COMMANDS = (
     CommandRow(
         "show", "library", "show", "Show parameters, sources and checks of a library entry."
     ),
+    CommandRow("diff", "difference", "diff", "Compare two muscles or laws: parameters and forces."),
     CommandRow("cite", "library", "cite", "Print the references of a library entry."),
     CommandRow(
         "evaluate",

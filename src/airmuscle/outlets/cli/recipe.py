@@ -29,7 +29,6 @@ def recipe(request: RecipeRequest, out: OptionalFolder = None, json: Json = Fals
           --pressure "5 bar" --out nine
       airmuscle recipe --bore "3 mm" --wall "1 mm" --length "150 mm" --modulus "2 MPa" --turn "20
           mm" --thread "0.2 mm" --threads 48 --pressure "5 bar"
-      airmuscle evaluate nine/muscle.toml --pressure "5 bar" --force "20 N"
     """
     if out is not None:
         check_writable(out)
