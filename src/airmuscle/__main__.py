@@ -25,6 +25,7 @@ def main() -> None:
     try:
         importlib.import_module("airmuscle.outlets.cli.streams").prepare_streams()
         interruption = importlib.import_module("airmuscle.outlets.cli.interruption")
+        interruption.end_on_sigterm()
         with interruption.deferred_sigint():
             app = importlib.import_module("airmuscle.outlets.cli.commands").app
             interruption.check_interrupted()

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from command_line import airmuscle
+from widths import widened
 
 from airmuscle.core import (
     atomic_file,
@@ -73,6 +74,37 @@ def test_what_a_killed_writer_has_left_is_removed_by_the_next_one(tmp_path: Path
         for writer in writers:
             writer.kill()
             writer.communicate()
+
+
+CONVERTS = """
+import sys, time
+from unittest import mock
+from airmuscle.__main__ import main
+from airmuscle.bench.readers import writer
+
+write = dict(writer._WRITERS)
+
+def slow(recording, temporary, path, comments):
+    write[path.suffix](recording, temporary, path, comments)
+    print("ready", flush=True)
+    time.sleep(60)
+
+with mock.patch.dict(writer._WRITERS, dict.fromkeys(write, slow)):
+    main()
+"""
+
+
+@pytest.mark.parametrize("ending", widened(["csv", "parquet", "h5"], lambda e: e == "h5"))
+def test_a_conversion_that_is_killed_leaves_nothing(tmp_path: Path, ending: str):
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],force [N]\n" + "".join(f"{t},{t}\n" for t in range(20)))
+    command = [sys.executable, "-c", CONVERTS, "convert", path, tmp_path / f"new.{ending}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as converter:
+        assert converter.stdout.readline() == "ready\n"
+        assert len(list(tmp_path.glob(".*.part"))) == 1
+        converter.terminate()
+    assert converter.returncode == 143
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_several_writers_of_one_file_leave_one_complete_text(tmp_path: Path):

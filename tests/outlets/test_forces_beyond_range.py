@@ -8,6 +8,7 @@ Scale of a deviation: 1.5 times the rated force.
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import math
 import re
@@ -30,6 +31,7 @@ from airmuscle.engine.compile import compile_system, functions
 from airmuscle.engine.compile.text import languages
 from airmuscle.errors import AirmuscleError, AirmuscleWarning
 from airmuscle.outlets import (
+    C99,
     JavaScript,
     Octave,
     OnnxStack,
@@ -37,11 +39,13 @@ from airmuscle.outlets import (
     WarpStack,
     write_actuator,
     write_fmu,
+    write_law,
     write_modelica,
     write_mujoco_plugin,
     write_program,
 )
 from airmuscle.physics import LinearDamper, LinearSpring, Ratings, ValidityRange, Vessel
+from airmuscle.physics.muscle.characteristic import calls
 
 RANGE = ValidityRange(0.5e5, 6e5, 0.0, 0.2)
 RATED = 1500.0
@@ -378,6 +382,71 @@ def of_mujoco(plant, folder, name):
     return forces
 
 
+def stated(plant):
+    """The law of a plant with the range and the ratings of its muscle."""
+    muscle = plant.muscle
+    return calls.with_stated_range(
+        muscle.contractile, muscle.validity_range, muscle.ratings.max_force
+    )
+
+
+def of_law_in_c(plant, folder, name):
+    write_law(stated(plant), folder, C99(), name="law")
+    library = printed.shared_library('#include "law.c"\n', folder, level="-O0")
+    defaults = (ctypes.c_double * 500).in_dll(library, "law_defaults")
+    prepared = np.zeros(500)
+    library.law_prepare(defaults, ctypes.c_void_p(prepared.ctypes.data))
+
+    def forces(points):
+        rows = np.empty((len(points.pressure), 3))
+        for row, pressure, contraction in zip(rows, *points, strict=True):
+            printed.call(library.law_evaluate, pressure, contraction, prepared, row)
+        return rows[:, 0]
+
+    return forces
+
+
+LAW_IN_JAVASCRIPT = """
+import {law, results} from "./law.mjs";
+import {readFileSync} from "fs";
+const points = JSON.parse(readFileSync("data.json"));
+console.log(JSON.stringify(points.map(([a, b]) => law(a, b)[results[0]])));
+"""
+
+
+def of_law_in_javascript(plant, folder, name):
+    write_law(stated(plant), folder, JavaScript(), name="law")
+
+    def forces(points):
+        rows = np.column_stack(points).tolist()
+        return np.array(printed.run_node(LAW_IN_JAVASCRIPT, rows, folder), dtype=float)
+
+    return forces
+
+
+LAW_IN_OCTAVE = """
+points = dlmread('points.txt');
+printf('%.17g\\n', law(points(:, 1), points(:, 2)));
+"""
+
+
+def of_law_in_octave(plant, folder, name):
+    octave = [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", LAW_IN_OCTAVE]
+    write_law(stated(plant), folder, Octave(), name="law")
+
+    def forces(points):
+        np.savetxt(folder / "points.txt", np.column_stack(points), fmt="%.17g")
+        _, text = printed.finished(octave, folder)
+        return np.array([float(line) for line in text.split()])
+
+    return forces
+
+
+PRINTED_LAWS = {
+    "C": of_law_in_c,
+    "JavaScript": of_law_in_javascript,
+    "Octave": of_law_in_octave,
+}
 TARGETS = {
     "machine code": of_machine_code,
     "C": of_c,
@@ -411,14 +480,42 @@ def test_the_force_of_every_target_is_that_of_numpy_and_monotone_and_bounded(
     expected = plant.muscle.tension(*points)
     assert np.isfinite(found).all()
     assert np.abs(found - expected).max() <= ROUNDING * LIMIT * RATED
-    inside = RANGE.contains(*points)
     assert (found >= 0.0).all()
+    check_contract(points, found, expected)
+
+
+def check_contract(points, found, expected):
+    """Bounded, without push outside the range, and falling with the contraction beyond it."""
+    inside = RANGE.contains(*points)
+    assert (found[~inside] >= 0.0).all()
     assert found.max() <= max(LIMIT * RATED, expected[inside].max()) * (1.0 + ROUNDING)
-    table = found.reshape(len(PRESSURES), -1)
+    # a formula that pushes inside the range is slack from its end on
+    table = np.maximum(found, 0.0).reshape(len(PRESSURES), -1)
     contraction = points.contraction[: table.shape[1]]
     beyond = ~((contraction >= RANGE.min_contraction) & (contraction <= RANGE.max_contraction))
     falls = np.diff(table, axis=1)[:, beyond[1:] | beyond[:-1]]
     assert (falls <= ROUNDING * RATED).all()
+
+
+@pytest.mark.parametrize("target", PRINTED_LAWS)
+@pytest.mark.parametrize("name", widened(laws(), lambda name: name in USUAL))
+def test_the_force_of_a_printed_law_is_that_of_python_and_monotone_and_bounded(
+    target, name, tmp_path
+):
+    """A law alone, with the range and the ratings of its muscle; one of straight fibres, whose
+    force is infinite at zero contraction, is its formula.
+    """
+    plant = plant_of(name)
+    points = points_of(name)
+    found = PRINTED_LAWS[target](plant, tmp_path, name)(points)
+    law = stated(plant)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        expected = law.force(*points)
+    scale = max(LIMIT * RATED, np.abs(expected).max())
+    assert np.abs(found - expected).max() <= ROUNDING * scale
+    if not law.refuses_beyond:
+        check_contract(points, found, expected)
 
 
 @pytest.mark.tool

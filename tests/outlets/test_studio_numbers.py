@@ -135,6 +135,27 @@ def test_every_law_of_the_page_gives_the_numbers_of_the_library(tmp_path):
     assert wrong == {}
 
 
+SAY = """
+console.log(JSON.stringify(DATA[1].map(([p, c]) => {
+  const law = new airmuscle.Law(DATA[0]);
+  law.values.set(DATA[0].values); law.prepare();
+  return airmuscle.textBeyond(law, { contraction: c, force: law.force(p, c) });
+})));
+"""
+
+
+def test_the_page_says_what_a_law_is_beyond_its_range_in_the_words_of_the_contract(tmp_path):
+    sheet = law_sheet(am.load("dmsp-20-300"))
+    script = sheet.pop("script")
+    points = [(3e5, -0.02), (3e5, 0.6), (9e5, 0.1)]
+    said = run_script(scripts(*BEGINNING) + script + SAY, [sheet, points], tmp_path)
+    contract = (EXAMPLES.parent / "docs" / "reference" / "conventions.md").read_text("utf-8")
+    for text, words in zip(said, ("sleeve", "slack", "1.5 times the rated force"), strict=True):
+        assert words in text
+        assert words in contract
+    assert "extrapolation" not in " ".join(scripts(*BEGINNING).split())
+
+
 def test_a_law_without_a_closed_form_is_approximated_and_the_error_is_stated():
     sheet = law_sheet(am.load("festo-tool-dmsp-20"))
     assert 0.0 < sheet["approximation"]["rms_error"] < sheet["approximation"]["max_error"] < 25.0

@@ -1,5 +1,5 @@
 """Deferred handling of SIGINT (Ctrl-C), so that no interruption of the command `airmuscle` is
-lost.
+lost, and an orderly end by SIGTERM (kill), which leaves no unfinished file.
 """
 
 import contextlib
@@ -12,7 +12,23 @@ from typing import Any
 INTERRUPTED = 130
 """Exit code of an interrupted command: 128 + SIGINT."""
 
+TERMINATED = 143
+"""Exit code of a command that was ended by SIGTERM: 128 + SIGTERM."""
+
 _received = threading.Event()
+
+
+def end_on_sigterm() -> None:
+    """From now on SIGTERM, unless it is ignored or handled already, leaves all blocks of the main
+    thread, which remove their temporary files, and ends the process.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if is_main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, _end)
+
+
+def _end(number: int, frame: Any) -> None:
+    raise SystemExit(TERMINATED)
 
 
 @contextlib.contextmanager

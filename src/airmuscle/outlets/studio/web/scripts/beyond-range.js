@@ -43,5 +43,13 @@
     return Math.abs(law.force(pressure, contraction) - force) <= CLOSE * Math.max(1, Math.abs(force));
   }
 
-  Object.assign(airmuscle, { extendedForce, forceLimits, holds });
+  /* What a law is at a point outside its validity range, in the words of the documentation of the contract. */
+  function textBeyond({ sheet: { beyond } }, { contraction, force }) {
+    if (!beyond) return "the law is not continued there";
+    if (contraction < beyond.begin) return "a stretched sleeve, with the stiffness of the law at the beginning of the range";
+    if (contraction > beyond.end) return force > 0 ? "the force falls with the mean stiffness to zero" : "the muscle is slack";
+    return "the formula of the law, at most 1.5 times the rated force";
+  }
+
+  Object.assign(airmuscle, { extendedForce, forceLimits, holds, textBeyond });
 })();

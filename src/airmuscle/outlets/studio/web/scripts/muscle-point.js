@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, complain, noNumber, shortText, readNumber } = airmuscle;
+  const { element, complain, noNumber, shortText, readNumber, textBeyond } = airmuscle;
   const QUANTITIES = { pressure: ["Pressure", "bar", 1e5], contraction: ["Contraction", "%", 0.01], force: ["Force", "N", 1] };
 
   class PointPanel {
@@ -75,7 +75,9 @@
     if (beyond.length) return [`Beyond the values that the maker permits: ${beyond.join(", ")}.`, true];
     if (force < 0) return ["The force is negative; a muscle cannot push and is slack here.", true];
     const inside = !valid || (pressure >= valid.min_pressure && pressure <= valid.max_pressure && contraction >= valid.min_contraction && contraction <= valid.max_contraction);
-    return inside ? ["", false] : [`Outside the validity range, ${shortText(valid.min_pressure / 1e5)} to ${shortText(valid.max_pressure / 1e5)} bar and ${shortText(100 * valid.min_contraction)} to ${shortText(100 * valid.max_contraction)} %: an extrapolation.`, false];
+    if (inside) return ["", false];
+    const range = `${shortText(valid.min_pressure / 1e5)} to ${shortText(valid.max_pressure / 1e5)} bar and ${shortText(100 * valid.min_contraction)} to ${shortText(100 * valid.max_contraction)} %`;
+    return [`Outside the validity range, ${range}: ${textBeyond(law, point)}.`, false];
   }
 
   Object.assign(airmuscle, { PointPanel });
