@@ -1,10 +1,11 @@
 """Bodies with routes: time of the sweep over all poses, of the study, and of the choice of muscles,
-for 12 and for 80 routes.
+for 12 and for 80 routes; of the search of places of points for 27 routes in 5 configurations.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 import tempfile
 import time
 from collections.abc import Callable
@@ -19,7 +20,9 @@ TEXT = (
     "Limbs of three hinges with a pair of routes at each; of 80 routes, further ones cross two and"
     " three hinges, so that their grid has 101^2 and 25^3 poses. Sweep: least and greatest length"
     " to 0.1 mm and moment arms. Study: with gravity in 1024 poses and clearances. Choice: muscles"
-    " of the catalogue at 6 bar. MuJoCo computes each pose."
+    " of the catalogue at 6 bar. Moved points: both ends of 27 routes within 20 mm, for curves of 9"
+    " angles in each of 5 configurations, with 1 to 3 muscles of one product, with and without a"
+    " tackle; 16 starts of each. MuJoCo computes each pose."
 )
 NAMES = ("hip", "knee", "ankle")
 HALF = 0.03
@@ -86,6 +89,47 @@ def steps(path: Path) -> dict[str, Callable[[], object]]:
     }
 
 
+ROUTED = 27
+ANGLES = (-20, -15, -10, -5, 0, 5, 10, 15, 20)
+CONFIGURATIONS = (2.0, 3.0, 4.0, 5.0, 6.0)
+"""Greatest torque [N m] of each configuration."""
+
+
+def curves(body: am.design.Body) -> str:
+    """CSV of the torques of the first routes: a part of a sine over the angle, by configuration."""
+    lines = ["route,joint,angle [deg],torque [N m],configuration"]
+    for route in body.routes[:ROUTED]:
+        sign = -1.0 if route.name.endswith("front") else 1.0
+        for number, level in enumerate(CONFIGURATIONS):
+            for angle in ANGLES:
+                part = 0.6 + 0.4 * math.cos(math.radians(2.0 * angle + 15.0 * number))
+                torque = sign * level * part
+                lines.append(f"{route.name},{route.joints[0]},{angle},{torque:.4f},c{number}")
+    return "\n".join(lines) + "\n"
+
+
+def routing(folder: Path) -> Callable[[], am.design.MovedRoutes]:
+    """The search of the places of both ends of 27 routes."""
+    path = folder / "limbs.xml"
+    path.write_text(body_text(5, 0), encoding="utf-8")
+    body = am.design.read_body(path)
+    file = folder / "curves.csv"
+    file.write_text(curves(body), encoding="utf-8")
+    moves = [
+        am.design.read_move(f"{site} within 20 mm", "move")
+        for route in body.routes[:ROUTED]
+        for site in route.points
+    ]
+    return functools.partial(
+        am.design.move_routes,
+        body,
+        am.design.read_curves(body, file),
+        moves,
+        am.design.SizingConditions(supply="6 bar", max_count=3),
+        [am.files.load_law("dmsp-20-300")],
+    )
+
+
 def section(rounds: int = 1) -> Section:
     """The complete benchmark."""
     rows = []
@@ -100,7 +144,11 @@ def section(rounds: int = 1) -> Section:
                     call()
                     times.append(time.process_time() - start)
                 rows.append((name, step, format_time(min(times))))
-    return Section("Body with 12 and with 80 routes", TEXT, HEADER, tuple(rows))
+        call = routing(Path(folder))
+        start = time.process_time()
+        call()
+        rows.append(("27 routes", "moved points", format_time(time.process_time() - start)))
+    return Section("Bodies with routes", TEXT, HEADER, tuple(rows))
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ os.environ.setdefault(
 )  # must precede the import of NumPy; a second thread that waits for a core slows all variants
 
 import batch
+import body_sweep
 import bootstrap
 import calls
 import components
@@ -74,6 +75,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (environments.section, 9),
     (learning.section, 9),
     (bootstrap.section, 5),
+    (body_sweep.section, 1),
     (model_comparison.section, 3),
     (outlets.section, 1),
     (new_plant.section, 7),

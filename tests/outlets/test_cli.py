@@ -98,6 +98,7 @@ NAMES = (
     "size",
     "body",
     "fit-out",
+    "route",
     "simulate",
     "study",
     "tune",

@@ -16,7 +16,19 @@ from .joints import BodyJoint as BodyJoint
 from .kinematics import Poses as Poses
 from .kinematics import RouteSamples as RouteSamples
 from .kinematics import sample_routes as sample_routes
+from .moved_routes import FrontPoint as FrontPoint
+from .moved_routes import MovedRoute as MovedRoute
+from .moved_routes import MovedRoutes as MovedRoutes
+from .moved_routes import TorqueAnswer as TorqueAnswer
+from .moves import MoveRequest as MoveRequest
+from .moves import PointMove as PointMove
+from .moves import read_move as read_move
+from .moves import read_moves as read_moves
+from .moves import resolved_moves as resolved_moves
+from .moving import move_routes as move_routes
+from .moving import moved_body as moved_body
 from .poses import read_poses as read_poses
+from .route_geometry import geometry_of_route as geometry_of_route
 from .route_muscle import RouteDemand as RouteDemand
 from .route_muscle import RouteMuscle as RouteMuscle
 from .route_muscle import UnservedRoute as UnservedRoute
@@ -27,6 +39,8 @@ from .study import BodyStudy as BodyStudy
 from .study import study_body as study_body
 from .sweep import RouteSweep as RouteSweep
 from .sweep import sweep_routes as sweep_routes
+from .torque_curve import TorqueRows as TorqueRows
+from .torque_curve import read_curves as read_curves
 
 # isort: split
 # For the other rooms, not in __all__

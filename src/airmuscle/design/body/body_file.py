@@ -33,6 +33,8 @@ class BodyFile(ShortRepr):
     ranges          range (low, high) of joints [rad or m], by name, in place of that of the file
     folder          folder from which the body may read files; that of `path` by default
     without_meshes  whether geoms and textures of files are left out
+    sites           positions of sites [m] in the frames of their bodies, by name, in place of those
+                    of the file
     """
 
     path: Path
@@ -40,6 +42,7 @@ class BodyFile(ShortRepr):
     ranges: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     folder: Path | None = None
     without_meshes: bool = False
+    sites: Mapping[str, tuple[float, float, float]] = dataclasses.field(default_factory=dict)
 
     def source(self) -> XmlSource:
         """The text, checked. Raises FileError."""
@@ -70,6 +73,9 @@ class BodyFile(ShortRepr):
         self._set_ranges(mujoco, spec)
         for name, points in self.further_routes():
             _add_route(spec, name, points)
+        for site in spec.sites:
+            if site.name in self.sites:
+                site.pos = self.sites[site.name]
         return spec
 
     def compiled(self, spec: Any) -> Any:

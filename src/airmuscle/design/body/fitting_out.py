@@ -206,7 +206,7 @@ def fit_out(
     entries = catalogue() if muscles is None else tuple(muscles)
     if not entries:
         raise ParameterError("fit_out: muscles must be one or more library entries.")
-    laws = _laws_of_products(entries, conditions)
+    laws = laws_of_products(entries, conditions)
     chosen: dict[str, RouteMuscle] = {}
     unserved: dict[str, UnservedRoute] = {}
     demands: dict[str, RouteDemand] = {}
@@ -247,7 +247,7 @@ def _is_sufficient(
     return all(least_reserve(item, demands[name]) >= needed - 1e-3 for name, item in chosen.items())
 
 
-def _laws_of_products(
+def laws_of_products(
     entries: Sequence[Entry], conditions: SizingConditions
 ) -> dict[str, tuple[Entry, ...]]:
     """The usable laws of each product, the one to use first."""

@@ -74,12 +74,12 @@ def read_poses(path: Path, body: Body, *, needs_time: bool = False) -> PoseTable
     names = []
     factors = []
     for number, text in enumerate(heading, 1):
-        name, unit = _parted(text, f"{path}: heading {number}")
+        name, unit = named_heading(text, f"{path}: heading {number}")
         if name != TIME:
             check_known(f"{path}: there is no joint", [name], body.joints)
         is_hinge = name != TIME and body.joints[name].is_hinge
         target = "s" if name == TIME else "rad" if is_hinge else "m"
-        factors.append(_factor(unit or target, target, f"{path}: heading {quotable(text)!r}"))
+        factors.append(factor_of(unit or target, target, f"{path}: heading {quotable(text)!r}"))
         names.append(name)
     if len(set(names)) < len(names):
         raise FileError(f"{path}: two columns have the same name.")
@@ -135,7 +135,7 @@ def numbers_of(path: Path, lines: list[list[str]], width: int) -> Array:
     return values
 
 
-def _parted(text: str, where: str) -> tuple[str, str]:
+def named_heading(text: str, where: str) -> tuple[str, str]:
     """Name and unit of a heading."""
     match = _HEADING.match(text)
     if match is None:
@@ -143,7 +143,8 @@ def _parted(text: str, where: str) -> tuple[str, str]:
     return match["name"], (match["unit"] or "").strip()
 
 
-def _factor(unit: str, target: str, where: str) -> float:
+def factor_of(unit: str, target: str, where: str) -> float:
+    """Factor from a unit to another one. Raises FileError."""
     try:
         return quantity(f"1 {unit}", target, where=where)
     except UnitError as error:

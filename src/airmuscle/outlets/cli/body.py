@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ...core import check_writable
-from ..requests.body import BodyRequest
+from ..requests.body import BodyFileRequest, BodyRequest
 from .delivery import deliver
 from .options import Json, OptionalFolder
 from .parser import Argument
@@ -16,7 +16,11 @@ BodyFile = Annotated[Path, Argument("BODY.xml", "A body with routes: MJCF or URD
 
 @with_requests
 def body(
-    path: BodyFile, request: BodyRequest, out: OptionalFolder = None, json: Json = False
+    path: BodyFile,
+    file: BodyFileRequest,
+    request: BodyRequest,
+    out: OptionalFolder = None,
+    json: Json = False,
 ) -> None:
     """Study the routes of muscles on a robot's body.
 
@@ -36,5 +40,5 @@ def body(
     if out is not None:
         check_writable(out)
     with progress_bars("poses") as show:
-        study = request.study(path, lambda fraction: show("", fraction))
+        study = request.study(file.body(path), lambda fraction: show("", fraction))
     deliver("body", [study.chapter()], json=json, out=out, title="Body")

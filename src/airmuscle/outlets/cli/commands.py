@@ -128,6 +128,12 @@ COMMANDS = (
         "fit_out_command",
         "Choose the muscles of a robot's body for its routes.",
     ),
+    CommandRow(
+        "route",
+        "route",
+        "route",
+        "Move points of routes so that they meet torques over angles.",
+    ),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),

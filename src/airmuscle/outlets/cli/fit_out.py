@@ -7,7 +7,7 @@ from typing import Annotated
 from ...core import check_writable
 from ...design.body.fitting_out import fit_out
 from ..export.body_muscles import choice_toml, fitted_body
-from ..requests.body import BodyRequest, FitOutRequest
+from ..requests.body import BodyFileRequest, BodyRequest, FitOutRequest
 from .delivery import deliver
 from .options import Json, OptionalFolder
 from .parser import Argument
@@ -24,6 +24,7 @@ PLUGIN_FOLDER = "plugins"
 def fit_out_command(
     path: BodyFile,
     request: FitOutRequest,
+    file: BodyFileRequest,
     body: BodyRequest,
     out: OptionalFolder = None,
     json: Json = False,
@@ -45,7 +46,7 @@ def fit_out_command(
     if out is not None:
         check_writable(out)
     with progress_bars("fit-out") as show:
-        study = body.study(path, lambda fraction: show("poses", fraction))
+        study = body.study(file.body(path), lambda fraction: show("poses", fraction))
         result = fit_out(
             study,
             request.conditions(),

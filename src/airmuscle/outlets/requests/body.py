@@ -1,4 +1,6 @@
-"""Request of the study of a body: its files, the ranges of its joints, and what is demanded."""
+"""Requests of a body: its files and the ranges of its joints, what is demanded of its routes, which
+muscles it may have, and which of its points may be moved.
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -6,10 +8,15 @@ from pathlib import Path
 
 from ...core import UnitError
 from ...design.body import Body, BodyStudy, read_body, read_direction, read_range, study_body
+from ...design.body.moved_routes import MovedRoutes
+from ...design.body.moves import MoveRequest, read_move, read_moves
+from ...design.body.moving import STARTS, move_routes
 from ...design.body.route_muscle import CRITERIA
+from ...design.body.torque_curve import read_curves
 from ...design.sizing import SizingConditions
+from ...engine.processes import Workers
 from ...files.library import Entry, load_law
-from .declaration import RequestError, many, option, optional, request
+from .declaration import RequestError, Where, many, option, optional, request
 from .reading import Pairs
 
 
@@ -26,8 +33,8 @@ def read_joint_range(text: str, where: str) -> tuple[str, tuple[float, float]]:
 
 
 @request
-class BodyRequest:
-    """How a body is read, and what its routes are asked for."""
+class BodyFileRequest:
+    """How a body is read."""
 
     routes: Path | None = optional(
         "TOML file of further routes: [[route]] with name and points.", metavar="FILE"
@@ -42,6 +49,23 @@ class BodyRequest:
         "Folder from which the body may read files; by default that of the file.", metavar="DIR"
     )
     without_meshes: bool = optional("Leave out geoms and textures of files.")
+
+    def body(self, path: Path) -> Body:
+        """The body of a file. Raises FileError and ParameterError."""
+        return read_body(
+            path,
+            routes=self.routes,
+            ranges=dict(self.range),
+            leave_out=self.leave_out,
+            folder=self.folder,
+            without_meshes=bool(self.without_meshes),
+        )
+
+
+@request
+class BodyRequest:
+    """What the routes of a body are asked for."""
+
     poses: Path | None = optional(
         "CSV file of the poses that the body reaches, a column 'knee [deg]' for each joint, in"
         " place of the ranges.",
@@ -64,21 +88,10 @@ class BodyRequest:
         unit="1",
     )
 
-    def body(self, path: Path) -> Body:
-        """The body of a file. Raises FileError and ParameterError."""
-        return read_body(
-            path,
-            routes=self.routes,
-            ranges=dict(self.range),
-            leave_out=self.leave_out,
-            folder=self.folder,
-            without_meshes=bool(self.without_meshes),
-        )
-
-    def study(self, path: Path, progress: Callable[[float], None]) -> BodyStudy:
-        """The study of the body of a file. Raises FileError and ParameterError."""
+    def study(self, body: Body, progress: Callable[[float], None]) -> BodyStudy:
+        """The study of a body. Raises FileError and ParameterError."""
         return study_body(
-            self.body(path),
+            body,
             poses=self.poses,
             motion=self.motion,
             torques=self.torques,
@@ -118,3 +131,64 @@ class FitOutRequest:
     def entries(self) -> tuple[Entry, ...] | None:
         """The muscles that are named; None without. Raises UnknownNameError and FileError."""
         return tuple(map(load_law, self.muscle)) or None
+
+
+@request
+class RouteRequest:
+    """Which points of the routes of a body may be moved, for which torques and muscles."""
+
+    curves: Path = option(
+        "CSV file of demanded torques: joint, angle [deg], torque [N m]; optionally route,"
+        " configuration, and positions of other joints, 'hip [deg]'.",
+        metavar="FILE",
+    )
+    supply: float = option("Supply pressure: '6 bar' (gauge).", unit="Pa")
+    move: tuple[MoveRequest, ...] = many(
+        "Point that may be moved: 'SITE within box 10 mm..40 mm, -5 mm..5 mm, -9 cm..-5 cm', 'SITE"
+        " within 20 mm', 'SITE on GEOM', with ', clearance 5 mm from GEOM'. Repeatable.",
+        metavar="MOVE",
+        read=read_move,
+    )
+    moves: Path | None = optional(
+        "TOML file of points that may be moved: [[move]] with site, and box, within or on.",
+        metavar="FILE",
+    )
+    muscle: tuple[str, ...] = many(
+        "Muscle or file instead of the catalogue; repeatable.", metavar="NAME"
+    )
+    max_count: int = option("Maximum number of muscles side by side.", default=3)
+    max_length: float = option("Maximum nominal length.", unit="m", default="2 m")
+    safety: float = option(
+        "Factor on the torques.", unit="1", metavar="NUMBER", default="1", bounds=(0.01, 100.0)
+    )
+    starts: int = option("Starts of each search.", default=STARTS, bounds=(1, 1024))
+
+    def check(self, where: Where) -> None:
+        """Refuse a request without a point that may be moved."""
+        if not self.move and self.moves is None:
+            raise RequestError(
+                f"give the points that may be moved with {where('move')} or {where('moves')}, such"
+                " as 'knee_insertion within 20 mm'."
+            )
+
+    def result(
+        self, body: Body, workers: Workers, progress: Callable[[float], None]
+    ) -> MovedRoutes:
+        """The moved routes of a body. Raises FileError, ParameterError and SolveError."""
+        moves = self.move
+        if self.moves is not None:
+            moves = (*moves, *read_moves(self.moves))
+        conditions = SizingConditions(
+            self.supply, max_length=self.max_length, max_count=self.max_count
+        )
+        return move_routes(
+            body,
+            read_curves(body, self.curves),
+            moves,
+            conditions,
+            tuple(map(load_law, self.muscle)) or None,
+            factor=self.safety,
+            starts=self.starts,
+            workers=workers,
+            progress=progress,
+        )
