@@ -87,6 +87,7 @@ from .errors import IdentificationError as IdentificationError
 from .errors import InputError as InputError
 from .errors import ParameterError as ParameterError
 from .errors import PhysicsError as PhysicsError
+from .errors import RigError as RigError
 from .errors import SimulationError as SimulationError
 from .errors import SolveError as SolveError
 from .errors import TraceError as TraceError

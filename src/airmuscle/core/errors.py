@@ -245,6 +245,10 @@ class EquilibriumError(PhysicsError):
     """A plant has no equilibrium; the message names the muscle and the forces."""
 
 
+class RigError(AirmuscleError):
+    """A test rig does not answer, or refuses a command."""
+
+
 class TraceError(AirmuscleError):
     """A model cannot be traced into a compiled program."""
 

@@ -9,6 +9,7 @@ kind of the cause:
                 UnknownNameError
         PhysicsError                  the model has no solution
             SolveError, GeometryLimitError, RatingError, EquilibriumError
+        RigError                      a test rig does not answer, or refuses a command
         TraceError                    a model cannot be compiled
         IdentificationError           the data cannot determine the requested quantities
         SimulationError               a simulation ended early; `.solution` contains the partial

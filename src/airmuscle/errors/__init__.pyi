@@ -10,6 +10,7 @@ from ..core.errors import InputError as InputError
 from ..core.errors import ParameterError as ParameterError
 from ..core.errors import PhysicsError as PhysicsError
 from ..core.errors import RatingError as RatingError
+from ..core.errors import RigError as RigError
 from ..core.errors import SimulationError as SimulationError
 from ..core.errors import SolveError as SolveError
 from ..core.errors import TraceError as TraceError

@@ -38,5 +38,12 @@ from .export import write_mujoco_plugin as write_mujoco_plugin
 from .export import write_program as write_program
 from .export import write_ssp as write_ssp
 from .export import write_urdf as write_urdf
+from .rig import PlayedRecord as PlayedRecord
+from .rig import Rig as Rig
+from .rig import Ros2Rig as Ros2Rig
+from .rig import SerialDevice as SerialDevice
+from .rig import SerialRig as SerialRig
+from .rig import SimulatedRig as SimulatedRig
+from .rig import play as play
 from .studio import export_page as export_page
 from .studio import serve as serve

@@ -111,6 +111,9 @@ COMMANDS = (
     ),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
     CommandRow(
+        "play", "play", "play_signals", "Play planned signals on a test rig and record them."
+    ),
+    CommandRow(
         "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
     ),
     CommandRow(

@@ -1,3 +1,13 @@
 from .mcap_file import mcap_bytes as mcap_bytes
 from .plan_files import c_table as c_table
 from .plan_files import signal_files as signal_files
+from .player import PlayedRecord as PlayedRecord
+from .player import check_commands as check_commands
+from .player import play as play
+from .protocol import Rig as Rig
+from .ros2_topics import Ros2Rig as Ros2Rig
+from .serial_line import SerialDevice as SerialDevice
+from .serial_line import SerialRig as SerialRig
+from .serial_line import framed as framed
+from .serial_line import unframed as unframed
+from .simulated_rig import SimulatedRig as SimulatedRig
