@@ -16,10 +16,9 @@ import pytest
 from command_line import airmuscle
 
 import airmuscle as am
-from airmuscle.bench import SignalLimits, check_record, fit_regulator, read_csv
-from airmuscle.bench.readers import write
+from airmuscle.bench import SignalLimits, check_record, fit_regulator, read_csv, write
 from airmuscle.errors import ParameterError, RigError
-from airmuscle.outlets.rig import (
+from airmuscle.outlets import (
     Ros2Rig,
     SerialDevice,
     SerialRig,
@@ -277,7 +276,7 @@ PLAYERS = """
 import os, sys, time
 import numpy as np
 from airmuscle.bench import SignalLimits
-from airmuscle.outlets.rig import SerialRig, play
+from airmuscle.outlets import SerialRig, play
 from airmuscle.recording import Recording
 
 time_column = 0.01 * np.arange(3000)

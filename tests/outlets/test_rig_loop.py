@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import SignalLimits, SignalPlan
-from airmuscle.outlets.rig import signal_files
+from airmuscle.outlets import signal_files
 
 RIG = """
 #include <stdio.h>

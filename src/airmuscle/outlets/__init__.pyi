@@ -44,6 +44,9 @@ from .rig import Ros2Rig as Ros2Rig
 from .rig import SerialDevice as SerialDevice
 from .rig import SerialRig as SerialRig
 from .rig import SimulatedRig as SimulatedRig
+from .rig import framed as framed
 from .rig import play as play
+from .rig import signal_files as signal_files
+from .rig import unframed as unframed
 from .studio import export_page as export_page
 from .studio import serve as serve
