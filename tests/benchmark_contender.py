@@ -7,8 +7,10 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
+from joint_models import proportional_joint
+
 from airmuscle.core import model, parameter
-from airmuscle.design import Contender, ControlTask, SineMotion, proportional_joint
+from airmuscle.design import Contender, ControlTask, SineMotion
 from airmuscle.engine import ControlLaw
 
 JOINT = proportional_joint((11,))

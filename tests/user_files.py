@@ -271,6 +271,7 @@ def _write_simulation(folder: Path) -> None:
     contents = {"muscle": MUSCLE_FILE, "scenario": HELD_FILL, "lift": POSITION_LOOP}
     for name, content in contents.items():
         (folder / f"{name}.toml").write_text(content, encoding="utf-8")
+    _write_loops(folder)
     shutil.copy(EXAMPLES / "air_leg.xml", folder / "leg.xml")
     bodies = {"leg.urdf": KNEE, "routes.toml": KNEE_ROUTES, "walk.csv": WALK}
     for name, content in bodies.items():
@@ -279,6 +280,16 @@ def _write_simulation(folder: Path) -> None:
     (folder / "cluster.toml").write_text(
         cluster.replace("workers = 2", "workers = 1"), encoding="utf-8"
     )
+
+
+def _write_loops(folder: Path) -> None:
+    """Scenarios whose controllers are compared: loops of one pressure, and predictive control."""
+    loop = (EXAMPLES / "pressure_loop.toml").read_text(encoding="utf-8")
+    slow = loop.replace("1.5 1/bar", "0.5 1/bar")
+    (folder / "loop-tuned.toml").write_text(slow, encoding="utf-8")
+    for name, content in (("pid", loop), ("cascade", slow), ("bench", loop)):
+        short = content.replace('duration = "5 s"', 'duration = "1 s"')
+        (folder / f"{name}.toml").write_text(short, encoding="utf-8")
 
 
 WRITERS: tuple[Callable[[Path], None], ...] = (

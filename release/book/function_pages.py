@@ -49,7 +49,7 @@ FACES = {
     "airmuscle.outlets.environments": "Learning environments",
     "airmuscle.design.study": "Parameter studies",
     "airmuscle.design.tuning": "Tuning",
-    "airmuscle.design.control_benchmark": "Control benchmark",
+    "airmuscle.design.control_comparison": "Comparison of controllers",
     "airmuscle.outlets.export": "Export",
     "airmuscle.outlets.studio": "Studio",
     "airmuscle.core": "Interfaces for models",

@@ -18,7 +18,8 @@ from .latex_symbols import GREEK
 
 COPIED = (
     "benchmarks/RESULTS.md",
-    "benchmarks/CONTROL.md",
+    "benchmarks/control/README.md",
+    "benchmarks/control/CONTROL.md",
     "benchmarks/REAL_DATA.md",
     "CHANGELOG.md",
 )

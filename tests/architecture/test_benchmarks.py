@@ -6,7 +6,9 @@ No times are asserted, because they depend on the machine; benchmarks/RESULTS.md
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
+from pathlib import Path
 
 import batch
 import control_page
@@ -20,19 +22,18 @@ import ode8
 import pytest
 import rodas4
 import run
+import run_contenders
 import startup
 import static_fit
+from contender_set import standard_contenders
 from filling import runs
+from joint_models import proportional_joint
 
 from airmuscle.core import tree
-from airmuscle.design import (
-    benchmark_controllers,
-    find_tasks,
-    proportional_joint,
-    standard_contenders,
-)
+from airmuscle.design import Group, compare_controllers, find_tasks
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule
 from airmuscle.engine.compile import compile_system
+from airmuscle.errors import InputError
 
 SMALLEST = 5e-324
 
@@ -51,7 +52,7 @@ def test_the_page_of_the_control_benchmark_has_the_tables_of_a_result_in_their_u
     known = [each for each in standard_contenders(joint) if each.name == "feed-forward"]
     narrow = dataclasses.replace(joint, family={"nominal": joint.model})
     for seeds, spread in ((1, 2), r"\|\s[^|–]+\|$"), ((1,), r"\| – \|$"):
-        found = benchmark_controllers(
+        found = compare_controllers(
             narrow, known, find_tasks(("step",)), seeds=seeds, sets_per_gain=8, commissioning_runs=0
         )
         text = "\n".join(control_page.part(found))
@@ -63,6 +64,24 @@ def test_the_page_of_the_control_benchmark_has_the_tables_of_a_result_in_their_u
         (searched,) = re.findall(r"\| controller \| gains .*\n.*\n(.*)", text)
         assert re.search(spread, searched)
         assert f"0 of {len(seeds)} searches converged" in control_page.convergence(found)
+
+
+def test_contenders_of_the_benchmark_are_run_on_some_tasks(tmp_path, capsys):
+    """With a scenario file among them, without a search."""
+    scenario = str(Path(__file__).resolve().parents[2] / "examples" / "joint_cascade.toml")
+    asked = ["--contender", "PID", "--contender", scenario, "--task", "step", "--budget", "0"]
+    few = ["--truth-seeds", "35", "--runs", "2", "--out", str(tmp_path / "out"), "--json"]
+    found = run_contenders.main([*asked, *few])
+    assert found.contenders(Group.MODELS) == ("PID", "joint_cascade")
+    content = json.loads(capsys.readouterr().out)["comparison"]
+    assert {row["truth"] for row in content["metrics"]} == {"truth 35"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    for text in ("LuGre", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
+        assert text in page, text
+    with pytest.raises(InputError, match="there is no controller 'PDI'; there are PID, feed-"):
+        run_contenders.main(["--contender", "PDI", *few])
+    with pytest.raises(InputError, match="--trials needs at least 2 trials and the controller"):
+        run_contenders.main([*asked, "--trials", "3", *few])
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])

@@ -19,6 +19,8 @@ from typing import Any
 import control_plants
 import numpy as np
 import pytest
+from contender_set import standard_contenders
+from joint_models import on_off_joint
 from plants import EXAMPLES
 
 import airmuscle as am
@@ -126,7 +128,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     ),
     "a vector environment": vector,
     "contenders and tasks of the benchmark": lambda: (
-        *design.standard_contenders(design.on_off_joint()),
+        *standard_contenders(on_off_joint()),
         *design.STANDARD_TASKS,
     ),
     "a loop with sensitivities": lambda: engine.differentiate_loop(

@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
+from contender_set import standard_contenders
+from joint_models import on_off_joint
 
 from airmuscle.control import WithStuckValve
 from airmuscle.core import leaves
@@ -24,13 +26,11 @@ from airmuscle.design import (
     RunKey,
     SineMotion,
     StuckValve,
-    benchmark_controllers,
     commission,
+    compare_controllers,
     find_tasks,
-    on_off_joint,
-    standard_contenders,
 )
-from airmuscle.design.control_benchmark import (
+from airmuscle.design.control_comparison import (
     PassedSignals,
     alike,
     complete,
@@ -47,13 +47,13 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
     sticks.
     """
     called = Contender("called", Called(MINE.law))
-    again = benchmark_controllers(JOINT, [called], [SHORT], sets_per_gain=10, commissioning_runs=0)
+    again = compare_controllers(JOINT, [called], [SHORT], sets_per_gain=10, commissioning_runs=0)
     assert again.results[0].tuning is None
     found = again.metric("called", "short sine", "rmse").median
-    mine = benchmark_controllers(JOINT, [MINE], [SHORT], sets_per_gain=0, commissioning_runs=0)
+    mine = compare_controllers(JOINT, [MINE], [SHORT], sets_per_gain=0, commissioning_runs=0)
     assert found == pytest.approx(mine.metric("mine", "short sine", "rmse").median, rel=1e-3)
     stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
-    (result,) = benchmark_controllers(
+    (result,) = compare_controllers(
         JOINT, [called], [stuck], sets_per_gain=0, commissioning_runs=0
     ).results
     record = result.runs[RunKey(Group.MODELS, JOINT.truths[0].name, "stuck")].recording
@@ -210,7 +210,7 @@ def test_a_commissioning_corrects_its_derivatives_by_its_steps(monkeypatch):
         )
         return matrix @ (x + 0.3 * x**2)
 
-    monkeypatch.setattr("airmuscle.design.control_benchmark.commissioning.tracking_errors", errors)
+    monkeypatch.setattr("airmuscle.design.control_comparison.commissioning.tracking_errors", errors)
     found = commission(
         JOINT, JOINT.truths[0], completed.law, completed.commissioned, [SHORT], runs=10
     )

@@ -16,13 +16,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from benchmark_contender import JOINT, MINE, SHORT, AngleLaw
+from contender_set import standard_contenders
+from joint_models import check_truth_differs, checked_rig, on_off_joint, proportional_joint
+from joint_truths import (
+    DEVELOPMENT_SEEDS,
+    SEALED_SEED,
+    TRUTH_SEEDS,
+    IsentropicNozzle,
+    kinds_of,
+    random_truth,
+)
 
 import airmuscle as am
 from airmuscle.core import model
 from airmuscle.design import (
     STANDARD_TASKS,
-    BenchmarkResult,
     Contender,
+    ControlComparison,
     ControlTask,
     Group,
     MinimumJerkMotion,
@@ -32,24 +42,14 @@ from airmuscle.design import (
     StepMotion,
     StuckValve,
     SumOfMotions,
-    benchmark_controllers,
+    compare_controllers,
     find_tasks,
     learn,
-    on_off_joint,
-    proportional_joint,
-    random_truth,
-    standard_contenders,
 )
-from airmuscle.design.control_benchmark import (
-    DEVELOPMENT_SEEDS,
+from airmuscle.design.control_comparison import (
     RATED_STROKES,
-    SEALED_SEED,
     SEARCH_SPREAD,
-    TRUTH_SEEDS,
-    IsentropicNozzle,
-    check_truth_differs,
     complete,
-    kinds_of,
     search_gains,
     task_signals,
     track,
@@ -69,12 +69,12 @@ def chosen(*names):
 
 
 def untuned(contenders, tasks, joint=JOINT, **further):
-    return benchmark_controllers(
+    return compare_controllers(
         joint, contenders, tasks, sets_per_gain=0, **{"commissioning_runs": 0, **further}
     )
 
 
-def only(result: BenchmarkResult, contender: str, task: str, group=Group.MODELS):
+def only(result: ControlComparison, contender: str, task: str, group=Group.MODELS):
     """The run of a contender on the first truth."""
     found = next(each for each in result.results if each.name == contender)
     return found.runs[RunKey(group, result.truths[0], task)]
@@ -137,15 +137,18 @@ def test_a_truth_of_the_kind_of_a_model_is_rejected(kind):
         ParameterError, match=f"'truth 11' of the benchmark has the same {kind} as a model"
     ):
         check_truth_differs(JOINT.model, changed(kind))
+    rig = replace(JOINT, truths=(changed(kind),))
     with pytest.raises(ParameterError, match=f"the same {kind}"):
-        replace(JOINT, truths=(changed(kind),))
+        checked_rig(rig)
 
 
 def test_the_friction_of_a_tuned_plant_is_refused_too():
     dahl = JOINT.family["friction 10 N"].muscles[0].friction
     muscles = tuple(replace(m, friction=dahl) for m in TRUTH.plant.muscles)
+    changed_truth = replace(TRUTH, plant=replace(TRUTH.plant, muscle=muscles))
+    rig = replace(JOINT, truths=(changed_truth,))
     with pytest.raises(ParameterError, match="the same friction as a model, Dahl"):
-        replace(JOINT, truths=(replace(TRUTH, plant=replace(TRUTH.plant, muscle=muscles)),))
+        checked_rig(rig)
 
 
 def test_the_truths_contain_every_class_of_the_family_and_none_that_was_seen_in_development():
@@ -425,7 +428,7 @@ def test_two_searches_agree_within_the_stated_spread():
     narrow = replace(
         JOINT, family={"nominal": JOINT.model, "friction 10 N": JOINT.family["friction 10 N"]}
     )
-    found = benchmark_controllers(
+    found = compare_controllers(
         narrow, [MINE], [SHORT], seeds=(1, 2), sets_per_gain=200, commissioning_runs=0
     )
     first, second = (each.tuning for each in found.results)
@@ -444,7 +447,7 @@ def test_the_search_of_a_seed_that_ends_worse_than_another_one_is_restarted(monk
     """
     ends = {1: 1.0, 2: 1.3, 1_000_002: 1.4, 2_000_002: 1.04, 3: 1.05}
     monkeypatch.setattr(
-        "airmuscle.design.control_benchmark.commissioning.find_gains",
+        "airmuscle.design.control_comparison.commissioning.find_gains",
         lambda joint, contender, seed, *_: SimpleNamespace(objective=ends[seed]),
     )
 
@@ -463,7 +466,7 @@ def test_the_search_of_a_seed_that_ends_worse_than_another_one_is_restarted(monk
 
 def test_tuning_uses_the_family_and_improves_the_objective():
     narrow = replace(JOINT, family={"nominal": JOINT.model})
-    found = benchmark_controllers(narrow, [MINE], [SHORT], sets_per_gain=8, commissioning_runs=0)
+    found = compare_controllers(narrow, [MINE], [SHORT], sets_per_gain=8, commissioning_runs=0)
     (tuned,) = found.results
     assert tuned.tuning.simulated_loops <= 8 * 2 * 2, "sets, gains, tasks"
     assert tuned.tuning.objective <= tuned.tuning.present_objective
@@ -531,12 +534,12 @@ def test_learning_reduces_the_error_from_trial_to_trial(result):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: benchmark_controllers(JOINT, [], [SHORT]), "there is no contender"),
+        (lambda: compare_controllers(JOINT, [], [SHORT]), "there is no contender"),
         (
-            lambda: benchmark_controllers(JOINT, [MINE, MINE], [SHORT]),
+            lambda: compare_controllers(JOINT, [MINE, MINE], [SHORT]),
             "two contenders are named 'mine'",
         ),
-        (lambda: benchmark_controllers(JOINT, [MINE], []), "there is no task"),
+        (lambda: compare_controllers(JOINT, [MINE], []), "there is no task"),
         (lambda: Contender("mine", 3), "its law is a int"),
         (lambda: find_tasks(("sine 1Hz",)), "no task 'sine 1Hz'.*Did you mean 'sine 1 Hz'"),
         (lambda: ControlTask("t", SHORT.motion, math.nan), "duration is nan"),

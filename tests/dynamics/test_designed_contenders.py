@@ -14,24 +14,17 @@ import pickle
 
 import numpy as np
 import pytest
+from contender_set import standard_contenders
+from designed_controllers import joint_design_model
+from joint_models import on_off_joint, proportional_joint
 from scipy.linalg import expm
 
 from airmuscle.control import design_lqg
 from airmuscle.core import leaves
-from airmuscle.design import (
-    STANDARD_TASKS,
-    ControlTask,
-    SineMotion,
-    StepMotion,
-    find_tasks,
-    on_off_joint,
-    proportional_joint,
-    standard_contenders,
-)
-from airmuscle.design.control_benchmark import (
+from airmuscle.design import STANDARD_TASKS, ControlTask, SineMotion, StepMotion, find_tasks
+from airmuscle.design.control_comparison import (
     angular_acceleration,
     complete,
-    joint_design_model,
     line_style,
     marker_style,
     run_task,

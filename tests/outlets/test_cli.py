@@ -102,7 +102,7 @@ NAMES = (
     "simulate",
     "study",
     "tune",
-    "benchmark",
+    "compare",
     "export",
     "studio",
     "schema",

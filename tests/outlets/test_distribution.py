@@ -11,7 +11,7 @@ from benchmark_contender import JOINT, MINE, SHORT
 
 from airmuscle import load_data
 from airmuscle.bench import bootstrap, fit
-from airmuscle.design import Contender, benchmark_controllers
+from airmuscle.design import Contender, compare_controllers
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_law
 from airmuscle.outlets import roll_out
@@ -56,7 +56,7 @@ def test_a_benchmark_does_not_depend_on_its_executor(executor: Executor, sets: i
     follower = Contender("follower", MINE.law, {}, tuned_as=MINE)
     options = {"sets_per_gain": sets, "commissioning_runs": 0}
     alone, shared = (
-        benchmark_controllers(JOINT, [follower, MINE], [SHORT], workers=each, **options)
+        compare_controllers(JOINT, [follower, MINE], [SHORT], workers=each, **options)
         for each in (1, executor)
     )
     assert executor.count == 2

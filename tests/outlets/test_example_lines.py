@@ -31,22 +31,20 @@ SHORTER = {
     "--rules": "--rules --budget 24",
     "--cluster scheduler.json": "--cluster scheduler.json --budget 24",
     "--workers 8": "--workers 2",
-    "--trials 10": "--trials 2 --truths 1 --budget 0 --runs 0",
-    "--budget 40": "--budget 0 --controller PID --task step --runs 0",
-    "--runs 0": "--runs 0 --truths 1 --budget 0 --task step",
+    "--truth-seeds 101-108": "--truth-seeds 101",
+    "--truth-seeds 1-200": "--truth-seeds 1-2 --spread 'mechanism.mass=20 %'",
     "fit-live": "fit-live --idle 0 --degree 2 --max-contraction 0.15",
     "--plugins": "",
 }
 """Parts of lines, and what takes their place so that a line takes seconds."""
 FURTHER = {
     "tune": "--draws 0 --loads '' --supplies ''",
-    "benchmark": "--controller PID --task step --truths 1 --budget 0 --runs 0",
     "fit-regulator": "--starts 1",
 }
 """Further options of a command whose lines contain none of its shorter parts."""
 CLUSTER = "tcp://head-node:8786"
 SLOW = re.compile(
-    r"reproduce|benchmark|--cluster|campaign bench|fit-regulator|--to (?:fmu|ssp)|--build"
+    r"reproduce|--cluster|campaign bench|fit-regulator|--to (?:fmu|ssp)|--build"
     r"|--starts 20|--workers|--rules|valve_study|--known|--separate|muscles/\*"
 )
 QUICK = (
@@ -157,7 +155,7 @@ def test_every_command_has_a_line_that_runs_by_default():
         for line in LINES
         if not any(mark.name == "slow" for mark in marks_of(line))
     }
-    assert by_default >= set(command_names()) - {"benchmark"}  # its quick form is in its own tests
+    assert by_default >= set(command_names())
 
 
 @pytest.mark.parametrize("line", LINES)

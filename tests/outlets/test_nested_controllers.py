@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joint_models import proportional_joint
 from scenario_files import writer_of
 
 from airmuscle.control import (
@@ -47,7 +48,7 @@ from airmuscle.control import (
     WithSetpointDelay,
     WithStuckValve,
 )
-from airmuscle.design import load_scenario_loop, proportional_joint, scenario_contender
+from airmuscle.design import load_scenario_loop, scenario_contender
 from airmuscle.engine import (
     ColumnSensor,
     Controller,

@@ -45,10 +45,6 @@ def commands():
     return [line for line in lines if line.startswith("./run airmuscle") and line != served]
 
 
-SHORTER = {"benchmark": ("--truths", "1", "--runs", "2")}
-"""Options that a command gets besides, so that it takes less time here."""
-
-
 @pytest.mark.parametrize(
     "command",
     [pytest.param(each, marks=[pytest.mark.slow] * (" study " in each)) for each in commands()],
@@ -58,7 +54,7 @@ def test_the_commands_run(command, tmp_path, monkeypatch):
     words = shlex.split(command)[2:]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
     monkeypatch.chdir(tmp_path)
-    done = airmuscle(*words, *SHORTER.get(words[0], ()))
+    done = airmuscle(*words)
     assert done.exit_code == 0, done.stderr
 
 

@@ -1,5 +1,5 @@
-"""Design: bodies, recipes of muscles, parameter studies, sizing, tuning of controllers, and the
-benchmark of controllers.
+"""Design: bodies, recipes of muscles, parameter studies, sizing, tuning and comparison of
+controllers.
 """
 
 from ..core.stubs import attach_stub

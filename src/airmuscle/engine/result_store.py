@@ -175,7 +175,7 @@ def result_store(
     from there if an earlier, interrupted call has stored them.
 
     This holds for `run_study`, `compare`, `bootstrap`, `identify_campaign`, `tune`,
-    `benchmark_controllers`, `fit_joint`, `size_muscles` and `roll_out`, whoever computes the tasks.
+    `compare_controllers`, `fit_joint`, `size_muscles` and `roll_out`, whoever computes the tasks.
     A result is that of a computation without a store, to the last bit. The folder may be removed at
     any time; `ResultStore.remove` does so. Nobody but the user may write to it. `resumed` is called
     when the first stored result is read.

@@ -105,7 +105,7 @@ def perturbed_family(
     changed = _scaled(plant, perturbations, notes)
     if perturbations.leak:
         changed += _leaking(plant, perturbations.leak, notes)
-    drawn = list(_draws(plant, uncertainties, fitted, perturbations.draws, seed))
+    drawn = list(parameter_draws(plant, uncertainties, fitted, perturbations.draws, seed))
     changed += drawn
     if perturbations.draws and not drawn:
         notes.append(
@@ -168,7 +168,7 @@ def _leaking(plant: Plant, share: float, notes: list[str]) -> list[tuple[str, Pl
     return [("leak", dataclasses.replace(plant, circuit=circuit))]
 
 
-def _draws(
+def parameter_draws(
     plant: Plant,
     uncertainties: Sequence[ParameterUncertainty | None],
     fitted: PlantUncertainty | None,

@@ -60,13 +60,14 @@ class ScenarioLoop(ShortRepr):
             self.scenario.plant,
             self.loop,
             perturbations,
-            initial_state=self._initial_state,
-            uncertainties=self._uncertainties(),
+            initial_state=self.initial_state_of,
+            uncertainties=self.uncertainties(),
             fitted=self.scenario.uncertainty,
             seed=seed,
         )
 
-    def _initial_state(self, plant: Plant) -> Mapping[str, float]:
+    def initial_state_of(self, plant: Plant) -> Mapping[str, float]:
+        """The initial state that the scenario gives a plant of the same structure."""
         if plant is self.scenario.plant:
             return self.scenario.initial_state
         tables = {
@@ -74,7 +75,7 @@ class ScenarioLoop(ShortRepr):
         }  # of the plant as fitted
         return build_scenario(tables, self.location, plant).initial_state
 
-    def _uncertainties(self) -> list[ParameterUncertainty | None]:
+    def uncertainties(self) -> list[ParameterUncertainty | None]:
         """The uncertainty of each muscle, of the parameters that the scenario takes from the muscle
         file unchanged.
         """
@@ -206,7 +207,7 @@ def load_scenario_loop(path: str | Path) -> ScenarioLoop:
     scenario = build_scenario(tables, location)
     if not isinstance(scenario.problem.input, ControlLoop):
         raise ParameterError(
-            f"{location}: there is no [input.controller]; tune needs a controller with its gains,"
+            f"{location}: there is no [input.controller]; give a controller with its gains,"
             " sample_time and setpoint. Of a plant of the library write a scenario file with"
             " [plant] library and [input.controller]."
         )

@@ -141,7 +141,7 @@ COMMANDS = (
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow(
-        "benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."
+        "compare", "compare", "compare", "Compare the controllers of scenarios on one plant."
     ),
     CommandRow(
         "export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."
@@ -163,7 +163,7 @@ RUN_CODE = (
     "simulate",
     "study",
     "tune",
-    "benchmark",
+    "compare",
     "export",
     "schema",
 )

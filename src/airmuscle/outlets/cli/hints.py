@@ -107,6 +107,11 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "predict": {**_FILES, **_CODE},
     "convert": _FILES,
     "plan": {"fixed": _fix, **_CODE},
+    "compare": {
+        **_CODE,
+        "rig": lambda hint: "use --rig SCENARIO.toml",
+        "spreads": lambda hint: f"use --spread '{hint.value[0]}'",
+    },
     "fit-dynamic": {
         **_RECORDS,
         "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]",

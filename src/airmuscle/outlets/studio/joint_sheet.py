@@ -27,7 +27,7 @@ import airmuscle as am
 
 from ...core import Node, ParameterError, leaves, nodes
 from ...core.slopes import by_row, jacobian
-from ...design.control_benchmark import STANDARD_TASKS
+from ...design.control_comparison import STANDARD_TASKS
 from ...engine.compile import Printer, compile_system
 from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.text.languages import JavaScriptLanguage

@@ -7,32 +7,36 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
+from joint_models import ENCODER_STEP
 
-from ...control.estimation import GAO2003, HAN2009, design_adrc, design_lqg, design_predictive
-from ...control.laws import (
-    DIFFERENCE,
-    FRANKLIN1998,
-    RAWLINGS2017,
+from airmuscle.control import (
     LinearModelPredictive,
     StateFeedback,
+    design_adrc,
+    design_lqg,
+    design_predictive,
 )
-from ...core import Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
-from ...core.declaration import forwarded
-from ...engine.loop import (
-    ControlLaw,
-    Controller,
-    EnclosingLaw,
-    LawDesign,
-    Measurement,
-    Memory,
-    Sampled,
+from airmuscle.core import (
+    Reference,
+    Value,
+    model,
+    ops,
+    parameter,
+    published,
+    select_prefix,
+    united,
+    with_prefix,
 )
-from ...physics.analysis.linear_model import LinearModel
-from .contenders import Memories
-from .joints import ENCODER_STEP, BenchmarkJoint
-from .signals import angular_acceleration
+from airmuscle.core.declaration import forwarded
+from airmuscle.design import JointRig
+from airmuscle.design.control_comparison.contenders import Memories
+from airmuscle.design.control_comparison.signals import angular_acceleration
+from airmuscle.engine import ControlLaw, Controller, LawDesign, Measurement
+from airmuscle.engine.loop import EnclosingLaw, Memory, Sampled
+from airmuscle.physics import LinearModel
 
 Law = TypeVar("Law")
+DIFFERENCE = "difference"
 READING = "reading"
 SPEED_READING = "speed_reading"
 """Names of the delayed angle and of the lagged and delayed speed, the measured columns of a
@@ -119,7 +123,7 @@ class JointDesignModel:
         )
 
 
-def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
+def joint_design_model(joint: JointRig) -> JointDesignModel:
     """The linear model of a joint, from its nominal model without friction at the mean pressure,
     with RESERVE.
     """
@@ -148,7 +152,10 @@ class JointDesign(LawDesign):
     same weights and the range of the command as its limit; references there.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998, RAWLINGS2017)
+    references: ClassVar[tuple[Reference, ...]] = (
+        published("franklin-1998"),
+        published("rawlings-2017"),
+    )
     from_file: ClassVar[bool] = False
 
     plant: JointDesignModel
@@ -213,7 +220,7 @@ class RejectionDesign(LawDesign):
     references there.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (HAN2009, GAO2003)
+    references: ClassVar[tuple[Reference, ...]] = (published("han-2009"), published("gao-2003"))
     from_file: ClassVar[bool] = False
 
     plant: JointDesignModel

@@ -1,4 +1,4 @@
-"""Iterative learning in the control benchmark: a task repeated on the truth, with a learned
+"""Iterative learning in a comparison of controllers: a task repeated on the truth, with a learned
 feed-forward signal.
 """
 
@@ -11,9 +11,9 @@ from ...control.laws.iterative_learning import IterativeLearning
 from ...core import Array, ParameterError, ShortRepr, check_whole, leaves
 from ...engine.loop import WithSensors
 from ...engine.run import simulate
-from . import BenchmarkTruth, ContenderResult, ControlTask
+from . import ContenderResult, ControlTask, TruePlant
 from .commissioning import on_truth
-from .joints import ENCODER_STEP, BenchmarkJoint
+from .rig import JointRig
 from .signals import TaskSignals, task_loop, task_signals
 
 SIGNAL = "feed_forward"
@@ -44,7 +44,7 @@ class LearningCurve(ShortRepr):
 
 
 def learn(
-    joint: BenchmarkJoint,
+    joint: JointRig,
     contender: ContenderResult,
     task: ControlTask,
     *,
@@ -102,17 +102,17 @@ def learn(
         last = signal
         angle, error = tried(number, signal)
         errors.append(error)
-        signal = learning.improve(signal, wanted - ENCODER_STEP * np.round(angle / ENCODER_STEP))
+        signal = learning.improve(signal, wanted - joint.read_angle(angle))
     repeated = [errors[-1], *(tried(trials + i, last)[1] for i in range(REPETITIONS))]
     return LearningCurve(task, contender.name, np.array(errors), last, float(np.ptp(repeated)))
 
 
 def _step_response(
-    joint: BenchmarkJoint, law: WithSensors, task: ControlTask, signals: TaskSignals, count: int
+    joint: JointRig, law: WithSensors, task: ControlTask, signals: TaskSignals, count: int
 ) -> Array:
     """The change (N,) [rad] of the angle of the model at rest by a step of the signal."""
     rest = signals._replace(angle=np.zeros_like(signals.angle))
-    known = BenchmarkTruth("model", joint.model, joint.drivers)
+    known = TruePlant("model", joint.model, joint.drivers)
     start = joint.start(joint.model)
     silent = replace(law, sensors=tuple(replace(s, noise=0.0, resolution=0.0) for s in law.sensors))
     quiet = replace(task, torque=(), stiffening=(), stuck=None)
@@ -124,8 +124,8 @@ def _step_response(
 
 
 def _trial(
-    joint: BenchmarkJoint,
-    truth: BenchmarkTruth,
+    joint: JointRig,
+    truth: TruePlant,
     law: WithSensors,
     task: ControlTask,
     signals: TaskSignals,

@@ -1,4 +1,4 @@
-"""Tables of the control benchmark: searches, gains, truths, all metrics, learning and failed
+"""Tables of a comparison of controllers: searches, gains, truths, all metrics, learning and failed
 runs.
 """
 
@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from ...core import conversion
 from ...report.chapter import Table, TableColumn
-from . import BenchmarkJoint, ContenderResult, LearningCurve
+from . import ContenderResult, JointRig, LearningCurve
 from .commissioning import RESTARTS, SEARCH_SPREAD
 from .signals import METRICS, RATED_STROKES, SETTLING_BAND, STEADY_TIME
 
@@ -37,7 +37,7 @@ def metric_column(metric: str, values: Sequence[float], **declared: Any) -> Tabl
     return TableColumn([factor * value for value in values], unit, shown, **declared)
 
 
-def search_table(joint: BenchmarkJoint, results: Sequence[ContenderResult]) -> Table | None:
+def search_table(joint: JointRig, results: Sequence[ContenderResult]) -> Table | None:
     """The searches for the models: sets of gains, agreement of their descents, objective and its
     spread.
     """
@@ -113,15 +113,16 @@ def gains_table(results: Sequence[ContenderResult]) -> Table | None:
     return _rows("gains", "Gains", names, rows, shown=False)
 
 
-def truth_table(joint: BenchmarkJoint) -> Table:
+def truth_table(joint: JointRig) -> Table:
     """The truths."""
     truths = joint.truths
     columns: dict[str, Any] = {"truth": [truth.name for truth in truths]}
-    described = [joint.describe(truth) for truth in truths]
-    columns |= {key: [description[key] for description in described] for key in described[0]}
-    return Table(
-        "truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model."
-    )
+    for heading in dict.fromkeys(key for truth in truths for key in truth.description):
+        columns[heading] = [truth.description.get(heading, "–") for truth in truths]
+    columns["unknown dead time"] = [
+        f"{1e3 * truth.extra_delay * joint.sample_time:g} ms" for truth in truths
+    ]
+    return Table("truths", "Truths", columns, joint.truths_note)
 
 
 def metrics_table(results: Sequence[ContenderResult]) -> Table:
@@ -194,7 +195,7 @@ def _rows(
     return Table(key, title, columns, shown=shown) if rows else None
 
 
-def settings_of(joint: BenchmarkJoint) -> tuple[tuple[str, str, str], ...]:
+def settings_of(joint: JointRig) -> tuple[tuple[str, str, str], ...]:
     """The settings of the joint."""
     sensors = list[tuple[str, str, str]]()
     for sensor in joint.sensors:

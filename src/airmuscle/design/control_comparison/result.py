@@ -1,12 +1,12 @@
-"""Control benchmark: contenders are tuned for a family of models and judged on truths; the result
-with its chapter.
+"""Comparison of controllers of a joint: contenders are tuned for a family of models and judged on
+truths; the result with its chapter.
 """
 
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -17,16 +17,17 @@ from ...engine.processes import Workers, process_pool
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ..tuning.case import check_names
 from . import (
-    BenchmarkJoint,
     Contender,
     ContenderResult,
     Group,
+    JointRig,
     LearningCurve,
     RunKey,
-    benchmark_contender,
+    judge_contender,
 )
 from .commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN, Progress
 from .plots import error_figure, learning_figure, run_figure
+from .scores import Spread, mean_ratios, order_columns, spread
 from .signals import BONE2019, METRICS
 from .tables import (
     failure_table,
@@ -56,7 +57,7 @@ DRAWN = (
     "valve stuck",
     "hold",
 )
-"""Tasks that are drawn over time, the first four that the benchmark contains."""
+"""Tasks that are drawn over time, the first four that the comparison contains."""
 MAX_BRIEF = 16
 SHORT_CONTROLLERS = 4
 """Tasks and controllers of the table of errors in the brief view (chosen)."""
@@ -64,25 +65,15 @@ LEARNING = "Iterative learning: rms error of repeated trials on a truth."
 PROCEDURE = (
     "Every controller is tuned by the same optimiser, with at most the same number of sets of gains"
     " for each gain, for perturbed models. In the group 'commissioned' it has then as many runs on"
-    " the truth as every other one. The truths are drawn at random from a family that has no"
-    " characteristic, friction law, valve or gas of the models. The measurements have the"
-    " resolution of a 12-bit encoder, noise and dead time, of which a part is unknown."
+    " the truth as every other one."
 )
 
 
-class Spread(NamedTuple):
-    """Median, smallest and largest value of a number over searches and truths."""
-
-    median: float
-    low: float
-    high: float
-
-
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class BenchmarkResult(Reported):
+class ControlComparison(Reported):
     """The results of contenders on the tasks of a joint: one for each contender and search."""
 
-    joint: BenchmarkJoint
+    joint: JointRig
     tasks: tuple[ControlTask, ...]
     results: tuple[ContenderResult, ...]
 
@@ -142,15 +133,7 @@ class BenchmarkResult(Reported):
         errors = np.array(
             [[self.values(n, task, "rmse", group) for task in self._task_names] for n in names]
         )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            logarithms = np.log(errors / errors.min(axis=0))
-        scores = dict(
-            zip(
-                names,
-                np.exp(np.where(np.isfinite(errors), logarithms, math.inf).mean(axis=1)),
-                strict=True,
-            )
-        )
+        scores = mean_ratios(names, errors)
         if REST_TASK not in self._task_names:
             return scores
         lives = {name: self.values(name, REST_TASK, "valve_life", group) for name in names}
@@ -164,7 +147,7 @@ class BenchmarkResult(Reported):
         return dict(sorted(scores.items(), key=lambda item: item[1].median))
 
     def chapter(self, curves: Sequence[LearningCurve] = ()) -> Chapter:
-        """The description of the benchmark: ranking and errors of each group, searches, gains,
+        """The description of the comparison: ranking and errors of each group, searches, gains,
         truths; and learning.
         """
         joint = self.joint
@@ -206,7 +189,7 @@ class BenchmarkResult(Reported):
             for reference in result.tuning.references
         ]
         return Chapter(
-            "benchmark",
+            "comparison",
             f"Control of an antagonistic joint with {joint.name}",
             self._summary(),
             values=(NamedValue("seeds", ", ".join(map(str, self.seeds)), brief=False),),
@@ -260,17 +243,8 @@ class BenchmarkResult(Reported):
 
     def order_table(self, group: Group) -> Table:
         """On how many truths one contender is better than another one in every search."""
-        ratios = self.ratios(group)
         names = list(self.scores(group))
-        rows = {
-            a: [int((ratios[a].max(axis=0) < ratios[b].min(axis=0)).sum()) for b in names]
-            for a in names
-        }
-        columns: dict[str, Any] = {"better": names}
-        columns |= {
-            f"than {b}": [rows[a][j] if a != b else None for a in names]
-            for j, b in enumerate(names)
-        }
+        columns = order_columns(names, self.ratios(group))
         return Table(
             f"order_{group.name.lower()}",
             f"Order, {group}",
@@ -339,16 +313,14 @@ class BenchmarkResult(Reported):
             counted(len(joint.truths), "truth"),
         )
         valves = f"Valves: {joint.valve}. Sampled every {joint.sample_time * 1e3:g} ms."
-        return f"{', '.join(counts)}. {' '.join(best)} {valves}", PROCEDURE
+        return (
+            f"{', '.join(counts)}. {' '.join(best)} {valves}",
+            f"{PROCEDURE} {joint.remark}".strip(),
+        )
 
 
-def spread(values: Array) -> Spread:
-    """Median, smallest and largest of some numbers; NaN where one of them is NaN."""
-    return Spread(float(np.median(values)), float(values.min()), float(values.max()))
-
-
-def benchmark_controllers(
-    joint: BenchmarkJoint,
+def compare_controllers(
+    joint: JointRig,
     contenders: Sequence[Contender],
     tasks: Sequence[ControlTask] = STANDARD_TASKS,
     *,
@@ -357,7 +329,7 @@ def benchmark_controllers(
     commissioning_runs: int = COMMISSIONING_RUNS,
     progress: Progress | None = None,
     workers: Workers = 1,
-) -> BenchmarkResult:
+) -> ControlComparison:
     """Tune every contender for the models of a joint, commission it on each truth, and run every
     task on the truths.
 
@@ -377,8 +349,8 @@ def benchmark_controllers(
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does
     not suit the joint.
     """
-    check_names("benchmark_controllers", "contender", [contender.name for contender in contenders])
-    check_names("benchmark_controllers", "task", [task.name for task in tasks])
+    check_names("compare_controllers", "contender", [contender.name for contender in contenders])
+    check_names("compare_controllers", "task", [task.name for task in tasks])
     show = progress or (lambda text, done, total: None)
     completed: dict[str, tuple[ContenderResult, ...]] = {}
     with process_pool(workers) as executor:
@@ -390,7 +362,7 @@ def benchmark_controllers(
             "commissioning_runs": commissioning_runs,
         }
         shown = {**options, "progress": show if executor is None else None}
-        distribution = DistributedCalls(executor, _benchmark_task, shown, content=options)
+        distribution = DistributedCalls(executor, _judged, shown, content=options)
         source_names = {
             contender.name: known.name
             for contender in contenders
@@ -412,10 +384,10 @@ def benchmark_controllers(
                 )
                 show(due[i].name, len(completed), len(contenders))
     ordered = (completed[contender.name][i] for i in range(len(seeds)) for contender in contenders)
-    return BenchmarkResult(joint, tuple(tasks), tuple(ordered))
+    return ControlComparison(joint, tuple(tasks), tuple(ordered))
 
 
-def _benchmark_task(
+def _judged(
     options: Mapping[str, Any], task: tuple[Contender, tuple[ContenderResult, ...]]
 ) -> tuple[ContenderResult, ...]:
-    return benchmark_contender(contender=task[0], tuned_as=task[1], **options)
+    return judge_contender(contender=task[0], tuned_as=task[1], **options)

@@ -1,5 +1,5 @@
-"""Gains in the control benchmark: searches for the family of models, and commissioning by runs on a
-truth.
+"""Gains in a comparison of controllers: searches for the family of models, and commissioning by
+runs on a truth.
 """
 
 import contextlib
@@ -18,10 +18,11 @@ from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
 from ..tuning.case import GainRange, with_gains
 from ..tuning.optimisation import MIN_SETS
 from .contenders import Contender, SensedController, complete
-from .joints import ENCODER_STEP, BenchmarkJoint
-from .signals import task_loop, task_signals, valve_travel
+from .rig import JointRig
+from .run_costs import valve_travel
+from .signals import task_loop, task_signals
 from .tasks import DEGREE, TUNING_BEGIN, ControlTask
-from .truths import BenchmarkTruth
+from .true_plant import TruePlant
 
 SETS_PER_GAIN: int = 300
 COMMISSIONING_RUNS: int = 60
@@ -49,7 +50,7 @@ of a small step (chosen)."""
 
 
 def search_gains(
-    joint: BenchmarkJoint,
+    joint: JointRig,
     contender: Contender,
     seeds: Sequence[int],
     sets_per_gain: int,
@@ -80,7 +81,7 @@ def search_gains(
 
 
 def tuned_law(
-    joint: BenchmarkJoint, contender: Contender, seed: int, tuning: Tuning | None
+    joint: JointRig, contender: Contender, seed: int, tuning: Tuning | None
 ) -> Controller:
     """The completed law of a contender with the gains of a search, which may be that of another
     contender.
@@ -92,7 +93,7 @@ def tuned_law(
 
 
 def find_gains(
-    joint: BenchmarkJoint, contender: Contender, seed: int, sets_per_gain: int, progress: Progress
+    joint: JointRig, contender: Contender, seed: int, sets_per_gain: int, progress: Progress
 ) -> Tuning | None:
     """The search for the gains that are best for the tuning tasks in the family of models; None:
     nothing is tuned.
@@ -135,8 +136,8 @@ class _Spent(Exception):
 
 
 def commission(
-    joint: BenchmarkJoint,
-    truth: BenchmarkTruth,
+    joint: JointRig,
+    truth: TruePlant,
     law: Controller,
     bounds: Mapping[str, tuple[float, float]],
     tasks: Sequence[ControlTask],
@@ -263,9 +264,7 @@ def alike(law: Controller, gains: Mapping[str, float]) -> dict[str, float]:
     return renamed
 
 
-def run_loop(
-    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask
-) -> Recording:
+def run_loop(joint: JointRig, truth: TruePlant, law: Controller, task: ControlTask) -> Recording:
     """A task on a truth, whose sensors have their unknown dead time, with rows at the sampling
     instants.
     """
@@ -289,7 +288,7 @@ def on_truth(law: SensedLaw, delay: int) -> SensedLaw:
 
 
 def tracking_errors(
-    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask
+    joint: JointRig, truth: TruePlant, law: Controller, task: ControlTask
 ) -> Array | None:
     """The difference [rad] of set point and reading of the encoder in a run on a truth, and one
     more row (N + 1,): the strokes of proportional valves with their weight in the tuning, as an
@@ -302,8 +301,7 @@ def tracking_errors(
     signals = task_signals(joint, task)
     time = signals.time[signals.time <= task.duration + 1e-9]
     angle = np.interp(time, record["time"], record["angle"])
-    reading = ENCODER_STEP * np.round(angle / ENCODER_STEP)
-    errors = (signals.angle[: time.size] - reading)[time >= TUNING_BEGIN]
+    errors = (signals.angle[: time.size] - joint.read_angle(angle))[time >= TUNING_BEGIN]
     travel = valve_travel(truth.plant, record, np.asarray(record["time"]) >= TUNING_BEGIN).sum()
     weight = (
         0.0 if joint.switching else joint.objective.travel_weight

@@ -1,4 +1,4 @@
-"""Tasks of the control benchmark, with their motions."""
+"""Tasks of a comparison of controllers of a joint, with their motions."""
 
 import abc
 import dataclasses
@@ -141,7 +141,7 @@ class StuckValve:
 
 @dataclasses.dataclass(frozen=True)
 class ControlTask:
-    """A task of the control benchmark.
+    """A task of a joint in a comparison of controllers.
 
     motion     wanted angle of the joint
     duration   of the run [s]
@@ -217,7 +217,7 @@ STANDARD_TASKS: tuple[ControlTask, ...] = (
         stuck=StuckValve("left.discharge", 2.0, 0.1),
     ),
 )
-"""The tasks of the benchmark; all amplitudes, times and disturbances are chosen."""
+"""Standard tasks of a joint; all amplitudes, times and disturbances are chosen."""
 
 
 def tuning_tasks(*fast: SineMotion) -> tuple[ControlTask, ControlTask]:

@@ -1,4 +1,4 @@
-"""Contender of the control benchmark: tuned for a family of models, and its runs of all tasks on
+"""Contender of a comparison: tuned for a family of models, and its runs of all tasks on
 the truths.
 """
 
@@ -13,10 +13,10 @@ from ...recording import Recording
 from ..tuning import Tuning
 from ..tuning.case import with_gains
 from . import (
-    BenchmarkJoint,
-    BenchmarkTruth,
     Commissioning,
     Contender,
+    JointRig,
+    TruePlant,
     commission,
     complete,
     search_gains,
@@ -37,7 +37,7 @@ class Group(enum.StrEnum):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class BenchmarkRun(ShortRepr):
+class TaskRun(ShortRepr):
     """One task done on a truth: its metrics and recording, or the reason why the run ended
     early.
     """
@@ -71,7 +71,7 @@ class ContenderResult(ShortRepr):
     law: Controller
     tuning: Tuning | None
     commissionings: Mapping[str, Commissioning]
-    runs: Mapping[RunKey, BenchmarkRun]
+    runs: Mapping[RunKey, TaskRun]
     restarts: int = 0
 
     @property
@@ -79,8 +79,8 @@ class ContenderResult(ShortRepr):
         return self.contender.name
 
 
-def benchmark_contender(
-    joint: BenchmarkJoint,
+def judge_contender(
+    joint: JointRig,
     contender: Contender,
     tasks: Sequence[ControlTask] = STANDARD_TASKS,
     *,
@@ -104,7 +104,7 @@ def benchmark_contender(
         law = tuned_law(joint, contender, seed, tuning)
         bounds = complete(joint, contender).commissioned
         commissionings: dict[str, Commissioning] = {}
-        runs: dict[RunKey, BenchmarkRun] = {}
+        runs: dict[RunKey, TaskRun] = {}
         for i, truth in enumerate(joint.truths):
             progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
             laws = {Group.MODELS: law}
@@ -131,12 +131,10 @@ def benchmark_contender(
     return tuple(results)
 
 
-def run_task(
-    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask
-) -> BenchmarkRun:
+def run_task(joint: JointRig, truth: TruePlant, law: Controller, task: ControlTask) -> TaskRun:
     """A task on a truth, with rows at the sampling instants."""
     try:
         record = run_loop(joint, truth, law, task)
     except (PhysicsError, SimulationError) as error:
-        return BenchmarkRun(None, None, str(error))
-    return BenchmarkRun(track(joint, truth.plant, task, task_signals(joint, task), record), record)
+        return TaskRun(None, None, str(error))
+    return TaskRun(track(joint, truth.plant, task, task_signals(joint, task), record), record)

@@ -1,7 +1,7 @@
 """Control benchmark of the antagonistic joint: all standard controllers on all truths, and the page
 of their results.
 
-    python benchmarks/control_benchmark.py [--quick] [--searches 3] [--on-off-searches 3]
+    python benchmarks/control/control_benchmark.py [--quick] [--searches 3] [--on-off-searches 3]
         [--processes 2]
                                            [--results FOLDER] [--out PAGE]
 
@@ -24,23 +24,22 @@ import sys
 import time
 from pathlib import Path
 
+from contender_set import standard_contenders
+from joint_models import on_off_joint, proportional_joint
+from joint_truths import SEALED_SEED, TRUTH_SEEDS
+
 import airmuscle
 from airmuscle.design import (
-    SEALED_SEED,
     STANDARD_TASKS,
-    TRUTH_SEEDS,
-    BenchmarkJoint,
-    BenchmarkResult,
     ContenderResult,
+    ControlComparison,
+    JointRig,
     LearningCurve,
-    benchmark_controllers,
+    compare_controllers,
     find_tasks,
     learn,
-    on_off_joint,
-    proportional_joint,
-    standard_contenders,
 )
-from airmuscle.design.control_benchmark.commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN
+from airmuscle.design.control_comparison.commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN
 
 JOINTS = {"proportional": proportional_joint, "on/off": on_off_joint}
 ON_OFF = ("PID", "feed-forward + PID", "feed-forward + sliding mode")
@@ -76,7 +75,7 @@ class Part:
     cpu: float
 
 
-def searches(joint: BenchmarkJoint, kind: str, settings: Settings) -> list[tuple[str, ...]]:
+def searches(joint: JointRig, kind: str, settings: Settings) -> list[tuple[str, ...]]:
     """The names of the contenders that share a search, the slow ones first."""
     groups: dict[str, list[str]] = {}
     for each in standard_contenders(joint):
@@ -120,7 +119,7 @@ def measure_part(kind: str, names: tuple[str, ...], settings: Settings, path: Pa
     started = time.process_time()
     joint = JOINTS[kind](settings.truths)
     contenders = [each for each in standard_contenders(joint) if each.name in names]
-    found = benchmark_controllers(
+    found = compare_controllers(
         joint,
         contenders,
         STANDARD_TASKS,
@@ -151,20 +150,20 @@ def fingerprint(settings: Settings) -> str:
     """A text that changes with the settings and with the program."""
     digest = hashlib.sha256(repr(settings).encode())
     source = Path(airmuscle.__file__).parent
-    for package in PACKAGES:
-        for path in sorted((source / package).rglob("*.py")):
-            digest.update(path.read_bytes())
+    of_program = (path for name in PACKAGES for path in sorted((source / name).rglob("*.py")))
+    for path in (*of_program, *sorted(Path(__file__).parent.glob("*.py"))):
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
-def collect(parts: list[Part], settings: Settings) -> dict[str, BenchmarkResult]:
+def collect(parts: list[Part], settings: Settings) -> dict[str, ControlComparison]:
     """The results of both joints."""
     results = {}
     for kind, joint in JOINTS.items():
         order = [each.name for each in standard_contenders(joint(settings.truths[:1]))]
         found = [each for part in parts if part.kind == kind for each in part.results]
         found.sort(key=lambda each: (each.seed, order.index(each.name)))
-        results[kind] = BenchmarkResult(joint(settings.truths), STANDARD_TASKS, tuple(found))
+        results[kind] = ControlComparison(joint(settings.truths), STANDARD_TASKS, tuple(found))
     return results
 
 
@@ -185,7 +184,9 @@ def main() -> None:
         "--on-off-searches", type=int, help="of those with on/off valves; the same unless given"
     )
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--results", type=Path, default=here.parent / "build" / "control_benchmark")
+    parser.add_argument(
+        "--results", type=Path, default=here.parents[1] / "build" / "control_benchmark"
+    )
     parser.add_argument(
         "--out", type=Path, help="default: CONTROL.md beside this file; of --quick in the results"
     )

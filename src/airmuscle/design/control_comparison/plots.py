@@ -1,4 +1,4 @@
-"""Figures of the control benchmark: errors of all tasks, runs of some tasks, learning curves."""
+"""Figures of a comparison of controllers: errors of tasks, runs, learning curves."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -7,19 +7,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ...control.laws import AntagonisticInverse, WithStuckValve, static_force
 from ...core import Array, ParameterError, check_known, published
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant
-from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
+from ...physics.pneumatics import REFERENCE_DENSITY
 from ...recording import Recording
 from ..study.metrics import time_mean
-from . import BenchmarkJoint, ControlTask, JointMotion
+from . import ControlTask, JointMotion, JointRig
 from .contenders import SensedController
+from .run_costs import TORQUE_INPUT, drawn_flow, valve_travel
 
-TORQUE_INPUT = "external_torque"
 BISECTIONS = 40
 ANGLE_STEP = 1e-4
 """Step of the angle [rad] for the speed of the muscles, by central differences (chosen)."""
@@ -54,7 +53,7 @@ class TaskSignals(NamedTuple):
         )
 
 
-def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
+def task_signals(joint: JointRig, task: ControlTask) -> TaskSignals:
     """The signals of a task at the sampling instants of a joint; kept, because every run of the
     task needs them.
     """
@@ -65,7 +64,7 @@ def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
     return _kept_signals(joint, task)
 
 
-def _signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
+def _signals(joint: JointRig, task: ControlTask) -> TaskSignals:
     h = joint.sample_time
     count = round(task.duration / h) + 2
     time: Array = h * np.arange(count, dtype=float)
@@ -98,7 +97,7 @@ _kept_signals = functools.lru_cache(maxsize=128)(_signals)
 
 
 def inverse_dynamics(
-    joint: BenchmarkJoint, plant: Plant, motion: JointMotion, time: Array, mean: Array
+    joint: JointRig, plant: Plant, motion: JointMotion, time: Array, mean: Array
 ) -> Array:
     """Half the pressure difference (N,) [Pa] by which a plant without friction follows a motion at
     times (N,) [s].
@@ -123,7 +122,7 @@ def inverse_dynamics(
 
 
 def angular_acceleration(
-    joint: BenchmarkJoint, plant: Plant, angle: float, speed: float, half: float
+    joint: JointRig, plant: Plant, angle: float, speed: float, half: float
 ) -> float:
     """Acceleration [rad/s2] of a plant without friction at an angle [rad], a speed [rad/s] and half
     a pressure difference [Pa] about the mean pressure."""
@@ -157,7 +156,7 @@ def _torque(plant: Plant, angle: Any, speed: Any, first: Any, second: Any) -> An
 
 
 def task_loop(
-    joint: BenchmarkJoint,
+    joint: JointRig,
     law: Controller,
     task: ControlTask,
     plant: Plant,
@@ -187,7 +186,6 @@ def task_loop(
 
 
 BONE2019 = published("bone-2019")
-Mask = npt.NDArray[np.bool_]
 SETTLING_BAND = 0.5
 """Half width of the band in which a motion has settled [degree] (chosen)."""
 STEADY_TIME = 0.3
@@ -253,7 +251,7 @@ METRICS = {field.name: field.metadata["column"] for field in dataclasses.fields(
 
 
 def track(
-    joint: BenchmarkJoint, plant: Plant, task: ControlTask, signals: TaskSignals, record: Recording
+    joint: JointRig, plant: Plant, task: ControlTask, signals: TaskSignals, record: Recording
 ) -> TrackingMetrics:
     """The metrics of a run of a task on a true joint; means are over time, by the trapezoidal
     rule.
@@ -288,37 +286,10 @@ def track(
         settling=settling,
         overshoot=overshoot,
         steady=time_mean(time[late], np.abs(error[late])) if task.event is not None else math.nan,
-        air=time_mean(t, _drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
+        air=time_mean(t, drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
         strokes=float(strokes.sum()),
         valve_life=(
             2.0 * RATED_STROKES / float(strokes.max()) / 3600.0 if strokes.max() > 0 else math.inf
         ),
         stiffness_error=100.0 * math.sqrt(time_mean(time[late], (reached / stiff - 1.0) ** 2)),
     )
-
-
-def _drawn_flow(plant: Plant, record: Recording) -> Array:
-    """The mass flow (N,) [kg/s] from the supplies, also what a stuck valve loses; else that into
-    the muscle.
-    """
-    flow = np.zeros(len(record["time"]))
-    for muscle, circuit in zip(plant.muscles, plant.circuits, strict=True):
-        inner = circuit.circuit if isinstance(circuit, WithTubes) else circuit
-        if not isinstance(inner, FillDischarge):
-            flow += np.maximum(record[f"{muscle.name}.mass_flow"], 0.0)
-            continue
-        air = inner.supply.air({}, plant.ambient)
-        tube = f"{muscle.name}.tube.pressure"
-        pressure = record[tube] if tube in record.columns else record[f"{muscle.name}.pressure"]
-        opening = np.asarray(record[f"{muscle.name}.fill"])
-        absolute = absolute_pressure(np.asarray(pressure), plant.ambient)
-        flow += np.maximum(
-            inner.fill.mass_flow(air.pressure, absolute, opening, air.temperature), 0.0
-        )
-    return flow
-
-
-def valve_travel(plant: Plant, record: Recording, judged: Mask) -> Array:
-    """Travel of each valve [full strokes/s] between the samples."""
-    commands = [record[f"command.{name}"][judged] for name in plant.inputs if name != TORQUE_INPUT]
-    return np.asarray(np.abs(np.diff(commands)).sum(axis=1) / np.ptp(record["time"][judged]))

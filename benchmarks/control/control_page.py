@@ -13,10 +13,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from joint_truths import SEALED_SEED
 
-from airmuscle.design import SEALED_SEED, BenchmarkResult, Group, LearningCurve
-from airmuscle.design.control_benchmark.commissioning import SEARCH_SPREAD
-from airmuscle.design.control_benchmark.tables import search_table, truth_table
+from airmuscle.design import ControlComparison, Group, LearningCurve
+from airmuscle.design.control_comparison.commissioning import SEARCH_SPREAD
+from airmuscle.design.control_comparison.tables import search_table, truth_table
 from airmuscle.report import Table, shown_columns
 
 SINES = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
@@ -35,7 +36,7 @@ Row = tuple[str, str, str, str]
 
 
 def page(
-    results: Mapping[str, BenchmarkResult], curve: LearningCurve, settings: Any, cpu: float
+    results: Mapping[str, ControlComparison], curve: LearningCurve, settings: Any, cpu: float
 ) -> str:
     """The page in Markdown."""
     known = {kind: without_sealed(result) for kind, result in results.items()}
@@ -55,7 +56,7 @@ def page(
     return "\n".join(lines) + "\n"
 
 
-def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: float) -> list[str]:
+def introduction(results: Mapping[str, ControlComparison], settings: Any, cpu: float) -> list[str]:
     """What was computed, how long it took, and the truths."""
     result = results["proportional"]
     switched = results["on/off"]
@@ -69,11 +70,11 @@ def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: flo
     )
     return [
         (
-            f"Results of `benchmarks/control_benchmark.py{options}` on {datetime.date.today()},"
-            f" Python {platform.python_version()}; {cpu / 60:.3g} minutes of CPU time. All figures"
-            " are simulations. [Comparison of controllers](../docs/benchmark.md) describes joint,"
-            " truths, groups, tasks and metrics; their numbers are chosen. All text of this page"
-            " but the headings is computed from the results."
+            f"Results of `benchmarks/control/control_benchmark.py{options}` on"
+            f" {datetime.date.today()}, Python {platform.python_version()}; {cpu / 60:.3g} minutes"
+            " of CPU time. All figures are simulations. [The control benchmark](README.md)"
+            " describes joint, truths, groups, tasks and metrics; their numbers are chosen. All"
+            " text of this page but the headings is computed from the results."
         ),
         "",
         (
@@ -88,7 +89,7 @@ def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: flo
     ]
 
 
-def convergence(result: BenchmarkResult) -> str:
+def convergence(result: ControlComparison) -> str:
     """How many searches have converged, and the controllers whose searches differ by more than the
     stated spread.
     """
@@ -110,18 +111,18 @@ def convergence(result: BenchmarkResult) -> str:
     )
 
 
-def without_sealed(result: BenchmarkResult) -> BenchmarkResult:
+def without_sealed(result: ControlComparison) -> ControlComparison:
     """The result on the truths other than the sealed one."""
     return on(result, [truth.name for truth in result.joint.truths if truth.name != "sealed truth"])
 
 
-def on(result: BenchmarkResult, names: Iterable[str]) -> BenchmarkResult:
+def on(result: ControlComparison, names: Iterable[str]) -> ControlComparison:
     """The result on some of the truths."""
     kept = tuple(truth for truth in result.joint.truths if truth.name in names)
     return replace(result, joint=replace(result.joint, truths=kept))
 
 
-def part(result: BenchmarkResult) -> list[str]:
+def part(result: ControlComparison) -> list[str]:
     """The tables of one joint."""
     lines = []
     for group in result.groups:
@@ -134,7 +135,7 @@ def part(result: BenchmarkResult) -> list[str]:
     return [*lines, *(["### Searches", "", *table(searched)] if searched else [])]
 
 
-def sealed(result: BenchmarkResult) -> list[str]:
+def sealed(result: ControlComparison) -> list[str]:
     """Ranking and errors of both groups on the truth that no tuning has seen."""
     alone = on(result, ["sealed truth"])
     lines = table(truth_table(alone.joint))
@@ -143,7 +144,7 @@ def sealed(result: BenchmarkResult) -> list[str]:
     return lines
 
 
-def orders(result: BenchmarkResult) -> list[str]:
+def orders(result: ControlComparison) -> list[str]:
     """The pairs of controllers whose order is the same on every truth, in every search."""
     lines = []
     for group in result.groups:
@@ -172,12 +173,12 @@ def orders(result: BenchmarkResult) -> list[str]:
     return lines
 
 
-def ratio_of(result: BenchmarkResult, task: str, first: str, second: str, group: Group) -> Any:
+def ratio_of(result: ControlComparison, task: str, first: str, second: str, group: Group) -> Any:
     """Ratio of the rms errors of two controllers, (searches, truths)."""
     return result.values(first, task, "rmse", group) / result.values(second, task, "rmse", group)
 
 
-def targets(results: Mapping[str, BenchmarkResult], curve: LearningCurve) -> list[Row]:
+def targets(results: Mapping[str, ControlComparison], curve: LearningCurve) -> list[Row]:
     """The targets: name, bound, what was reached over searches and truths, and where all searches
     meet it.
     """

@@ -4,36 +4,49 @@ than the model.
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import Reference, ShortRepr, Value, model, ops, parameter, published
-from ...engine.loop import Driver, SolenoidDriver
-from ...files.library.loading import load_law
-from ...physics import (
+import airmuscle as am
+from airmuscle.core import Reference, Value, model, ops, parameter
+from airmuscle.design import TruePlant
+from airmuscle.engine import Driver, SolenoidDriver
+from airmuscle.physics import (
+    REFERENCE_DENSITY,
+    REFERENCE_TEMPERATURE,
+    AntagonisticJoint,
+    BoucWen,
+    EnergyBalance,
     FillDischarge,
     ForceLaw,
+    Friction,
+    Isothermal,
+    JointWithExternalTorque,
     LinearDamper,
+    LuGre,
+    MaxwellSlip,
     Orifice,
     Plant,
     SubsonicIndexValve,
-    TonduLopez2000,
-)
-from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
-from ...physics.muscle.friction import BoucWen, Friction, LuGre, MaxwellSlip
-from ...physics.pneumatics import (
-    EnergyBalance,
-    Isothermal,
     Supply,
+    TonduLopez2000,
     Tube,
+    TubeOrifice,
     WallHeatTransfer,
     WithTubes,
 )
-from ...physics.pneumatics.gas import HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from airmuscle.physics.pneumatics.gas import HEAT_CAPACITY_RATIO
 
+SAINT_VENANT = Reference(
+    "saint-venant-wantzel-1839",
+    "de Saint-Venant, B., Wantzel, L.",
+    "Mémoire et expériences sur l'écoulement de l'air",
+    "Journal de l'École Polytechnique 16(27), 85-122",
+    1839,
+    note="isentropic flow through a nozzle; cited after textbooks, not read",
+)
 SIDES = ("left", "right")
 SUPPLY = 6e5
 TRUTH_SEEDS = tuple(range(35, 41))
@@ -66,7 +79,7 @@ class IsentropicNozzle(Orifice):
     difference. Reference: Saint-Venant and Wantzel (1839).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (published("saint-venant-wantzel-1839"),)
+    references: ClassVar[tuple[Reference, ...]] = (SAINT_VENANT,)
     from_file: ClassVar[bool] = False
 
     conductance: float = parameter(
@@ -106,24 +119,7 @@ def _psi(ratio: Value) -> Value:
     )
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class BenchmarkTruth(ShortRepr):
-    """A plant on which controllers are judged.
-
-    name         of the truth in tables
-    plant        with classes of characteristic, friction, valve and gas that neither the model nor
-                 its family has
-    drivers      of the valves
-    extra_delay  dead time of all sensors that nobody knows, in samples, beside the stated one
-    """
-
-    name: str
-    plant: Plant
-    drivers: Mapping[str, Driver] = dataclasses.field(default_factory=dict)
-    extra_delay: int = 0
-
-
-def random_truth(seed: int, conductance: float, *, switching: bool = False) -> BenchmarkTruth:
+def random_truth(seed: int, conductance: float, *, switching: bool = False) -> TruePlant:
     """The truth of a seed, with valves of about this sonic conductance [m3/(s Pa)].
 
     All ranges are chosen; numbers are uniform within them, and logarithmic where the ends differ by
@@ -149,7 +145,7 @@ def random_truth(seed: int, conductance: float, *, switching: bool = False) -> B
     heat = _logarithmic(random, 0.3, 3.0)
     coefficient = _logarithmic(random, 10.0, 60.0)
     gas = (EnergyBalance(heat), WallHeatTransfer(coefficient), Isothermal())[kind]
-    muscle = load_law("dmsp-20-300").muscle
+    muscle = am.load("dmsp-20-300").muscle
     law = _characteristic(random)
     damper = LinearDamper(random.uniform(150.0, 400.0))
     pair = tuple(
@@ -164,16 +160,14 @@ def random_truth(seed: int, conductance: float, *, switching: bool = False) -> B
     )
     valve = valves[0] if random.random() < 0.5 else valves[1]
     circuit: Any = FillDischarge(Supply(SUPPLY), valve, valve)
+    tube = "–"
     if random.random() < 0.7:
-        circuit = WithTubes(
-            circuit,
-            Tube.from_dimensions(_logarithmic(random, 0.2, 1.0), random.uniform(4e-3, 6e-3)),
-        )
+        length = _logarithmic(random, 0.2, 1.0)
+        circuit = WithTubes(circuit, Tube.from_dimensions(length, random.uniform(4e-3, 6e-3)))
+        tube = f"{length:.2g} m"
     factors = {"inertia": (0.8, 1.6), "weight_torque": (0.6, 1.5), "offset": (0.9, 1.1)}
-    joint = replace(
-        JOINT,
-        **{name: getattr(JOINT, name) * random.uniform(*ends) for name, ends in factors.items()},
-    )
+    drawn = {name: random.uniform(*ends) for name, ends in factors.items()}
+    joint = replace(JOINT, **{name: getattr(JOINT, name) * x for name, x in drawn.items()})
     extra = int(random.integers(0, MAX_EXTRA_DELAY + 1))
     delay = random.uniform(1e-3, 2e-3)
     plant = Plant(pair, (circuit, circuit), JointWithExternalTorque(joint), gas)
@@ -181,9 +175,14 @@ def random_truth(seed: int, conductance: float, *, switching: bool = False) -> B
     drivers: dict[str, Driver] = (
         dict.fromkeys(inputs, SolenoidDriver(delay, delay)) if switching else {}
     )
-    return BenchmarkTruth(
-        f"truth {seed}" if seed != SEALED_SEED else "sealed truth", plant, drivers, extra
-    )
+    description = {
+        **{kind: ", ".join(sorted(names)) for kind, names in kinds_of(plant).items()},
+        "flow": f"{factor:.2f}",
+        "tube": tube,
+        **{name.replace("_", " "): f"{x:.2f}" for name, x in drawn.items()},
+    }
+    name = f"truth {seed}" if seed != SEALED_SEED else "sealed truth"
+    return TruePlant(name, plant, drivers, extra, description)
 
 
 def _logarithmic(random: np.random.Generator, low: float, high: float) -> float:
@@ -194,7 +193,7 @@ def _characteristic(random: np.random.Generator) -> ForceLaw:
     name = LAWS[random.integers(len(LAWS))]
     correction = random.uniform(1.1, 1.35)
     radius = random.uniform(9.5e-3, 10.5e-3)
-    law = load_law(name).characteristic
+    law = am.load(name).characteristic
     assert isinstance(law, ForceLaw)
     if not isinstance(law, TonduLopez2000):
         return law
@@ -214,3 +213,27 @@ def _friction(random: np.random.Generator) -> Friction:
     return MaxwellSlip(
         tuple(s * force / limit for s, limit in zip(shares, limits, strict=True)), limits
     )
+
+
+def kinds_of(plant: Plant) -> dict[str, set[str]]:
+    """Class names of the characteristics, valves, friction laws and gas in a plant, without
+    wrappers.
+    """
+    laws: list[Any] = [muscle.contractile for muscle in plant.muscles]
+    while any(hasattr(law, "inner") for law in laws):
+        laws = [getattr(law, "inner", law) for law in laws]
+    return {
+        "characteristic": {type(law).__name__ for law in laws},
+        "valve": {name for circuit in plant.circuits for name in _valves(circuit)},
+        "friction": {type(muscle.friction).__name__ for muscle in plant.muscles},
+        "gas": {type(plant.gas).__name__},
+    }
+
+
+def _valves(part: Any) -> set[str]:
+    """Class names of the orifices inside a circuit, other than those of tubes."""
+    if isinstance(part, Orifice):
+        return set() if isinstance(part, TubeOrifice) else {type(part).__name__}
+    if not dataclasses.is_dataclass(part):
+        return set()
+    return {name for f in dataclasses.fields(part) for name in _valves(getattr(part, f.name))}

@@ -1,4 +1,4 @@
-"""Contenders of the control benchmark: laws and called controllers, completed by sensors and
+"""Contenders of a comparison: laws and called controllers, completed by sensors and
 pressure control.
 """
 
@@ -24,8 +24,7 @@ from ...engine.loop import (
 )
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
-from . import BenchmarkJoint
-from .truths import SIDES
+from . import JointRig
 
 ELSEWHERE = (
     "A controller of another plant, such as a fitted arm, is judged by airmuscle tune {}, whose"
@@ -165,7 +164,7 @@ ZONE = (0.005 * BAR, 0.2 * BAR)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Contender:
-    """A controller that takes part in the benchmark.
+    """A controller that takes part in a comparison.
 
     name     for tables
     law      a ControlLaw, which is compiled with the plant, or another Controller, which is called
@@ -215,7 +214,7 @@ class CompleteLaw(NamedTuple):
     commissioned: Bounds
 
 
-def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> CompleteLaw:
+def complete(joint: JointRig, contender: Contender, seed: int = 1) -> CompleteLaw:
     """The law of a contender with the parts that it lacks: co-contraction, pressure control,
     modulation, sensors.
 
@@ -248,9 +247,7 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     return CompleteLaw(SensedController(sense, contender.law, law, limited), tuned, commissioned)
 
 
-def _check_columns(
-    joint: BenchmarkJoint, contender: Contender, path: str | Path = "FILE.toml"
-) -> None:
+def _check_columns(joint: JointRig, contender: Contender, path: str | Path = "FILE.toml") -> None:
     """Raise ParameterError where a law, of the scenario `path`, measures a column without a
     sensor.
     """
@@ -262,7 +259,7 @@ def _check_columns(
         )
 
 
-def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
+def _actuated(joint: JointRig, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
     """A law with the parts from its commands to the valves, the prefix of its parameters, and
     ranges of the parts.
     """
@@ -276,7 +273,8 @@ def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[Contro
         )
         prefix = "outer."
     if set(law.inputs) == set(joint.pressures):
-        valves = tuple(SplitRange(f"{side}.fill", f"{side}.discharge") for side in SIDES)
+        names = [muscle.name for muscle in joint.model.muscles]
+        valves = tuple(SplitRange(f"{name}.fill", f"{name}.discharge") for name in names)
         start = (10.0 / BAR, 0.02 * BAR) if joint.switching else (2.0 / BAR, 0.0)
         inner = ProportionalFeedback(joint.pressures, valves, *start)
         law = Cascade(law, inner, (joint.min_pressure,) * 2, (joint.max_pressure,) * 2, tracking)
@@ -294,11 +292,11 @@ def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[Contro
     return law, prefix, ranges
 
 
-def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
+def scenario_contender(joint: JointRig, path: str | Path) -> Contender:
     """The contender of a scenario file: its control law, with the ranges of its gains that
     `airmuscle tune` has.
 
-    The benchmark has its own sensors and, for a law that commands pressures, its own pressure
+    The rig has its own sensors and, for a law that commands pressures, its own pressure
     control: `WithSensors` around the law is removed, and of a `Cascade` whose inputs the joint does
     not have the outer law is taken. Raises FileError, ParameterError, UnitError or UnknownNameError
     with the location; ParameterError for a law that commands none of half the pressure difference,

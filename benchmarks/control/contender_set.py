@@ -5,15 +5,26 @@ without it.
 import dataclasses
 import functools
 
-from ...control.laws import PID, SlidingMode, SuperTwisting, WithFeedForward, WithSetpointDelay
-from ...control.laws.open_loop import FrictionFeedForward, MotionFeedForward, SetpointLead
-from ...control.laws.pressures import DIFFERENCE, AngleAndStiffness, AntagonisticInverse
-from ...core import with_prefix
-from ...engine.loop import ControlLaw
-from . import designed_controllers as designed
-from .contenders import Bounds, Contender, PassedSignals
-from .joints import BenchmarkJoint
+import designed_controllers as designed
 
+from airmuscle.control import (
+    PID,
+    AngleAndStiffness,
+    AntagonisticInverse,
+    FrictionFeedForward,
+    MotionFeedForward,
+    SetpointLead,
+    SlidingMode,
+    SuperTwisting,
+    WithFeedForward,
+    WithSetpointDelay,
+)
+from airmuscle.core import with_prefix
+from airmuscle.design import Contender, JointRig
+from airmuscle.design.control_comparison.contenders import Bounds, PassedSignals
+from airmuscle.engine import ControlLaw
+
+DIFFERENCE = designed.DIFFERENCE
 MAX_LEAD = 0.03
 """Greatest lead time [s] of a feed-forward (chosen): it replaces the lag of the pressures, never
 damping or inertia.
@@ -55,7 +66,7 @@ def _feed_forward() -> WithFeedForward:
 
 
 def _beside_feed_forward(
-    joint: BenchmarkJoint,
+    joint: JointRig,
     name: str,
     feedback: ControlLaw,
     bounds: Bounds,
@@ -73,12 +84,12 @@ def _beside_feed_forward(
     return Contender(name, law, known, sought)
 
 
-def _delay(joint: BenchmarkJoint) -> int:
+def _delay(joint: JointRig) -> int:
     """Stated dead time of the encoder [samples]."""
     return next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
 
 
-def _angle_and_stiffness(joint: BenchmarkJoint) -> Contender:
+def _angle_and_stiffness(joint: JointRig) -> Contender:
     """Angle and stiffness by the inverse of the model for torque and stiffness."""
     plant = joint.model
     inverse = AntagonisticInverse(
@@ -97,7 +108,7 @@ def _angle_and_stiffness(joint: BenchmarkJoint) -> Contender:
     return Contender("angle and stiffness", law, bounds, bounds)
 
 
-def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
+def standard_contenders(joint: JointRig) -> tuple[Contender, ...]:
     """The contenders of the package for a joint; all ranges of gains are chosen."""
     pid = PID(
         "angle",
