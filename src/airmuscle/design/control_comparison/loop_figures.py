@@ -13,9 +13,11 @@ from .plots import line_style, marker_style
 
 def loop_error_figure(errors: Mapping[str, Mapping[str, Array]], columns: Sequence[str]) -> Any:
     """RMS error of each controller on each plant, one axis for each controlled column."""
-    width = 3.6 * max(len(columns), 1.4)
-    figure, axes = new_figure(1, len(columns), width=width, height=3.2, squeeze=False)
-    for axis, column in zip(axes[0], columns, strict=True):
+    count = len(columns)
+    width = 3.6 * max(count, 1.4)
+    figure, axes = new_figure(1, count, width=width, height=3.2, squeeze=False)
+    for place, column in enumerate(columns):
+        axis = axes[0, place]
         _draw_column_errors(axis, column, errors[column])
     return figure
 
@@ -53,12 +55,17 @@ def _spaced(places: Array, count: int) -> Array:
 
 def loop_run_figure(runs: Mapping[str, Recording | None], columns: Sequence[str]) -> Any:
     """Controlled columns with their set points, and below them the first command of each loop."""
-    rows = len(columns) + 1
-    figure, axes = new_figure(rows, 1, height=1.9 * rows + 0.6, sharex=True, squeeze=False)
-    completed = {name: record for name, record in runs.items() if record is not None}
-    for axis, column in zip(axes[:-1, 0], columns, strict=True):
+    count = len(columns)
+    height = 2.5 + 1.9 * count
+    figure, axes = new_figure(count + 1, 1, height=height, sharex=True, squeeze=False)
+    completed = dict[str, Recording]()
+    for name, record in runs.items():
+        if record is not None:
+            completed[name] = record
+    for place, column in enumerate(columns):
+        axis = axes[place, 0]
         _draw_column(axis, column, completed)
-    _draw_commands(axes[-1, 0], completed)
+    _draw_commands(axes[count, 0], completed)
     legend_below(figure, axes[0, 0], columns=3)
     return figure
 
