@@ -29,7 +29,7 @@ from airmuscle.errors import AirmuscleWarning
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
 FIRST = {
     "the form of the law": (lambda: ramps(FRICTIONLESS), 1),
-    "offsets and gains of single runs": (
+    "two muscles, or gains, in two groups of runs": (
         lambda: (
             ramps(FRICTIONLESS)
             | {
@@ -64,7 +64,9 @@ def test_the_cause_of_a_misfit_comes_first(cause: str, tmp_path):
     assert first.startswith(cause), text
     assert float(share) > 50.0
     assert "the law does not follow them" in text or "repeated runs differ" in text
-    assert ("No law follows such runs" in text) == (cause == "offsets and gains of single runs")
+    assert ("No law follows such runs" in text) == (
+        cause == "two muscles, or gains, in two groups of runs"
+    )
 
 
 def test_a_law_that_follows_the_data_has_no_misfit(tmp_path):

@@ -261,15 +261,23 @@ _BRANCH_CAUSES = (
     " friction.",
     Hint("To identify the friction", function="bench.fit_hysteresis"),
 )
-"""What two branches may come from, and what tells the causes apart; not where a delay is known."""
+"""What tells the causes of two branches apart; not where they are no friction."""
 
 
 def branch_notes(
-    runs: Sequence[Recording], distance: float, quantity: str, *, delayed: bool = False
+    runs: Sequence[Recording],
+    distance: float,
+    quantity: str,
+    *,
+    causes: str = "",
+    is_friction: bool = True,
 ) -> list[str]:
     """The remark that the residuals of a fit follow two branches at a distance [SI]; empty without
-    a distance. `delayed` is whether a delay of a sensor explains them, so that they are not
-    friction."""
+    a distance.
+
+    causes       a sentence with the causes of the residuals, if they are known
+    is_friction  whether they may be friction
+    """
     if not distance:
         return []
     unit = QUANTITIES[quantity].unit
@@ -282,8 +290,8 @@ def branch_notes(
     return [
         HintedText(
             f"The residuals follow two branches, {text} apart on average"
-            f" ({'; '.join(dict.fromkeys(names))}).",
-            *([] if delayed else _BRANCH_CAUSES),
+            f" ({'; '.join(dict.fromkeys(names))}). {causes}".rstrip(),
+            *(_BRANCH_CAUSES if is_friction else []),
         )
     ]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core import Array
 from ...recording import Recording
-from .misfit_causes import MisfitCause, causes_text, misfit_causes
+from .causes import MisfitCause, causes_text, misfit_causes
 
 MAX_ACCEPTED = 10.0
 """Ratio of the rms error to the scatter of the data above which a muscle is written only where the

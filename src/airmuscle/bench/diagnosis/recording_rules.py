@@ -7,6 +7,7 @@ from ...core import ParameterError, one_line
 from ...recording import Recording
 from ..inspection import remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
+from .causes import MisfitCause
 from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .data_checks import outlier_notes, saturation_notes
 from .matched_rows import Matches, match_rows
@@ -84,6 +85,9 @@ class Findings:
     misfit: LawMisfit | None = None
     """That a law does not follow the data, with the causes that explain the residuals; its text is
     among the diagnoses."""
+    causes: tuple[MisfitCause, ...] = ()
+    """What explains the residuals of a law where they are more than noise: those of a misfit, or of
+    two branches."""
 
     @property
     def notes(self) -> tuple[str, ...]:

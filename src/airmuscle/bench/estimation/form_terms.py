@@ -23,6 +23,8 @@ LOOP_DEGREE = 3
 """Degree of the width of the loop (chosen)."""
 GREATEST_HELD_DEGREE = 6
 """Greatest degree of the form error in a quantity that is held in each run (chosen)."""
+GAIN_DEGREE = 4
+"""Degree of the polynomial that gives the changes for a relative change of an argument (chosen)."""
 SPARE_RUNS = 4
 """Combinations of run offsets that the form error in the held quantity leaves, where there are as
 many (chosen: 92 to 98 % of 95 % intervals of laboratories held)."""
@@ -107,17 +109,38 @@ class Conditions(NamedTuple):
     second: Array
     modelled: Array
     direction: Array
+    gain_of_first: Array
+    gain_of_second: Array
+    """Change of the modelled quantity for a relative change of each argument, x dF/dx."""
+
+    @classmethod
+    def of(cls, first: Array, second: Array, modelled: Array, direction: Array) -> "Conditions":
+        """The conditions with the gains of both arguments, from a polynomial of the modelled
+        quantity."""
+        gains = _gains_of_arguments(first, second, modelled)
+        return cls(first, second, modelled, direction, *gains)
 
     def rows(self, selection: npt.NDArray[np.bool_] | Indices) -> "Conditions":
         """The conditions of a selection of the rows, a mask (N,) or their indices."""
         return Conditions(*(values[selection] for values in self))
 
     def scaled(self) -> "Conditions":
-        """With both arguments on a scale from -1 to 1, and the modelled quantity in its root mean
-        square."""
+        """With both arguments on a scale from -1 to 1, and the modelled quantity and its changes in
+        its root mean square."""
         size = float(np.sqrt(np.mean(self.modelled**2)))
-        modelled = self.modelled / size if size > 0.0 else self.modelled
-        return Conditions(_scaled(self.first), _scaled(self.second), modelled, self.direction)
+        unit = size if size > 0.0 else 1.0
+        return Conditions(
+            first=_scaled(self.first),
+            second=_scaled(self.second),
+            modelled=self.modelled / unit,
+            direction=self.direction,
+            gain_of_first=self.gain_of_first / unit,
+            gain_of_second=self.gain_of_second / unit,
+        )
+
+    def gain_of_swept(self, *, second_is_swept: bool) -> Array:
+        """The change for a relative change of the swept argument."""
+        return self.gain_of_second if second_is_swept else self.gain_of_first
 
 
 class FormTerms(NamedTuple):
@@ -129,6 +152,8 @@ class FormTerms(NamedTuple):
     spare_gains: int
     spare_tilts: int
     """The same of what is proportional to the swept quantity in each run."""
+    spare_stretches: int
+    """The same of a relative change of the swept quantity in each run."""
     second_is_swept: bool
     """Whether the runs sweep the second argument, and hold the first."""
 
@@ -204,11 +229,20 @@ class _Terms:
         offsets = [members] if runs else []
         columns = _orthonormal(np.hstack([within, *offsets, self._means(held)]), self.design)
         described = np.hstack([self.design, columns])
-        of_offsets, of_gains, of_tilts = (
+        conditions = self.conditions
+        stretch = conditions.gain_of_swept(second_is_swept=self.second_is_swept)
+        of_offsets, of_gains, of_tilts, of_stretches = (
             _left_over(self._in_runs(values), described)
-            for values in (np.ones(len(self.swept)), self.conditions.modelled, self.swept)
+            for values in (np.ones(len(self.swept)), conditions.modelled, self.swept, stretch)
         )
-        return FormTerms(columns, of_offsets, of_gains, of_tilts, self.second_is_swept)
+        return FormTerms(
+            columns=columns,
+            spare_offsets=of_offsets,
+            spare_gains=of_gains,
+            spare_tilts=of_tilts,
+            spare_stretches=of_stretches,
+            second_is_swept=self.second_is_swept,
+        )
 
     def _in_runs(self, values: Array) -> Array:
         """A quantity (N,) in each run, less its mean there unless it is constant, (M, R)."""
@@ -247,6 +281,25 @@ class _Terms:
         sums = members.T @ self.cells.scaled(self.other)
         powers = np.polynomial.chebyshev.chebvander(sums / rows, held)
         return np.asarray(members @ powers[:, 1:])
+
+
+def _gains_of_arguments(first: Array, second: Array, modelled: Array) -> tuple[Array, Array]:
+    """x dF/dx of both arguments (N,), from a polynomial of the modelled quantity over both."""
+    chebyshev = np.polynomial.chebyshev
+    scaled = (_scaled(first), _scaled(second))
+    degrees = (GAIN_DEGREE, GAIN_DEGREE)
+    powers = np.add.outer(np.arange(GAIN_DEGREE + 1), np.arange(GAIN_DEGREE + 1))
+    is_used = (powers <= GAIN_DEGREE).ravel()
+    columns = chebyshev.chebvander2d(*scaled, degrees)[:, is_used]
+    coefficients = np.zeros(is_used.size)
+    coefficients[is_used] = np.linalg.lstsq(columns, modelled, rcond=1e-9)[0]
+    surface = coefficients.reshape(powers.shape)
+    gains = []
+    for axis, values in enumerate((first, second)):
+        span = float(np.ptp(values))
+        slope = chebyshev.chebval2d(*scaled, chebyshev.chebder(surface, axis=axis))
+        gains.append(slope * 2.0 * values / span if span > 0.0 else np.zeros(values.size))
+    return gains[0], gains[1]
 
 
 def _scaled(values: Array) -> Array:

@@ -88,7 +88,7 @@ class Runs:
         unknown = np.zeros(self.run.size)
         first, second = (*self.arguments, unknown, unknown)[:2]
         direction = unknown if self.direction is None else self.direction
-        return Conditions(first, second, modelled, direction)
+        return Conditions.of(first, second, modelled, direction)
 
     @property
     def order(self) -> Indices:

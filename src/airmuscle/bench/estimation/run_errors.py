@@ -219,7 +219,9 @@ def _cells(run: Indices, parameters: int) -> Cells:
 OFFSET = "offset"
 GAIN = "gain"
 TILT = "tilt"
-"""Errors of a run that are constant, proportional to the modelled and to the swept quantity."""
+STRETCH = "stretch"
+"""Errors of a run that are constant, proportional to the modelled and to the swept quantity, and
+those of a gain of the swept quantity."""
 
 
 class _Kinds(NamedTuple):
@@ -240,14 +242,18 @@ class _Kinds(NamedTuple):
             shapes += [(GAIN,), (OFFSET, GAIN)]
         if terms.spare_tilts >= MIN_SPARE_RUNS:
             shapes += [(OFFSET, TILT)]
+        if min(terms.spare_gains, terms.spare_stretches) >= MIN_SPARE_RUNS:
+            shapes += [(GAIN, STRETCH)]
         return cls(shapes, SLOW_CHANGES if in_order else (), terms.second_is_swept)
 
     def modes(self, cells: Cells, conditions: Conditions) -> list[Array]:
         """The means of each shape in each cell, (M, errors) for each shape."""
+        stretch = conditions.gain_of_swept(second_is_swept=self.second_is_swept)
         quantities = {
             OFFSET: np.ones(len(cells.count)),
             GAIN: cells.sums(conditions.modelled) / cells.count,
             TILT: cells.sums(conditions[int(self.second_is_swept)]) / cells.count,
+            STRETCH: cells.sums(stretch) / cells.count,
         }
         return [np.stack([quantities[name] for name in shape], axis=1) for shape in self.shapes]
 

@@ -11,16 +11,20 @@ import numpy as np
 from ...core import Array, Hint, HintedText
 from ...recording import resting_length_of
 from ..diagnosis import (
+    FRICTION,
     HELD,
     DiagnosisRule,
     Findings,
     LawMisfit,
+    MisfitCause,
     Scatter,
     Subject,
     apply_rules,
     branch_distance,
     branch_notes,
+    causes_text,
     level_text,
+    misfit_causes,
 )
 from ..estimation import UNCENSORED, Censoring, LeastSquares
 from ..inspection import RIPPLE_BAND
@@ -81,9 +85,20 @@ class FitCase:
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
         greatest = fit.data_ranges["force"][1]
         misfit = self.scatter.misfit(fit.rmse, fit.degrees_of_freedom, greatest, count)
-        if misfit is None:
-            return None
-        return misfit.with_causes(self.points.recordings, self.residuals)
+        return None if misfit is None else dataclasses.replace(misfit, causes=self.causes)
+
+    @functools.cached_property
+    def causes(self) -> tuple[MisfitCause, ...]:
+        """What explains the residuals of a force, the greatest share first."""
+        if self.problem.fitted_quantity != FORCE:
+            return ()
+        return misfit_causes(self.points.recordings, self.residuals)
+
+    @property
+    def stated_causes(self) -> tuple[MisfitCause, ...]:
+        """The causes where the residuals are more than noise."""
+        is_stated = self.misfit is not None or self.scatter.branches > 0.0
+        return self.causes if is_stated else ()
 
     @property
     def unit(self) -> str:
@@ -103,7 +118,7 @@ def examine_fit(
     """The findings of the rules of recordings, points and fits; arguments as for `FitCase`."""
     case = FitCase(fit, points, problem, modelled, measured, sensor_deviations)
     diagnoses = (*points.diagnoses, *apply_rules(FIT_RULES, case))
-    return Findings(diagnoses, case.scatter, points.findings.delay, case.misfit)
+    return Findings(diagnoses, case.scatter, points.findings.delay, case.misfit, case.stated_causes)
 
 
 def _dropped_rows(case: FitCase) -> Iterator[str]:
@@ -214,8 +229,17 @@ def _small_scale_of_loss(case: FitCase) -> Iterator[str]:
 
 def _branches(case: FitCase) -> list[str]:
     quantity = case.problem.fitted_quantity.name
-    is_delayed = case.points.findings.delay is not None
-    return branch_notes(case.points.recordings, case.scatter.branches, quantity, delayed=is_delayed)
+    if not case.scatter.branches:
+        return []
+    is_stated = case.misfit is None and bool(case.causes)
+    is_friction = not case.causes or FRICTION in (case.causes[0].name, case.causes[0].rival)
+    return branch_notes(
+        case.points.recordings,
+        case.scatter.branches,
+        quantity,
+        causes=causes_text(case.causes) if is_stated else "",
+        is_friction=is_friction and case.points.findings.delay is None,
+    )
 
 
 def _one_level(case: FitCase) -> Iterator[str]:

@@ -16,7 +16,7 @@ from ...recording.columns import display_scale
 from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.parameter_tables import estimate_table
 from ...report.shown import BRIEF_ROWS
-from ..diagnosis import Diagnosis, Findings, LawMisfit, Scatter
+from ..diagnosis import Diagnosis, Findings, LawMisfit, MisfitCause, Scatter
 from ..estimation import CorrelationIndex, Estimate, Loss, ParameterCovariance
 from ..reported import Reported
 from .fit_problem import FORCE, FitProblem, FittedQuantity, evaluate
@@ -102,6 +102,13 @@ class Fit(Reported):
         among the notes.
         """
         return self._findings.misfit
+
+    @property
+    def causes(self) -> tuple[MisfitCause, ...]:
+        """What explains the residuals, the greatest share first, where they are more than noise: of
+        a misfit, or of two branches; empty otherwise.
+        """
+        return self._findings.causes
 
     @property
     def scatter(self) -> Scatter | None:

@@ -1,0 +1,543 @@
+"""Causes of a misfit, ranked by the share of the squared residuals that each explains.
+
+Each cause has a form of its own: the residuals of another form of the law are a smooth surface over
+pressure and contraction; those of friction follow the direction of the motion, from a turning point
+on within a travel that is independent of the speed; those of a sensor are what a delay, a low-pass
+filter or a moving average makes of the force of the law, or of the measured force where pressure or
+length are later; those of creep are the slow response of a small share of the force, or a drift
+from the beginning of each run; those of two muscles are a gain of a group of runs, those of a
+temperature a stiffness of the wall of such a group; those of a coarse sensor have the variance of
+its steps.
+
+The surface is taken off first. Of the rest each cause takes up what its best form explains; the one
+that explains the most is the first, and what it leaves is shared among the others in the same way.
+A sensor has no free size: its delay or filter makes the whole of the residuals.
+"""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import Array
+from ...recording import Recording
+from ..inspection import estimate_noise, estimate_resolution
+from .cause_traces import (
+    Average,
+    AverageAround,
+    Delay,
+    LowPass,
+    SensorResponse,
+    Traces,
+    slipped,
+)
+
+SURFACE_DEGREE = 4
+"""Total degree of the surface that takes up an error of the form of the law (chosen)."""
+MIN_SHARE = 0.1
+"""Minimum share of the squared residuals of a cause that is named (chosen)."""
+ALIKE = 1.2
+"""Ratio of the squares that two causes leave up to which the data do not tell them apart (chosen).
+"""
+MIN_ROWS = 30
+"""Minimum number of rows in which causes are looked for (chosen)."""
+HELD = 0.005
+"""Range of the contraction at a held length (chosen)."""
+MIN_READINGS = 4
+MIN_ROWS_OF_READING = 3
+MIN_REPEATED = 0.25
+"""Least share of the rows that repeat the reading before them (chosen): of a ramp that was read at
+even levels no row does."""
+EVEN = 0.1
+"""Number of readings of a ramp, rows of each, and relative difference of the steps between them,
+from which they are those of a coarse sensor (chosen)."""
+SENSOR_GAINS = (0.8, 1.25)
+"""Residuals over those of a filter of the whole force (chosen)."""
+MAX_CREEP = 0.3
+"""Greatest share of the force that creeps (chosen)."""
+LEAST_STEPS = 2.0
+GREATEST_FILTER = 0.25
+"""Least time of a filter in sample times, and greatest one in durations of a run (chosen)."""
+CREEP_TIMES = (0.03, 3.0)
+"""Times of creep in durations of a run (chosen)."""
+PLAUSIBLE = 0.3
+"""Least share that a sensor explains for which the law is fitted anew (chosen)."""
+COARSE = 14
+"""Number of times that are tried (chosen)."""
+WIDTHS = (1.15, 1.03)
+"""Ratios of the times of the parabolas that refine the best one (chosen)."""
+SLIPS = np.array([0.02, 0.05, 0.1, 0.2])
+"""Travels of friction from a turning point on, as fractions of the range (chosen)."""
+ROWS_OF_RUN = 12.0
+"""Number of independent rows of a run, against which the offsets and gains of all runs count
+(chosen)."""
+GROUPED = 0.9
+"""Share of what single runs explain from which two groups of runs explain it (chosen)."""
+FORM = "the form of the law"
+FRICTION = "friction, which follows the direction of the motion"
+DELAY = "a delay of a sensor"
+FILTER = "a low-pass filter of a sensor"
+AVERAGE = "a moving average of a sensor or logger"
+CREEP = "creep of the muscle, or another slow drift"
+MUSCLES = "two muscles, or gains, in two groups of runs"
+TEMPERATURE = "another temperature of the wall in a group of runs"
+ZEROS = "another zero of a sensor in a group of runs"
+RUNS = "offsets and gains of single runs (another muscle, a temperature, a zero)"
+STEPS = "the steps of the {} readings"
+SMOOTHING = (FILTER, AVERAGE)
+"""Causes that smooth the steps of readings."""
+REMEDIES = {
+    MUSCLES: "No law follows such runs: check whether the muscle or a sensor was exchanged.",
+    TEMPERATURE: "No law follows such runs: measure at one temperature, after some warming cycles.",
+    ZEROS: "No law follows such runs: check the zeros of the sensors before each run.",
+    RUNS: (
+        "No law follows such runs: check whether the muscle, its temperature or a zero has changed"
+        " between them."
+    ),
+    DELAY: "Do not take it for friction: shift the later signal, or ramp more slowly.",
+    FILTER: "Do not take it for friction: turn the filter off, or ramp more slowly.",
+    AVERAGE: "Do not take it for friction: record without averaging, or ramp more slowly.",
+    CREEP: (
+        "Do not take it for friction: hold each level for the same time before it is read, or fit"
+        " the creep of a hold."
+    ),
+}
+"""What is done about a cause that comes first."""
+TOLD_APART = "A run at another speed, or a hold, tells these two apart."
+"""What is done where another cause explains the same."""
+FORCE_IS_LATER = "the force is later"
+FORCE_IS_EARLIER = "the pressure or the length is later"
+AROUND = "around each row"
+
+
+class MisfitCause(NamedTuple):
+    """A cause and its share of the squared residuals, from 0 to 1."""
+
+    name: str
+    share: float
+    detail: str = ""
+    """Its time, and which signal is later; empty where it has none."""
+    rival: str = ""
+    """A cause that explains the same as well; empty where the data tell them apart."""
+
+    def __str__(self) -> str:
+        rival = f"not told from {self.rival}" if self.rival else ""
+        remarks = "; ".join(filter(None, (self.detail, rival)))
+        return f"{100 * self.share:.0f} % by {self.name}" + (f" ({remarks})" if remarks else "")
+
+
+def misfit_causes(
+    recordings: Sequence[Recording], residuals: Sequence[Array]
+) -> tuple[MisfitCause, ...]:
+    """The causes of the residuals (model - measured) [N] of a static law, the greatest share first.
+
+    residuals  of the rows of each recording, NaN for rows that are not measured
+    """
+    traces = Traces.of(recordings, residuals)
+    rest = traces.residual[traces.is_known]
+    total = float(rest @ rest)
+    if rest.size < MIN_ROWS or not total > 0.0:
+        return ()
+    surface = np.linalg.qr(traces.rows(_surface(traces)))[0]
+    unexplained = _Unexplained(surface, rest - surface @ (surface.T @ rest))
+    causes = [MisfitCause(FORM, 1.0 - unexplained.squares / total)]
+    forms = [_best(group, unexplained) for group in _groups_of_forms(traces, unexplained.rest)]
+    steps = _share_of_steps(_steps(recordings, traces), forms, unexplained, total)
+    causes.append(steps)
+    if steps.share > MIN_SHARE:
+        forms = [form for form in forms if form.name not in SMOOTHING]
+    while forms:
+        forms = _without_single_runs(forms, unexplained)
+        best = max(forms, key=unexplained.taken_up)
+        taken_up = unexplained.taken_up(best)
+        if taken_up < MIN_SHARE * total:
+            break
+        rival = _rival(best, forms, unexplained)
+        causes.append(MisfitCause(best.name, taken_up / total, best.detail, rival))
+        unexplained = unexplained.without(best)
+        forms = [form._replace(left=None) for form in forms if form is not best]
+    named = [cause for cause in causes if cause.share >= MIN_SHARE]
+    return tuple(sorted(named, key=lambda cause: -cause.share))
+
+
+def causes_text(causes: Sequence[MisfitCause]) -> str:
+    """The causes as a sentence; that none is known without any."""
+    if not causes:
+        return "No form of the law, motion, sensor, run or step of the readings explains it."
+    first = causes[0]
+    remedy = TOLD_APART if first.rival else REMEDIES.get(first.name, "")
+    explained = ", ".join(map(str, causes))
+    return f"Of the squared residuals are explained: {explained}. {remedy}".rstrip()
+
+
+class _Form(NamedTuple):
+    """A form of the residuals of a cause: columns (N, K) of the known rows."""
+
+    name: str
+    columns: Array
+    limits: tuple[float, float] | None = None
+    """Limits of the factor of a single column."""
+    detail: str = ""
+    time: float = 0.0
+    penalty: float = 0.0
+    """Share of what is left that as many columns take up by chance."""
+    left: float | None = None
+    """Squares that are left where the law is fitted with this cause; None where it is not."""
+
+
+class _Unexplained(NamedTuple):
+    """What is left of the residuals (N,) beside an orthonormal basis (N, B)."""
+
+    basis: Array
+    rest: Array
+
+    @property
+    def squares(self) -> float:
+        return float(self.rest @ self.rest)
+
+    def fitted(self, form: _Form) -> Array:
+        """What a form takes up of the rest (N,)."""
+        columns = self._beside(form.columns)
+        if form.limits is not None:
+            (column,) = columns.T
+            square = float(column @ column)
+            factor = float(column @ self.rest) / square if square > 0.0 else 0.0
+            return np.asarray(np.clip(factor, *form.limits) * column)
+        factors = np.linalg.lstsq(columns, self.rest, rcond=1e-9)[0]
+        return np.asarray(columns @ factors)
+
+    def taken_up(self, form: _Form) -> float:
+        """The squares that a form takes up, less those that it would by chance."""
+        if form.left is not None:
+            return self.squares - form.left
+        left = self.rest - self.fitted(form)
+        return self.squares - float(left @ left) * (1.0 + form.penalty)
+
+    def without(self, form: _Form) -> "_Unexplained":
+        """What the form leaves."""
+        basis = np.linalg.qr(np.hstack([self.basis, form.columns]))[0]
+        return _Unexplained(basis, self.rest - self.fitted(form))
+
+    def _beside(self, columns: Array) -> Array:
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+
+def _best(forms: Iterator[_Form], unexplained: _Unexplained) -> _Form:
+    """The form of one cause that explains the most."""
+    return max(forms, key=unexplained.taken_up)
+
+
+def _rival(best: _Form, forms: Sequence[_Form], unexplained: _Unexplained) -> str:
+    """The cause that leaves nearly as little as the best one; empty if none does."""
+    others = [form for form in forms if form is not best and RUNS not in (form.name, best.name)]
+    if not others:
+        return ""
+    second = max(others, key=unexplained.taken_up)
+    left = [unexplained.squares - unexplained.taken_up(form) for form in (best, second)]
+    return second.name if left[1] <= ALIKE * left[0] else ""
+
+
+def _without_single_runs(forms: Sequence[_Form], unexplained: _Unexplained) -> list[_Form]:
+    """The forms without the offsets and gains of all runs, where two groups of runs explain nearly
+    as much."""
+    single = [form for form in forms if form.name == RUNS]
+    groups = [form for form in forms if form.name in (MUSCLES, TEMPERATURE, ZEROS)]
+    of_groups = max(map(unexplained.taken_up, groups), default=0.0)
+    of_runs = max(map(unexplained.taken_up, single), default=0.0)
+    is_grouped = of_groups > GROUPED * of_runs
+    return [form for form in forms if form.name != RUNS or not is_grouped]
+
+
+def _groups_of_forms(traces: Traces, rest: Array) -> Iterator[Iterator[_Form]]:
+    """The forms of each cause."""
+    if np.any(traces.direction != 0.0):
+        yield _frictions(traces)
+    if traces.is_timed:
+        for name, response in SENSORS:
+            yield _sensor_forms(traces, name, response, rest)
+        yield _creeps(traces)
+    if len(traces.step) > 1:
+        yield iter([_single_runs(traces)])
+    contraction = traces.relative_contraction
+    for name, columns in (
+        (MUSCLES, [traces.modelled]),
+        (TEMPERATURE, [contraction, contraction**2]),
+        (ZEROS, [np.ones(contraction.shape)]),
+    ):
+        form = _two_groups(traces, name, columns, rest)
+        if form is not None:
+            yield iter([form])
+
+
+def _surface(traces: Traces) -> Array:
+    """The columns (R, n, K) of a polynomial surface over pressure and contraction, and the force of
+    the law."""
+    powers = [(i, j) for i in range(SURFACE_DEGREE + 1) for j in range(SURFACE_DEGREE + 1 - i)]
+    columns = [traces.pressure**i * traces.contraction**j for i, j in powers]
+    greatest = float(np.max(np.abs(traces.modelled)))
+    return np.stack([*columns, traces.modelled / max(greatest, 1e-300)], axis=2)
+
+
+def _frictions(traces: Traces) -> Iterator[_Form]:
+    """Friction that changes its sign at once, or within a travel, and whose size follows pressure
+    and contraction."""
+    travel = 0.5 * (traces.pressure + traces.contraction)
+    signs = np.concatenate([traces.direction[:, :, None], slipped(travel, SLIPS)], axis=2)
+    sizes = np.stack(
+        [
+            np.ones(travel.shape),
+            traces.pressure,
+            traces.contraction,
+            traces.pressure * traces.contraction,
+        ],
+        axis=2,
+    )
+    for number in range(signs.shape[2]):
+        yield _Form(FRICTION, traces.rows(signs[:, :, [number]] * sizes))
+
+
+SENSORS: tuple[tuple[str, tuple[SensorResponse, ...]], ...] = (
+    (DELAY, (Delay(),)),
+    (FILTER, (LowPass(),)),
+    (AVERAGE, (Average(), AverageAround())),
+)
+
+
+class _Sensor(NamedTuple):
+    """A response of the sensor of the force, or of those of pressure and length."""
+
+    traces: Traces
+    name: str
+    response: SensorResponse
+    is_force: bool
+
+    def forms(self, times: Array) -> list[_Form]:
+        """What the sensor makes of the force of the law with each of these times [s]; where
+        pressure or length are later, of the measured force."""
+        traces = self.traces
+        signals = traces.modelled if self.is_force else traces.measured
+        change = signals[:, :, None] - self.response(signals, times / traces.step[:, None])
+        columns = traces.rows(change if self.is_force else -change)
+        later = FORCE_IS_LATER if self.is_force else FORCE_IS_EARLIER
+        where = AROUND if isinstance(self.response, AverageAround) else later
+        return [
+            _Form(self.name, columns[:, [k]], SENSOR_GAINS, f"{_seconds(time)}, {where}", time)
+            for k, time in enumerate(times.tolist())
+        ]
+
+    def left(self, time: float) -> float:
+        """Squares that a surface leaves whose force the sensor shows later by a time [s]; where
+        pressure or length are later, those of the force as such a sensor would show it, with the
+        noise that it removes."""
+        traces = self.traces
+        pulling = _surface(traces) * traces.is_known[:, :, None]
+        rows = time / traces.step[:, None]
+        if self.is_force:
+            target = traces.rows(traces.measured)
+            columns = traces.rows(self._shown(pulling, rows))
+            return _squares_beside(columns, target)
+        target = traces.rows(self.response(traces.measured, rows)[:, :, 0])
+        noise = float(np.median([estimate_noise(run) for run in traces.measured]))
+        removed = 1.0 - self.response.noise_left(float(np.median(rows)))
+        return _squares_beside(traces.rows(pulling), target) + target.size * noise**2 * removed
+
+    def _shown(self, columns: Array, rows: Array) -> Array:
+        """Columns (R, n, K) as the sensor shows them with times (R, 1) in rows."""
+        runs, points, count = columns.shape
+        signals = np.moveaxis(columns, 2, 0).reshape(count * runs, points)
+        shown = self.response(signals, np.tile(rows, (count, 1)))[:, :, 0]
+        return np.moveaxis(shown.reshape(count, runs, points), 0, 2)
+
+
+def _squares_beside(columns: Array, target: Array) -> float:
+    """The squares of a target (N,) that columns (N, K) leave."""
+    basis = np.linalg.qr(columns)[0]
+    left = target - basis @ (basis.T @ target)
+    return float(left @ left)
+
+
+def _sensor_forms(
+    traces: Traces, name: str, responses: Sequence[SensorResponse], rest: Array
+) -> Iterator[_Form]:
+    """What a sensor with different times makes of the force of the law; where pressure or length
+    are later, of the measured force. The law is fitted anew with the times that explain the most.
+    """
+    step = float(np.median(traces.step))
+    longest = max(GREATEST_FILTER * traces.duration, 2.0 * LEAST_STEPS * step)
+    coarse = np.geomspace(LEAST_STEPS * step, longest, COARSE)
+    for response, is_force in itertools.product(responses, (True, False)):
+        sensor = _Sensor(traces, name, response, is_force)
+        forms = sensor.forms(coarse)
+        best = max(forms, key=lambda form: _alone(form, rest))
+        start = best.time * _factor(best, rest)
+        if is_force and isinstance(response, AverageAround):
+            # it opens no loop, so that the law has followed most of it
+            start = min(coarse.tolist(), key=sensor.left)
+        elif _alone(best, rest) < (PLAUSIBLE - 1.0) * float(rest @ rest):
+            yield best
+            continue
+        time, left = _refined(sensor.left, start)
+        (form,) = sensor.forms(np.array([time]))
+        yield form._replace(left=left)
+
+
+def _factor(form: _Form, rest: Array) -> float:
+    """The residuals over a single column, within the limits of a sensor: loops are proportional to
+    the time of a sensor, so that this is a factor of the time."""
+    column = form.columns[:, 0]
+    square = float(column @ column)
+    return float(np.clip(column @ rest / square, *SENSOR_GAINS)) if square > 0.0 else 1.0
+
+
+def _refined(left: Callable[[float], float], time: float) -> tuple[float, float]:
+    """The time with the least squares that are left, and these, by parabolas through three times
+    around the best one."""
+    tried = {time: left(time)}
+    for width in WIDTHS:
+        middle = min(tried, key=tried.__getitem__)
+        around = [middle / width, middle, middle * width]
+        tried |= {each: left(each) for each in around if each not in tried}
+        curvature, slope, _ = np.polyfit(around, [tried[each] for each in around], 2)
+        if curvature > 0.0:
+            vertex = float(np.clip(-0.5 * slope / curvature, around[0], around[-1]))
+            tried[vertex] = left(vertex)
+    best = min(tried, key=tried.__getitem__)
+    return best, tried[best]
+
+
+def _alone(form: _Form, rest: Array) -> float:
+    """The squares of the residuals that a form takes up as it is."""
+    left = rest - form.columns[:, 0]
+    return -float(left @ left)
+
+
+def _seconds(time: float) -> str:
+    return f"{1e3 * time:.3g} ms" if time < 1.0 else f"{time:.3g} s"
+
+
+def _creeps(traces: Traces) -> Iterator[_Form]:
+    """A slow response of a share of the force, and a drift of force and gain from the beginning of
+    each run."""
+    least, greatest = CREEP_TIMES
+    times = traces.duration * np.geomspace(least, greatest, COARSE)
+    response = LowPass()(traces.modelled, times / traces.step[:, None])
+    slow = traces.modelled[:, :, None] - response
+    columns = traces.rows(slow)
+    for k, time in enumerate(times.tolist()):
+        yield _Form(CREEP, columns[:, [k]], (-MAX_CREEP, MAX_CREEP), f"about {_seconds(time)}")
+        elapsed = -np.expm1(-traces.time / time)
+        drift = np.stack([elapsed, elapsed * traces.modelled], axis=2)
+        yield _Form(CREEP, traces.rows(drift), detail=f"about {_seconds(time)}")
+
+
+def _single_runs(traces: Traces) -> _Form:
+    """An offset and a gain of the force in each run."""
+    runs, points = traces.modelled.shape
+    members = np.broadcast_to(np.eye(runs)[:, None, :], (runs, points, runs))
+    gains = members * traces.modelled[:, :, None]
+    columns = traces.rows(np.concatenate([members, gains], axis=2))
+    return _Form(RUNS, columns, penalty=2.0 / ROWS_OF_RUN)
+
+
+def _two_groups(traces: Traces, name: str, columns: Sequence[Array], rest: Array) -> _Form | None:
+    """Columns that count in a group of two or more runs, and not in the two or more others; None
+    with fewer runs. The groups are those of least squares of the factors of the first column in the
+    runs."""
+    column = columns[0]
+    residual = np.zeros(column.shape)
+    residual[traces.is_known] = rest
+    weights = np.sum(np.where(traces.is_known, column, 0.0) ** 2, axis=1)
+    products = np.sum(column * residual, axis=1)
+    order = np.argsort(products / np.maximum(weights, 1e-300), kind="stable")
+    if order.size < 4:
+        return None
+    below = np.cumsum(weights[order])[1:-2]
+    along = np.cumsum(products[order])[1:-2]
+    above = np.sum(weights) - below
+    against = np.sum(products) - along
+    explained = along**2 / np.maximum(below, 1e-300) + against**2 / np.maximum(above, 1e-300)
+    group = order[: int(np.argmax(explained)) + 2]
+    is_member = np.isin(np.arange(order.size), group)
+    members = np.stack(columns, axis=2) * is_member[:, None, None]
+    return _Form(name, traces.rows(members))
+
+
+class _Steps(NamedTuple):
+    """The quantity whose readings are coarse, and the variance of the force that follows [N^2]."""
+
+    quantity: str
+    variance: float
+
+
+def _share_of_steps(
+    steps: _Steps, forms: Sequence[_Form], unexplained: _Unexplained, total: float
+) -> MisfitCause:
+    """The share of steps is their variance, and no more than what all other causes leave but a
+    filter or an average, which smooths steps as well."""
+    others = [form for form in forms if form.name not in SMOOTHING]
+    taken_up = max(map(unexplained.taken_up, others), default=0.0)
+    squares = min(steps.variance * unexplained.rest.size, unexplained.squares - taken_up)
+    return MisfitCause(STEPS.format(steps.quantity), squares / total)
+
+
+def _steps(recordings: Sequence[Recording], traces: Traces) -> _Steps:
+    """The quantity whose steps give the greatest variance of the force."""
+    slopes = _slopes(traces)
+    found = []
+    for quantity, slope in slopes.items():
+        step = max((_step(recording, quantity) for recording in recordings), default=0.0)
+        found.append(_Steps(quantity, (slope * step) ** 2 / 12.0))
+    return max(found, key=lambda steps: steps.variance)
+
+
+def _step(recording: Recording, quantity: str) -> float:
+    """The step of the readings of a run [SI]; also where it is so great that there are few
+    readings, if a ramp goes through them while the other quantity is held. 0 of a held one.
+    """
+    values = recording[quantity][np.isfinite(recording[quantity])]
+    readings = np.unique(values)
+    repeated = float(np.mean(np.diff(values) == 0.0)) if values.size > 1 else 0.0
+    if readings.size < MIN_READINGS or repeated < MIN_REPEATED:
+        return 0.0
+    step = estimate_resolution(values)
+    if step > 0.0 or quantity != "pressure" or not _is_held_ramp(recording):
+        return step
+    few = readings.size <= values.size / MIN_ROWS_OF_READING
+    gaps = np.diff(readings)
+    is_even = few and float(np.ptp(gaps)) <= EVEN * float(np.median(gaps))
+    return float(np.median(gaps)) if is_even else 0.0
+
+
+def _is_held_ramp(recording: Recording) -> bool:
+    """Whether the contraction of a run with time is held."""
+    contraction = recording["contraction"][np.isfinite(recording["contraction"])]
+    return "time" in recording and contraction.size > 0 and float(np.ptp(contraction)) < HELD
+
+
+def _slopes(traces: Traces) -> dict[str, float]:
+    """The root mean square slope of the force over each quantity [N/SI], of a bilinear surface."""
+    columns = traces.rows(
+        np.stack(
+            [
+                np.ones(traces.pressure.shape),
+                traces.pressure,
+                traces.contraction,
+                traces.pressure * traces.contraction,
+            ],
+            axis=2,
+        )
+    )
+    factors = np.linalg.lstsq(columns, traces.measured[traces.is_known], rcond=1e-9)[0]
+    _, pressure, contraction, _ = columns.T
+    of_pressure = factors[1] + factors[3] * contraction
+    of_contraction = factors[2] + factors[3] * pressure
+    return {
+        "pressure": _root_mean_square(of_pressure) * traces.pressure_scale,
+        "contraction": _root_mean_square(of_contraction) * traces.contraction_scale,
+        "force": 1.0,
+    }
+
+
+def _root_mean_square(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
