@@ -3,7 +3,7 @@ from .branch_residuals import EITHER as EITHER
 from .branch_residuals import FILTER as FILTER
 from .branch_residuals import delay_notes as delay_notes
 from .branch_residuals import find_delay as find_delay
-from .causes import MisfitCause as MisfitCause
+from .cause_names import MisfitCause as MisfitCause
 from .checked_reading import check_bench as check_bench
 from .checked_reading import complete_bench as complete_bench
 from .checked_reading import read as read
@@ -38,8 +38,8 @@ from .value_rules import VALUE_RULES as VALUE_RULES
 from .branch_residuals import branch_distance as branch_distance
 from .branch_residuals import branch_notes as branch_notes
 from .branch_residuals import row_directions as row_directions
-from .causes import FRICTION as FRICTION
-from .causes import causes_text as causes_text
+from .cause_names import FRICTION as FRICTION
+from .cause_names import causes_text as causes_text
 from .causes import misfit_causes as misfit_causes
 from .contractions import MAX_CONTRACTION as MAX_CONTRACTION
 from .contradictions import RepeatedRows as RepeatedRows

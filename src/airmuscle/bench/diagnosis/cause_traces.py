@@ -110,9 +110,13 @@ class _Grid:
     @classmethod
     def of(cls, recording: Recording, points: int) -> "_Grid":
         rows = np.arange(len(recording), dtype=float)
-        time = recording["time"] if "time" in recording else np.full(len(rows), np.nan)
-        if not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
-            return cls(np.linspace(0.0, len(rows) - 1.0, points), 0.0)
+        untimed = cls(np.linspace(0.0, len(rows) - 1.0, points), 0.0)
+        if "time" not in recording:
+            return untimed
+        time = recording["time"]
+        is_increasing = np.isfinite(time).all() and (np.diff(time) > 0.0).all()
+        if not is_increasing:
+            return untimed
         even = np.linspace(time[0], time[-1], points)
         return cls(np.interp(even, time, rows), float(even[1] - even[0]))
 
@@ -171,11 +175,14 @@ class LowPass:
     """A low-pass filter of first order, in equilibrium at first."""
 
     def __call__(self, signals: Array, times: Array) -> Array:
+        points = signals.shape[1]
+        count = times.shape[1]
         share = -np.expm1(-1.0 / times)
-        state = np.repeat(signals[:, :1], times.shape[1], axis=1)
-        result = np.empty((*signals.shape, times.shape[1]))
-        for point in range(signals.shape[1]):
-            state = state + share * (signals[:, point, None] - state)
+        state = np.repeat(signals[:, :1], count, axis=1)
+        result = np.empty((*signals.shape, count))
+        for point in range(points):
+            change = signals[:, point, None] - state
+            state = state + share * change
             result[:, point] = state
         return result
 
@@ -223,11 +230,12 @@ def _at(signals: Array, places: Array) -> Array:
     """The signals (R, n) at places (R, n, K), constant beyond their ends."""
     last = signals.shape[1] - 1
     inside = np.clip(places, 0.0, last)
-    below = np.minimum(inside.astype(np.intp), max(last - 1, 0))
+    below = inside.astype(np.intp)
+    above = np.minimum(below + 1, last)
     runs = np.arange(len(signals))[:, None, None]
     low = signals[runs, below]
-    high = signals[runs, np.minimum(below + 1, last)]
-    return np.asarray(low + (inside - below) * (high - low))
+    rise = signals[runs, above] - low
+    return np.asarray(low + (inside - below) * rise)
 
 
 def _mean_between(signals: Array, low: Array, high: Array) -> Array:
@@ -237,9 +245,13 @@ def _mean_between(signals: Array, low: Array, high: Array) -> Array:
 
 def _integral(signals: Array, places: Array) -> Array:
     """The integral of the signals from the first point to the places (R, n, K)."""
-    steps = 0.5 * (signals[:, 1:] + signals[:, :-1])
-    sums = np.concatenate([np.zeros((len(signals), 1)), np.cumsum(steps, axis=1)], axis=1)
+    means = 0.5 * (signals[:, 1:] + signals[:, :-1])
+    sums = np.zeros(signals.shape)
+    sums[:, 1:] = np.cumsum(means, axis=1)
     last = signals.shape[1] - 1
-    before = np.minimum(places, 0.0) * signals[:, :1, None]
-    after = np.maximum(places - last, 0.0) * signals[:, -1:, None]
-    return np.asarray(_at(sums, places) + before + after)
+    first_value = signals[:, :1, None]
+    last_value = signals[:, -1:, None]
+    rows_before = np.minimum(places, 0.0)
+    rows_after = np.maximum(places - last, 0.0)
+    inside = _at(sums, places)
+    return np.asarray(inside + rows_before * first_value + rows_after * last_value)

@@ -19,10 +19,25 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import Array
 from ...recording import Recording
 from ..inspection import estimate_noise, estimate_resolution
+from .cause_names import (
+    AVERAGE,
+    CREEP,
+    DELAY,
+    FILTER,
+    FORM,
+    FRICTION,
+    MUSCLES,
+    RUNS,
+    STEPS,
+    TEMPERATURE,
+    ZEROS,
+    MisfitCause,
+)
 from .cause_traces import (
     Average,
     AverageAround,
@@ -74,57 +89,13 @@ ROWS_OF_RUN = 12.0
 (chosen)."""
 GROUPED = 0.9
 """Share of what single runs explain from which two groups of runs explain it (chosen)."""
-FORM = "the form of the law"
-FRICTION = "friction, which follows the direction of the motion"
-DELAY = "a delay of a sensor"
-FILTER = "a low-pass filter of a sensor"
-AVERAGE = "a moving average of a sensor or logger"
-CREEP = "creep of the muscle, or another slow drift"
-MUSCLES = "two muscles, or gains, in two groups of runs"
-TEMPERATURE = "another temperature of the wall in a group of runs"
-ZEROS = "another zero of a sensor in a group of runs"
-RUNS = "offsets and gains of single runs (another muscle, a temperature, a zero)"
-STEPS = "the steps of the {} readings"
 SMOOTHING = (FILTER, AVERAGE)
 """Causes that smooth the steps of readings."""
-REMEDIES = {
-    MUSCLES: "No law follows such runs: check whether the muscle or a sensor was exchanged.",
-    TEMPERATURE: "No law follows such runs: measure at one temperature, after some warming cycles.",
-    ZEROS: "No law follows such runs: check the zeros of the sensors before each run.",
-    RUNS: (
-        "No law follows such runs: check whether the muscle, its temperature or a zero has changed"
-        " between them."
-    ),
-    DELAY: "Do not take it for friction: shift the later signal, or ramp more slowly.",
-    FILTER: "Do not take it for friction: turn the filter off, or ramp more slowly.",
-    AVERAGE: "Do not take it for friction: record without averaging, or ramp more slowly.",
-    CREEP: (
-        "Do not take it for friction: hold each level for the same time before it is read, or fit"
-        " the creep of a hold."
-    ),
-}
-"""What is done about a cause that comes first."""
-TOLD_APART = "A run at another speed, or a hold, tells these two apart."
-"""What is done where another cause explains the same."""
+GROUPS = (MUSCLES, TEMPERATURE, ZEROS)
+"""Causes of two groups of runs."""
 FORCE_IS_LATER = "the force is later"
 FORCE_IS_EARLIER = "the pressure or the length is later"
 AROUND = "around each row"
-
-
-class MisfitCause(NamedTuple):
-    """A cause and its share of the squared residuals, from 0 to 1."""
-
-    name: str
-    share: float
-    detail: str = ""
-    """Its time, and which signal is later; empty where it has none."""
-    rival: str = ""
-    """A cause that explains the same as well; empty where the data tell them apart."""
-
-    def __str__(self) -> str:
-        rival = f"not told from {self.rival}" if self.rival else ""
-        remarks = "; ".join(filter(None, (self.detail, rival)))
-        return f"{100 * self.share:.0f} % by {self.name}" + (f" ({remarks})" if remarks else "")
 
 
 def misfit_causes(
@@ -159,16 +130,6 @@ def misfit_causes(
         forms = [form._replace(left=None) for form in forms if form is not best]
     named = [cause for cause in causes if cause.share >= MIN_SHARE]
     return tuple(sorted(named, key=lambda cause: -cause.share))
-
-
-def causes_text(causes: Sequence[MisfitCause]) -> str:
-    """The causes as a sentence; that none is known without any."""
-    if not causes:
-        return "No form of the law, motion, sensor, run or step of the readings explains it."
-    first = causes[0]
-    remedy = TOLD_APART if first.rival else REMEDIES.get(first.name, "")
-    explained = ", ".join(map(str, causes))
-    return f"Of the squared residuals are explained: {explained}. {remedy}".rstrip()
 
 
 class _Form(NamedTuple):
@@ -214,6 +175,10 @@ class _Unexplained(NamedTuple):
         left = self.rest - self.fitted(form)
         return self.squares - float(left @ left) * (1.0 + form.penalty)
 
+    def left_by(self, form: _Form) -> float:
+        """The squares that a form leaves."""
+        return self.squares - self.taken_up(form)
+
     def without(self, form: _Form) -> "_Unexplained":
         """What the form leaves."""
         basis = np.linalg.qr(np.hstack([self.basis, form.columns]))[0]
@@ -230,23 +195,32 @@ def _best(forms: Iterator[_Form], unexplained: _Unexplained) -> _Form:
 
 def _rival(best: _Form, forms: Sequence[_Form], unexplained: _Unexplained) -> str:
     """The cause that leaves nearly as little as the best one; empty if none does."""
-    others = [form for form in forms if form is not best and RUNS not in (form.name, best.name)]
+    if best.name == RUNS:
+        return ""
+    others = [form for form in forms if form.name not in (best.name, RUNS)]
     if not others:
         return ""
     second = max(others, key=unexplained.taken_up)
-    left = [unexplained.squares - unexplained.taken_up(form) for form in (best, second)]
-    return second.name if left[1] <= ALIKE * left[0] else ""
+    left = unexplained.left_by(best)
+    left_by_second = unexplained.left_by(second)
+    is_alike = left_by_second <= ALIKE * left
+    return second.name if is_alike else ""
 
 
 def _without_single_runs(forms: Sequence[_Form], unexplained: _Unexplained) -> list[_Form]:
     """The forms without the offsets and gains of all runs, where two groups of runs explain nearly
     as much."""
-    single = [form for form in forms if form.name == RUNS]
-    groups = [form for form in forms if form.name in (MUSCLES, TEMPERATURE, ZEROS)]
-    of_groups = max(map(unexplained.taken_up, groups), default=0.0)
-    of_runs = max(map(unexplained.taken_up, single), default=0.0)
-    is_grouped = of_groups > GROUPED * of_runs
-    return [form for form in forms if form.name != RUNS or not is_grouped]
+    of_groups = 0.0
+    of_runs = 0.0
+    for form in forms:
+        taken_up = unexplained.taken_up(form)
+        if form.name == RUNS:
+            of_runs = taken_up
+        elif form.name in GROUPS:
+            of_groups = max(of_groups, taken_up)
+    if of_groups <= GROUPED * of_runs:
+        return list(forms)
+    return [form for form in forms if form.name != RUNS]
 
 
 def _groups_of_forms(traces: Traces, rest: Array) -> Iterator[Iterator[_Form]]:
@@ -273,10 +247,15 @@ def _groups_of_forms(traces: Traces, rest: Array) -> Iterator[Iterator[_Form]]:
 def _surface(traces: Traces) -> Array:
     """The columns (R, n, K) of a polynomial surface over pressure and contraction, and the force of
     the law."""
-    powers = [(i, j) for i in range(SURFACE_DEGREE + 1) for j in range(SURFACE_DEGREE + 1 - i)]
-    columns = [traces.pressure**i * traces.contraction**j for i, j in powers]
+    columns = []
+    for total in range(SURFACE_DEGREE + 1):
+        for order in range(total + 1):
+            of_contraction = traces.contraction**order
+            of_pressure = traces.pressure ** (total - order)
+            columns.append(of_pressure * of_contraction)
     greatest = float(np.max(np.abs(traces.modelled)))
-    return np.stack([*columns, traces.modelled / max(greatest, 1e-300)], axis=2)
+    columns.append(traces.modelled / max(greatest, 1e-300))
+    return np.stack(columns, axis=2)
 
 
 def _frictions(traces: Traces) -> Iterator[_Form]:
@@ -344,10 +323,11 @@ class _Sensor(NamedTuple):
 
     def _shown(self, columns: Array, rows: Array) -> Array:
         """Columns (R, n, K) as the sensor shows them with times (R, 1) in rows."""
-        runs, points, count = columns.shape
-        signals = np.moveaxis(columns, 2, 0).reshape(count * runs, points)
-        shown = self.response(signals, np.tile(rows, (count, 1)))[:, :, 0]
-        return np.moveaxis(shown.reshape(count, runs, points), 0, 2)
+        shown = []
+        for number in range(columns.shape[2]):
+            response = self.response(columns[:, :, number], rows)
+            shown.append(response[:, :, 0])
+        return np.stack(shown, axis=2)
 
 
 def _squares_beside(columns: Array, target: Array) -> float:
@@ -396,14 +376,23 @@ def _refined(left: Callable[[float], float], time: float) -> tuple[float, float]
     tried = {time: left(time)}
     for width in WIDTHS:
         middle = min(tried, key=tried.__getitem__)
-        around = [middle / width, middle, middle * width]
-        tried |= {each: left(each) for each in around if each not in tried}
-        curvature, slope, _ = np.polyfit(around, [tried[each] for each in around], 2)
-        if curvature > 0.0:
-            vertex = float(np.clip(-0.5 * slope / curvature, around[0], around[-1]))
-            tried[vertex] = left(vertex)
+        around = (middle / width, middle, middle * width)
+        for trial in around:
+            if trial not in tried:
+                tried[trial] = left(trial)
+        vertex = _vertex(np.array(around), np.array([tried[trial] for trial in around]))
+        tried[vertex] = left(vertex)
     best = min(tried, key=tried.__getitem__)
     return best, tried[best]
+
+
+def _vertex(times: Array, squares: Array) -> float:
+    """The least of the parabola through three points, within them; their best without one."""
+    curvature, slope, _ = np.polyfit(times, squares, 2)
+    if not curvature > 0.0:
+        return float(times[np.argmin(squares)])
+    least = -0.5 * slope / curvature
+    return float(np.clip(least, times[0], times[-1]))
 
 
 def _alone(form: _Form, rest: Array) -> float:
@@ -419,25 +408,29 @@ def _seconds(time: float) -> str:
 def _creeps(traces: Traces) -> Iterator[_Form]:
     """A slow response of a share of the force, and a drift of force and gain from the beginning of
     each run."""
-    least, greatest = CREEP_TIMES
-    times = traces.duration * np.geomspace(least, greatest, COARSE)
-    response = LowPass()(traces.modelled, times / traces.step[:, None])
-    slow = traces.modelled[:, :, None] - response
-    columns = traces.rows(slow)
-    for k, time in enumerate(times.tolist()):
-        yield _Form(CREEP, columns[:, [k]], (-MAX_CREEP, MAX_CREEP), f"about {_seconds(time)}")
+    times = traces.duration * np.geomspace(*CREEP_TIMES, COARSE)
+    limits = (-MAX_CREEP, MAX_CREEP)
+    for time in times.tolist():
+        detail = f"about {_seconds(time)}"
+        rows = time / traces.step[:, None]
+        response = LowPass()(traces.modelled, rows)
+        slow = traces.modelled[:, :, None] - response
+        yield _Form(CREEP, traces.rows(slow), limits, detail)
         elapsed = -np.expm1(-traces.time / time)
         drift = np.stack([elapsed, elapsed * traces.modelled], axis=2)
-        yield _Form(CREEP, traces.rows(drift), detail=f"about {_seconds(time)}")
+        yield _Form(CREEP, traces.rows(drift), detail=detail)
 
 
 def _single_runs(traces: Traces) -> _Form:
     """An offset and a gain of the force in each run."""
-    runs, points = traces.modelled.shape
-    members = np.broadcast_to(np.eye(runs)[:, None, :], (runs, points, runs))
-    gains = members * traces.modelled[:, :, None]
-    columns = traces.rows(np.concatenate([members, gains], axis=2))
-    return _Form(RUNS, columns, penalty=2.0 / ROWS_OF_RUN)
+    columns = []
+    for run in range(len(traces.modelled)):
+        offset = np.zeros(traces.modelled.shape)
+        offset[run] = 1.0
+        columns.append(offset)
+        columns.append(offset * traces.modelled)
+    stacked = np.stack(columns, axis=2)
+    return _Form(RUNS, traces.rows(stacked), penalty=2.0 / ROWS_OF_RUN)
 
 
 def _two_groups(traces: Traces, name: str, columns: Sequence[Array], rest: Array) -> _Form | None:
@@ -447,20 +440,35 @@ def _two_groups(traces: Traces, name: str, columns: Sequence[Array], rest: Array
     column = columns[0]
     residual = np.zeros(column.shape)
     residual[traces.is_known] = rest
-    weights = np.sum(np.where(traces.is_known, column, 0.0) ** 2, axis=1)
+    known = np.where(traces.is_known, column, 0.0)
+    weights = np.sum(known**2, axis=1)
     products = np.sum(column * residual, axis=1)
-    order = np.argsort(products / np.maximum(weights, 1e-300), kind="stable")
-    if order.size < 4:
+    if weights.size < 4:
         return None
-    below = np.cumsum(weights[order])[1:-2]
-    along = np.cumsum(products[order])[1:-2]
-    above = np.sum(weights) - below
-    against = np.sum(products) - along
-    explained = along**2 / np.maximum(below, 1e-300) + against**2 / np.maximum(above, 1e-300)
-    group = order[: int(np.argmax(explained)) + 2]
-    is_member = np.isin(np.arange(order.size), group)
+    is_member = _upper_group(weights, products)
     members = np.stack(columns, axis=2) * is_member[:, None, None]
     return _Form(name, traces.rows(members))
+
+
+def _upper_group(weights: Array, products: Array) -> npt.NDArray[np.bool_]:
+    """The runs (R,) of one of the two groups whose common factors explain the most, from the
+    squares of a column in each run and its products with the residuals."""
+    order = np.argsort(products / np.maximum(weights, 1e-300), kind="stable")
+    explained = []
+    for size in range(2, order.size - 1):
+        group = order[:size]
+        others = order[size:]
+        parts = [_explained(weights[runs], products[runs]) for runs in (group, others)]
+        explained.append(sum(parts))
+    size = int(np.argmax(explained)) + 2
+    is_upper = np.ones(order.size, dtype=bool)
+    is_upper[order[:size]] = False
+    return is_upper
+
+
+def _explained(weights: Array, products: Array) -> float:
+    """The squares that a common factor of some runs explains."""
+    return float(np.sum(products) ** 2 / max(float(np.sum(weights)), 1e-300))
 
 
 class _Steps(NamedTuple):

@@ -3,13 +3,10 @@ rests on the law states first.
 """
 
 import dataclasses
-from collections.abc import Sequence
 
 import numpy as np
 
-from ...core import Array
-from ...recording import Recording
-from .causes import MisfitCause, causes_text, misfit_causes
+from .cause_names import MisfitCause, causes_text
 
 MAX_ACCEPTED = 10.0
 """Ratio of the rms error to the scatter of the data above which a muscle is written only where the
@@ -26,14 +23,6 @@ class LawMisfit:
     """Rms error over the scatter of the data."""
     causes: tuple[MisfitCause, ...] = ()
     """What explains the residuals, the greatest share first."""
-
-    def with_causes(
-        self, recordings: Sequence[Recording], residuals: Sequence[Array]
-    ) -> "LawMisfit":
-        """The misfit with the causes of the residuals (model - measured) [N] of the rows of each
-        recording, NaN for rows that are not measured.
-        """
-        return dataclasses.replace(self, causes=misfit_causes(recordings, residuals))
 
     def __str__(self) -> str:
         return f"{self.verdict} {causes_text(self.causes)}"

@@ -7,7 +7,7 @@ from ...core import ParameterError, one_line
 from ...recording import Recording
 from ..inspection import remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
-from .causes import MisfitCause
+from .cause_names import MisfitCause
 from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .data_checks import outlier_notes, saturation_notes
 from .matched_rows import Matches, match_rows

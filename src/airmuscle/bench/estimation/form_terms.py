@@ -9,6 +9,7 @@ greatest degree that leaves `SPARE_RUNS` combinations of run offsets.
 
 import dataclasses
 import functools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +29,10 @@ GAIN_DEGREE = 4
 SPARE_RUNS = 4
 """Combinations of run offsets that the form error in the held quantity leaves, where there are as
 many (chosen: 92 to 98 % of 95 % intervals of laboratories held)."""
+FURTHER_DEGREES = 1
+"""Greatest number of further degrees that may be form or scatter (chosen)."""
+LEFT_RUNS = 2
+"""Combinations of run offsets that these leave (chosen)."""
 MIN_SPARE_RUNS = 3
 """Least number of combinations of run offsets by which their variance is estimated (chosen)."""
 HELD = 0.1
@@ -156,6 +161,9 @@ class FormTerms(NamedTuple):
     """The same of a relative change of the swept quantity in each run."""
     second_is_swept: bool
     """Whether the runs sweep the second argument, and hold the first."""
+    further: tuple[Array, ...] = ()
+    """Columns (M, K) of the means of the runs in the next degrees of the held quantity, which may
+    be form or scatter."""
 
     @property
     def knows_runs(self) -> bool:
@@ -218,7 +226,19 @@ class _Terms:
             if min(further.spare_offsets, further.spare_gains) < spare:
                 break
             terms = further
-        return terms
+        return terms._replace(further=tuple(self._further(terms)))
+
+    def _further(self, terms: FormTerms) -> Iterator[Array]:
+        """The means of the runs of the next degrees in the held quantity, that neither the law nor
+        the terms contain, of one degree and two, while offsets are left."""
+        described = np.hstack([self.design, terms.columns])
+        for held in range(1, self.levels - 1):
+            means = self._means(held)
+            count = _left_over(means, described)
+            if count > min(FURTHER_DEGREES, terms.spare_offsets - LEFT_RUNS):
+                break
+            if count:
+                yield _orthonormal(means, described)[:, -count:]
 
     def of_degree(self, held: int, *, runs: bool = False) -> FormTerms:
         """The terms of a degree in the other quantity; `runs` adds every run offset."""
@@ -285,21 +305,29 @@ class _Terms:
 
 def _gains_of_arguments(first: Array, second: Array, modelled: Array) -> tuple[Array, Array]:
     """x dF/dx of both arguments (N,), from a polynomial of the modelled quantity over both."""
-    chebyshev = np.polynomial.chebyshev
     scaled = (_scaled(first), _scaled(second))
-    degrees = (GAIN_DEGREE, GAIN_DEGREE)
-    powers = np.add.outer(np.arange(GAIN_DEGREE + 1), np.arange(GAIN_DEGREE + 1))
-    is_used = (powers <= GAIN_DEGREE).ravel()
-    columns = chebyshev.chebvander2d(*scaled, degrees)[:, is_used]
-    coefficients = np.zeros(is_used.size)
-    coefficients[is_used] = np.linalg.lstsq(columns, modelled, rcond=1e-9)[0]
-    surface = coefficients.reshape(powers.shape)
+    surface = _surface_of(*scaled, modelled)
     gains = []
     for axis, values in enumerate((first, second)):
         span = float(np.ptp(values))
-        slope = chebyshev.chebval2d(*scaled, chebyshev.chebder(surface, axis=axis))
-        gains.append(slope * 2.0 * values / span if span > 0.0 else np.zeros(values.size))
+        per_unit = 2.0 / span if span > 0.0 else 0.0
+        derivative = np.polynomial.chebyshev.chebder(surface, axis=axis)
+        slope = np.polynomial.chebyshev.chebval2d(*scaled, derivative)
+        gains.append(slope * per_unit * values)
     return gains[0], gains[1]
+
+
+def _surface_of(first: Array, second: Array, values: Array) -> Array:
+    """The Chebyshev coefficients (K, K) of values (N,) over two scaled arguments, up to the total
+    degree `GAIN_DEGREE`."""
+    orders = np.arange(GAIN_DEGREE + 1)
+    is_used = (orders[:, None] + orders) <= GAIN_DEGREE
+    degrees = (GAIN_DEGREE, GAIN_DEGREE)
+    columns = np.polynomial.chebyshev.chebvander2d(first, second, degrees)
+    coefficients = np.zeros(is_used.shape)
+    used_columns = columns[:, is_used.ravel()]
+    coefficients[is_used] = np.linalg.lstsq(used_columns, values, rcond=1e-9)[0]
+    return coefficients
 
 
 def _scaled(values: Array) -> Array:

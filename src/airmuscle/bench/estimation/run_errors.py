@@ -231,6 +231,8 @@ class _Kinds(NamedTuple):
     shapes: Sequence[tuple[str, ...]]
     changes: Sequence[float]
     second_is_swept: bool
+    forms: Sequence[Array] = ()
+    """Columns of the cells (M, K) that are form in place of a shape, equal in every repeat."""
 
     @classmethod
     def of(cls, terms: FormTerms, *, in_order: bool) -> "_Kinds":
@@ -244,7 +246,8 @@ class _Kinds(NamedTuple):
             shapes += [(OFFSET, TILT)]
         if min(terms.spare_gains, terms.spare_stretches) >= MIN_SPARE_RUNS:
             shapes += [(GAIN, STRETCH)]
-        return cls(shapes, SLOW_CHANGES if in_order else (), terms.second_is_swept)
+        changes = SLOW_CHANGES if in_order else ()
+        return cls(shapes, changes, terms.second_is_swept, terms.further)
 
     def modes(self, cells: Cells, conditions: Conditions) -> list[Array]:
         """The means of each shape in each cell, (M, errors) for each shape."""
@@ -259,7 +262,7 @@ class _Kinds(NamedTuple):
 
     def products(self, cells: Cells, design: Array, conditions: Conditions) -> tuple[Array, Array]:
         """J^T S J of each shape and J^T C J of each change, of the rows of the cells, (number, P,
-        P); one of zeros where there is none."""
+        P); one of zeros where there is none, and for each form, which is no scatter."""
         sums = cells.sums(design)
         parameters = design.shape[1]
         zero = np.zeros((parameters, parameters))
@@ -272,6 +275,7 @@ class _Kinds(NamedTuple):
                 gradients = members.T @ (mode[:, None] * sums)
                 product = product + gradients.T @ gradients
             of_shapes.append(product)
+        of_shapes += [zero for _ in self.forms]
         of_changes = [zero] if not self.changes else []
         for distance in self.changes:
             product = zero
@@ -350,6 +354,7 @@ class _Likelihood:
         for modes in self.kinds.modes(self.cells, self.conditions):
             columns = [members * mode[:, None] for mode in modes.T]
             shapes.append(np.hstack(columns))
+        shapes += self.kinds.forms
         return shapes or [members[:, :0]]
 
     def _rotate(self, parts: Sequence[Array], distance: float) -> Array:

@@ -22,7 +22,7 @@ from ...engine.run.integrators import Integrator, Rodas4
 from ...physics import Characteristic, CreepElements, ForceLaw, Friction, NoFriction, ValidityRange
 from ...recording import Recording
 from ...recording.columns import displayed
-from .. import dynamics
+from .. import diagnosis, dynamics
 from ..diagnosis import DataUse, LawMisfit, Scatter, branch_distance, force_noise, support_of
 from ..estimation import NORMAL_QUANTILE
 from ..inspection import Mask, rate_of_change
@@ -148,7 +148,9 @@ def _record_misfit(recording: Recording, force: QuantityPrediction) -> LawMisfit
     scatter = Scatter(force_noise([recording]), None, distance)
     rows = int(np.count_nonzero(force.compared))
     misfit = scatter.misfit(force.rms, rows, float(np.nanmax(recording["force"])))
-    return None if misfit is None else misfit.with_causes([recording], residuals)
+    if misfit is None:
+        return None
+    return dataclasses.replace(misfit, causes=diagnosis.misfit_causes([recording], residuals))
 
 
 def _rows_with_tension(recording: Recording) -> tuple[Mask, Mask]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core import Array, Hint, HintedText
 from ...recording import resting_length_of
+from .. import diagnosis
 from ..diagnosis import (
     FRICTION,
     HELD,
@@ -24,7 +25,6 @@ from ..diagnosis import (
     branch_notes,
     causes_text,
     level_text,
-    misfit_causes,
 )
 from ..estimation import UNCENSORED, Censoring, LeastSquares
 from ..inspection import RIPPLE_BAND
@@ -92,7 +92,7 @@ class FitCase:
         """What explains the residuals of a force, the greatest share first."""
         if self.problem.fitted_quantity != FORCE:
             return ()
-        return misfit_causes(self.points.recordings, self.residuals)
+        return diagnosis.misfit_causes(self.points.recordings, self.residuals)
 
     @property
     def stated_causes(self) -> tuple[MisfitCause, ...]:
