@@ -163,7 +163,7 @@ def test_bands_of_runs_that_differ_by_noise_alone_hold(laboratory):
     """The scatter of the law is 0.2 N; what the terms of the form error leave is of this size."""
     result = bands(laboratory, SCATTER["noise"], 60)
     assert result.held.mean() > 0.95, result
-    assert result.width.mean() < 5.0, result
+    assert result.width.mean() < 2.4, result
 
 
 def test_levels_that_were_measured_once_leave_the_scatter_between_runs_unknown():
