@@ -131,6 +131,11 @@ def test_no_length_is_a_mean_of_laws_and_laws_that_differ_are_named(sized):
     ]
     differs = max(lengths) > DISAGREEMENT * min(lengths)
     assert ("contradict each other by a factor" in chapter.paragraphs[0]) is differs
+    if differs:
+        longest = f"asks for {1e3 * max(lengths):.4g} mm: this choice"
+        assert longest in chapter.paragraphs[0]
+        falls_short = max(lengths) > result.best.length
+        assert ("does not reach both end points" in chapter.paragraphs[0]) is falls_short
     for law in of_best if len(of_best) > 1 else ():
         assert law.name in chapter.paragraphs[1]
 

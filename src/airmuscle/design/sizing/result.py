@@ -183,19 +183,32 @@ class SizingResult(Reported):
         return [law for law in self.laws if law.product == self.best.product]
 
     def _disagreement(self) -> str:
-        """A warning where the laws of the product of the best choice contradict each other."""
+        """A warning where the laws of the product of the best choice contradict each other, and
+        what the choice lacks by the law that asks for the most.
+        """
         count = self.best.count
-        lengths = [
-            law.choices[count].length for law in self._laws_of_the_best if count in law.choices
-        ]
+        lengths = {
+            law.name: law.choices[count].length
+            for law in self._laws_of_the_best
+            if count in law.choices
+        }
         if len(lengths) < 2:
             return ""
-        factor = max(lengths) / min(lengths)
+        most = max(lengths, key=lengths.__getitem__)
+        factor = lengths[most] / min(lengths.values())
         if factor <= DISAGREEMENT:
             return ""
+        lack = lengths[most] - self.best.length
+        short = (
+            f"this choice is {1e3 * lack:.4g} mm ({100 * lack / lengths[most]:.0f} %) shorter and"
+            " by that law does not reach both end points, whatever its reserve"
+            if lack > 0.0
+            else "this choice has that length"
+        )
         return (
             f" The published laws of this product contradict each other by a factor of {factor:.2g}"
-            " in the length: measure a muscle at its end points before you order."
+            f" in the length. The most conservative, {most}, asks for {1e3 * lengths[most]:.4g} mm:"
+            f" {short}. Measure a muscle at its end points before you order."
         )
 
     def reasons_for_the_law(self) -> str:
