@@ -345,7 +345,7 @@ def test_options_of_commands_are_declared_in_requests():
         "commands",
         "library",
         "simulate",
-        "fit",
+        "approximate",
         "tune",
     }
 

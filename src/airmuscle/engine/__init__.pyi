@@ -47,3 +47,7 @@ from .run.batch import Double as Double
 from .run.batch import Precision as Precision
 from .run.batch import Single as Single
 from .run.batch import simulate_batch as simulate_batch
+
+# isort: split
+# For the other rooms, not in __all__
+from .cluster import dask_cluster as dask_cluster

@@ -6,6 +6,7 @@ from .recording import Recording as Recording
 # For the other rooms, not in __all__
 from .columns import display_scale as display_scale
 from .columns import quantity_of as quantity_of
+from .plot import plot_columns as plot_columns
 from .recording import resting_length_of as resting_length_of
 from .vocabulary import UNIT_NAMES as UNIT_NAMES
 from .vocabulary import WORDS as WORDS

@@ -7,7 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..core import Hint, HintedText, System, chosen_scale
+from .. import core
+from ..core import Hint, HintedText, chosen_scale
 
 MOVED = ("contraction", "length", "shortening", "position")
 """Columns of the motion of the muscle end; the first one of a recording is used."""
@@ -199,7 +200,7 @@ def proposal(heading: str) -> str:
     )
 
 
-def column_units(system: System, outputs: Sequence[str]) -> dict[str, str]:
+def column_units(system: "core.System", outputs: Sequence[str]) -> dict[str, str]:
     """The unit of every state, input and output; empty where none is known."""
     units = {name: getattr(quantity_of(name), "unit", "") for name in outputs}
     units |= {i.name: i.unit for i in system.input_variables}

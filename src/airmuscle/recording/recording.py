@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import recording as room
 from ..core import Array, Reference, check_field_types, conversion, one_line
 from ..core.errors import (
     AirmuscleError,
@@ -20,7 +21,6 @@ from ..core.errors import (
 )
 from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
 from .notebook import Card, NotebookDisplay
-from .plot import plot_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -230,7 +230,7 @@ class Recording(NotebookDisplay):
         contains too few Axes.
         """
         columns = {name: self[name] for name in names or self if name != "time"}
-        return plot_columns(
+        return room.plot_columns(
             columns, self.columns.get("time"), self.origin, ax=ax, ordered=not names
         )
 
@@ -285,7 +285,7 @@ def recording_card(recording: Any, units: Mapping[str, str]) -> Card:
         every = slice(None, None, max(1, step))
         columns = {name: values[every] for name, values in recording.columns.items()}
         time = columns.pop("time", None)
-        return plot_columns(columns, time, recording.origin, units=units, limit=MAX_PANELS)
+        return room.plot_columns(columns, time, recording.origin, units=units, limit=MAX_PANELS)
 
     count = len(recording)
     title = f"{recording.origin}: {count} rows of {len(recording.columns)} columns"

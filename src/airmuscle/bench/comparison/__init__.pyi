@@ -1,3 +1,4 @@
+from ..estimation import specimens_of as specimens_of
 from .candidate_scores import FoldScore as FoldScore
 from .comparison_chapter import LawSelection as LawSelection
 from .comparison_chapter import compare_chapters as compare_chapters
@@ -10,12 +11,13 @@ from .model_selection import recommend as recommend
 from .result_chapter import error_interval as error_interval
 from .specimen_errors import SpecimenErrors as SpecimenErrors
 from .specimen_errors import odd_specimen_notes as odd_specimen_notes
-from .specimen_errors import specimens_of as specimens_of
 
 # isort: split
 # For the other rooms, not in __all__
 from .candidate_scores import RankedModel as RankedModel
+from .compared_points import ComparedPoints as ComparedPoints
 from .compared_points import force_residuals as force_residuals
 from .compared_points import law_of_length as law_of_length
 from .comparison_chapter import compare_chapter as compare_chapter
+from .comparison_chapter import select_law as select_law
 from .specimen_errors import ranked_specimen_errors as ranked_specimen_errors

@@ -11,10 +11,9 @@ import numpy as np
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot
 from ...report.formatting import format_number
+from .. import comparison
 from ..estimation import is_pressure_ramp, levels_of, specimen_name
 from ..statics import Fit
-from .candidate_scores import RankedModel
-from .comparison_chapter import LawSelection
 
 MIN_LEVELS = 4
 """Levels of a quantity below which more are proposed (chosen): a curvature is then determined by a
@@ -49,7 +48,7 @@ def result_chapter(
     fit: Fit,
     fitted: Chapter,
     recordings: Sequence[Recording],
-    selection: LawSelection | None = None,
+    selection: "comparison.LawSelection | None" = None,
 ) -> Chapter:
     """The chapter that begins the report of a static fit.
 
@@ -91,7 +90,7 @@ def result_chapter(
     )
 
 
-def left_out_errors(selection: LawSelection) -> list[LeftOutError]:
+def left_out_errors(selection: "comparison.LawSelection") -> list[LeftOutError]:
     """The cross-validation errors of the recommended law, one for each purpose."""
     return [
         LeftOutError(comparison.purpose, model.cross_validated_rmse, error_interval(model))
@@ -99,7 +98,7 @@ def left_out_errors(selection: LawSelection) -> list[LeftOutError]:
     ]
 
 
-def error_interval(model: RankedModel) -> tuple[float, float] | None:
+def error_interval(model: "comparison.RankedModel") -> tuple[float, float] | None:
     """The 95 % interval [N] of a cross-validation error from the scatter of its parts: percentiles
     of the bootstrap that draws whole parts (Efron, Tibshirani 1993, chapter 13). None below
     MIN_FOLDS parts.
@@ -116,7 +115,7 @@ def error_interval(model: RankedModel) -> tuple[float, float] | None:
     return float(low), float(high)
 
 
-def _sentence(fit: Fit, selection: LawSelection | None) -> str:
+def _sentence(fit: Fit, selection: "comparison.LawSelection | None") -> str:
     name = (
         type(fit.model).__name__ if selection is None else selection.recommended[0].candidate.name
     )

@@ -11,11 +11,16 @@ import numpy as np
 from ...core import AirmuscleError, Hint, HintedText
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
-from ..estimation import MIN_MEMBERS, SpecimenSplit, leverages, specimen_name, t_quantile
+from .. import comparison
+from ..estimation import (
+    MIN_MEMBERS,
+    SpecimenSplit,
+    leverages,
+    resting_lengths_of,
+    specimens_of,
+    t_quantile,
+)
 from ..statics import Candidate, Fit
-from .candidate_scores import FoldScore, RankedModel
-from .compared_points import ComparedPoints
-from .model_selection import Comparison
 
 MIN_JUDGED = 4
 """Number of specimens from which one that does not follow the others is named (chosen): of three,
@@ -116,23 +121,6 @@ def odd_specimen_notes(errors: SpecimenErrors | None) -> list[HintedText]:
     ]
 
 
-def specimens_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """The specimens of the recordings; empty if one of them states neither its specimen nor its
-    resting length.
-    """
-    if not all(
-        "specimen" in run.constants or "resting_length" in run.constants for run in recordings
-    ):
-        return ()
-    return tuple(dict.fromkeys(specimen_name(run) for run in recordings))
-
-
-def resting_lengths_of(recordings: Sequence[Recording]) -> dict[str, float]:
-    """The resting length [m] of each specimen that states one."""
-    stated = [run for run in recordings if "resting_length" in run.constants]
-    return {specimen_name(run): float(run.constants["resting_length"]) for run in stated}
-
-
 def specimen_errors(
     fit: Fit, recordings: Sequence[Recording], fixed: tuple[str, ...] = ()
 ) -> SpecimenErrors | None:
@@ -142,7 +130,7 @@ def specimen_errors(
     if len(specimens_of(recordings)) < MIN_MEMBERS:
         return None
     try:
-        points = ComparedPoints.of(recordings, SpecimenSplit())
+        points = comparison.ComparedPoints.of(recordings, SpecimenSplit())
         parts = [
             p
             for p in points.left_out_residuals(Candidate("", fit.model, fixed), fit, fit.loss)
@@ -150,25 +138,25 @@ def specimen_errors(
         ]
     except AirmuscleError:  # the others do not determine the law, so that no error is known
         return None
-    return _checked([FoldScore.of(*part) for part in parts], fit.model, recordings)
+    return _checked([comparison.FoldScore.of(*part) for part in parts], fit.model, recordings)
 
 
 def ranked_specimen_errors(
-    model: RankedModel, comparisons: Sequence[Comparison], recordings: Sequence[Recording]
+    model: "comparison.RankedModel",
+    comparisons: "Sequence[comparison.Comparison]",
+    recordings: Sequence[Recording],
 ) -> SpecimenErrors | None:
     """As `specimen_errors`, for a law of comparisons; from that which left the specimens out, if
     there is one.
     """
-    for comparison in comparisons:
-        if isinstance(comparison.leave_out, SpecimenSplit) and specimens_of(recordings):
-            return _checked(
-                comparison[model.candidate.name].fold_scores, model.fit.model, recordings
-            )
+    for compared in comparisons:
+        if isinstance(compared.leave_out, SpecimenSplit) and specimens_of(recordings):
+            return _checked(compared[model.candidate.name].fold_scores, model.fit.model, recordings)
     return specimen_errors(model.fit, recordings, model.candidate.fixed)
 
 
 def _checked(
-    scores: Sequence[FoldScore], law: Characteristic, recordings: Sequence[Recording]
+    scores: "Sequence[comparison.FoldScore]", law: Characteristic, recordings: Sequence[Recording]
 ) -> SpecimenErrors | None:
     names = tuple(each.fold for each in scores)
     rms = tuple(each.rmse for each in scores)

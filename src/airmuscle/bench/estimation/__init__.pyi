@@ -59,8 +59,10 @@ from .weighting import sensor_deviations as sensor_deviations
 from .cross_validation import LEVEL_TOLERANCE as LEVEL_TOLERANCE
 from .cross_validation import MAX_LEVEL_WIDTH as MAX_LEVEL_WIDTH
 from .cross_validation import held_levels as held_levels
+from .cross_validation import resting_lengths_of as resting_lengths_of
 from .cross_validation import specimen_name as specimen_name
-from .group_refits import LEVEL as LEVEL
+from .cross_validation import specimens_of as specimens_of
+from .form_terms import Conditions as Conditions
 from .group_refits import MIN_MEMBERS as MIN_MEMBERS
 from .group_refits import RowIndices as RowIndices
 from .group_refits import root_mean_square as root_mean_square
@@ -70,12 +72,15 @@ from .identifiability import MAX_RELATIVE_ERROR as MAX_RELATIVE_ERROR
 from .identifiability import Identifiability as Identifiability
 from .identifiability import UndeterminedCombination as UndeterminedCombination
 from .model_evidence import EQUIVALENT as EQUIVALENT
+from .model_evidence import LEVEL as LEVEL
 from .model_evidence import lag_one_autocorrelation as lag_one_autocorrelation
 from .model_evidence import student_quantile as student_quantile
 from .parameter_covariance import ParameterCovariance as ParameterCovariance
 from .parameter_covariance import normalised as normalised
 from .pooled_covariance import PooledCovariance as PooledCovariance
 from .pooled_covariance import Sums as Sums
+from .run_errors import RunErrors as RunErrors
+from .run_errors import estimate_run_errors as estimate_run_errors
 from .search import goes_on as goes_on
 from .search import is_budget_spent as is_budget_spent
 from .statistics import CorrelationIndex as CorrelationIndex

@@ -136,6 +136,23 @@ def specimen_name(run: Recording) -> str:
     return run.origin if length is None else f"{float(length) * 1e3:.6g} mm"
 
 
+def specimens_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """The specimens of the recordings; empty if one of them states neither its specimen nor its
+    resting length.
+    """
+    if not all(
+        "specimen" in run.constants or "resting_length" in run.constants for run in recordings
+    ):
+        return ()
+    return tuple(dict.fromkeys(specimen_name(run) for run in recordings))
+
+
+def resting_lengths_of(recordings: Sequence[Recording]) -> dict[str, float]:
+    """The resting length [m] of each specimen that states one."""
+    stated = [run for run in recordings if "resting_length" in run.constants]
+    return {specimen_name(run): float(run.constants["resting_length"]) for run in stated}
+
+
 @dataclasses.dataclass(frozen=True)
 class LevelSplit(GroupSplit):
     """Each level of a quantity is a group; values closer than `min_gap` times their range belong to

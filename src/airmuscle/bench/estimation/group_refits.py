@@ -24,12 +24,10 @@ import numpy.typing as npt
 
 from ...core import Array
 from . import least_squares_descent as steps
-from .model_evidence import student_quantile
+from .model_evidence import LEVEL, student_quantile
 from .problem import LeastSquaresProblem, LeastSquaresSolution
 from .variable_projection import RANK_TOLERANCE
 
-LEVEL = 0.95
-"""Share of the rows that a band is stated for."""
 MIN_MEMBERS = 3
 """Minimum number of specimens from which a band for others is stated (chosen): of two, each
 predicts the other.

@@ -7,6 +7,8 @@ import numpy.typing as npt
 
 from ...core import Array
 
+LEVEL = 0.95
+"""Share of the rows that a band is stated for."""
 EQUIVALENT = 2.0
 """Difference of AICc up to which laws are equivalent; the one with the fewest coefficients is then
 taken (Burnham and Anderson, Model Selection and Multimodel Inference, Springer, 2002)."""

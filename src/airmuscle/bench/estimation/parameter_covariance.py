@@ -22,9 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .form_terms import Conditions
+from .. import estimation
 from .model_evidence import lag_one_autocorrelation, student_quantile
-from .run_errors import RunErrors, estimate_run_errors
 
 ROWS = "rows"
 PARTS = "parts"
@@ -83,12 +82,12 @@ class Runs:
             arguments,
         )
 
-    def conditions(self, modelled: Array) -> Conditions:
+    def conditions(self, modelled: Array) -> "estimation.Conditions":
         """What the errors of the rows may follow, with the modelled quantity (N,)."""
         unknown = np.zeros(self.run.size)
         first, second = (*self.arguments, unknown, unknown)[:2]
         direction = unknown if self.direction is None else self.direction
-        return Conditions.of(first, second, modelled, direction)
+        return estimation.Conditions.of(first, second, modelled, direction)
 
     @property
     def order(self) -> Indices:
@@ -125,7 +124,7 @@ class ParameterCovariance:
     """What the errors are independent between: ROWS, RUNS or SPECIMENS."""
     groups: Groups | None = None
     """The specimens, if they are the unit."""
-    run_errors: RunErrors | None = None
+    run_errors: "estimation.RunErrors | None" = None
     """The errors that the rows of a run share, if the runs are the unit."""
 
     @functools.cached_property
@@ -303,7 +302,9 @@ def estimate_covariance(
     if not in_order and count < MIN_GROUPS:
         return independent
     conditions = runs.conditions(modelled)
-    errors = estimate_run_errors(rows, residuals, runs.run, conditions, in_order=in_order)
+    errors = estimation.estimate_run_errors(
+        rows, residuals, runs.run, conditions, in_order=in_order
+    )
     if errors is None:
         return independent
     return dataclasses.replace(independent, unit=RUNS, run_errors=errors)

@@ -425,3 +425,8 @@ def _term_labels(law: Any, paths: Sequence[str]) -> dict[str, str]:
 def _is_plain(path: str) -> bool:
     """Whether a path consists of fields alone, without the index of a sequence."""
     return bool(path) and "[" not in path
+
+
+def population_of(law: Any) -> Any:
+    """The population law of a pooled law; any other law unchanged."""
+    return law.population if isinstance(law, PooledLengthLaw) else law

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...core import Array, IdentificationError
 from ...recording import Recording
+from .. import statics
 from ..estimation import LeastSquares, profile_limits, student_quantile
 from .fit_problem import RESTING_LENGTH
-from .pooling import pooled_band
 from .static_fit_result import Fit
 
 
@@ -66,7 +66,7 @@ def confidence_band(
     if fit.effects is None:
         half = fit.parameter_covariance.half_widths(jacobian, level)
     else:
-        offset, half = pooled_band(fit, points, jacobian, level)
+        offset, half = statics.pooled_band(fit, points, jacobian, level)
         value = value + offset
     half = np.hypot(half, prediction * quantile * fit.sigma)
     return Band(value, value - half, value + half)

@@ -19,8 +19,7 @@ from ...report.chapter import Chapter, Table, TableColumn
 from ..estimation import LeastSquares, effective_sample_size, solve_least_squares, specimen_name
 from .candidates import blank_surface
 from .fit_points import FitPoints
-from .fit_problem import evaluate
-from .pooling import population_of
+from .fit_problem import evaluate, population_of
 from .static_fit import refit
 
 PRIOR_STD = 2e-3

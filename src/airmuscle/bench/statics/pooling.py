@@ -284,8 +284,3 @@ def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> t
         scatter = np.zeros(count)
     gradient = np.hstack([jacobian, by_specimen.reshape(count, effects.coefficients.size)])
     return offset, effects.covariance.half_widths(gradient, level, scatter)
-
-
-def population_of(law: Any) -> Any:
-    """The population law of a pooled law; any other law unchanged."""
-    return law.population if isinstance(law, PooledLengthLaw) else law

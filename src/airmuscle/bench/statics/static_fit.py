@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ...core import HintedText, IdentificationError, ParameterError, one_line, tree
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
+from .. import statics
 from ..diagnosis import MAX_CONTRACTION, VALUE_RULES, support_of
 from ..estimation import (
     Censoring,
@@ -23,10 +24,9 @@ from ..estimation import (
     uncensored_rank,
 )
 from .fit_points import FitPoints
-from .fit_problem import evaluate
+from .fit_problem import evaluate, population_of
 from .fit_rules import examine_fit
 from .goodness import check_determined_by_levels, goodness_of_fit
-from .pooling import check_poolable, make_pooling, pool, population_of
 from .slack import solve_bounded
 from .static_fit_result import Fit
 
@@ -123,14 +123,16 @@ def fit_to_points(
     if np.nanmax(points.joined["contraction"], initial=0.0) > MAX_CONTRACTION:
         _ = points.findings  # raises ColumnError where no muscle is so short
     if isinstance(law, PooledLengthLaw):
-        check_poolable(law, points)
+        statics.check_poolable(law, points)
     population = population_of(law)
     key = tree.structure(population), tree.flatten(population).tobytes(), loss, tuple(fixed)
     kept: dict[str, Any] = points.kept if censoring is None and sigma is None else {}
     if kept.get("key") != key:
         kept.clear()
         kept.update(fit=_fit_law(population, points, loss, censoring, sigma, fixed), key=key)
-    return pool(law, kept["fit"], points) if isinstance(law, PooledLengthLaw) else kept["fit"]
+    return (
+        statics.pool(law, kept["fit"], points) if isinstance(law, PooledLengthLaw) else kept["fit"]
+    )
 
 
 def _fit_law(
@@ -185,7 +187,7 @@ def refit(
     if isinstance(law, PooledLengthLaw):
         population = refit(law.population, points, loss=loss, fixed=fixed)
         problem = points.problem(population)
-        pooling = make_pooling(law, points, problem)
+        pooling = statics.make_pooling(law, points, problem)
         return pooling.law(population, pooling.predict(problem.initial_values))
     problem = points.problem(law, fixed=fixed)
     near = (

@@ -39,11 +39,11 @@ from ...report.equation.source_code import REMARKS, displayed_lines, source_code
 from ...report.formatting import format_number
 from ..estimation import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
 from .candidates import evaluate_force
+from .energy_defect_values import defect_values
 from .fit_problem import with_length
 from .intervals import Band, confidence_band
 from .static_fit_result import Fit
 from .surface_violations import shape_violations_of_fit, violation_table
-from .volume_fit import defect_values
 
 MAX_ISOBARS = 8
 MAX_CURVES = 5

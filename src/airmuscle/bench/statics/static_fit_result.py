@@ -16,12 +16,12 @@ from ...recording.columns import display_scale
 from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.parameter_tables import estimate_table
 from ...report.shown import BRIEF_ROWS
+from .. import statics
 from ..diagnosis import Diagnosis, Findings, LawMisfit, MisfitCause, Scatter
 from ..estimation import CorrelationIndex, Estimate, Loss, ParameterCovariance
 from ..reported import Reported
 from .fit_problem import FORCE, FitProblem, FittedQuantity, evaluate
 from .goodness import WorstPoint
-from .specimen_effects import SpecimenEffects
 
 MANY_POINTS = 1000
 """Number of points of a plot from which markers are small."""
@@ -72,7 +72,7 @@ class Fit(Reported):
     """What the rules find in the fit and its data, or the examination that gives it, which is made
     when a finding is first asked for.
     """
-    effects: SpecimenEffects | None = None
+    effects: "statics.SpecimenEffects | None" = None
     """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its
     population law.
     """

@@ -10,7 +10,7 @@ from ...core import Array, autodiff, check_whole
 from ...physics.muscle.characteristic import ForceLaw, ValidityRange
 from ...physics.muscle.characteristic.base import ContractionLaw
 from ...report.chapter import Table, TableColumn
-from .exponential_surface import LoadRange
+from .. import statics
 from .static_fit_result import Fit
 
 _ROUNDING = 1e-9
@@ -103,13 +103,13 @@ FORCE_FALLS = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
 
 def find_monotonicity_violations(
     law: ContractionLaw,
-    validity_range: LoadRange | None = None,
+    validity_range: "statics.LoadRange | None" = None,
     points: tuple[int, int] = (201, 201),
 ) -> tuple[MonotonicityViolation, ...]:
     """The regions of a validity range where k rises with F or falls with p, largest first.
     `validity_range` is by default that of the law. Exact slopes are evaluated on an even grid of
     `points` pressures and forces, edges included."""
-    validity_range = validity_range or LoadRange.from_law(law)
+    validity_range = validity_range or statics.LoadRange.from_law(law)
     return find_violations(
         law, (RISES_WITH_FORCE, CONTRACTION_FALLS), *validity_range.grid(*points)
     )

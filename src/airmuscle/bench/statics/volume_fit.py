@@ -25,6 +25,7 @@ from ...report.parameter_tables import parameter_table
 from ..estimation import EQUIVALENT, aicc
 from ..inspection import level_intervals
 from ..reported import Reported
+from .energy_defect_values import defect_values
 
 HELD = 0.005
 """Range of the contraction within which it is held during a fill (chosen)."""
@@ -284,20 +285,6 @@ def _braid_terms(contraction: Array) -> Array:
 def _chebyshev_terms(contraction: Array, low: float, high: float, degree: int) -> Array:
     scaled = np.clip((2 * contraction - low - high) / (high - low), -1.0, 1.0)
     return np.asarray(np.polynomial.chebyshev.chebvander(scaled, degree))
-
-
-def defect_values(defect: EnergyDefect) -> list[NamedValue]:
-    """The Maxwell defect and its place; it is zero where force and volume derive from one
-    potential.
-    """
-    return [
-        NamedValue(
-            "Maxwell defect", defect.worst, defect.unit, remark=f"|dF/dp + dV/dL| {defect.place}"
-        ),
-        NamedValue(
-            "relative Maxwell defect", defect.relative, "1", "%", remark="of the maximum of -dV/dL"
-        ),
-    ]
 
 
 def _tables(fit: VolumeFit) -> tuple[Table, Table]:

@@ -5,8 +5,9 @@ import dataclasses
 import numpy as np
 
 from ...bench.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
-from ...bench.comparison.specimen_errors import ranked_specimen_errors, resting_lengths_of
+from ...bench.comparison.specimen_errors import ranked_specimen_errors
 from ...bench.diagnosis.misfit import misfit_warning
+from ...bench.estimation import resting_lengths_of
 from ...core import IdentificationError
 from ...physics import NoFriction
 from ...physics.muscle.geometry.base import LENGTH_TOLERANCE

@@ -6,16 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.comparison import RankedModel
-from ...bench.comparison.specimen_errors import (
-    SpecimenErrors,
-    resting_lengths_of,
-    specimens_of,
-)
+from ...bench import comparison, inspection, statics
 from ...bench.diagnosis.misfit import misfit_warning
-from ...bench.estimation import LEVEL
-from ...bench.inspection import maximum_rate
-from ...bench.statics import Fit, standard_candidates
+from ...bench.estimation import LEVEL, resting_lengths_of, specimens_of
+from ...bench.statics import Fit
 from ...core import (
     HintedText,
     ParameterError,
@@ -70,7 +64,7 @@ def find_initial_law(
         return Entry(cls.__name__, cls.__name__, "chosen", cls.guess(recordings)), cls.redundant
     if issubclass(cls, ContractileSurface):
         return Entry(name, name, "chosen", cls.guess(recordings, degree)), ()
-    for candidate in standard_candidates(recordings):
+    for candidate in statics.standard_candidates(recordings):
         if type(candidate.law) is cls:
             return Entry(name, name, "chosen", candidate.law), candidate.fixed
     has_length = all("resting_length" in run.constants for run in recordings)
@@ -98,7 +92,7 @@ def fitted_entry(
     files: Sequence[Path],
     error_ratio: float = 1.0,
     recordings: Sequence[Recording] = (),
-    errors: SpecimenErrors | None = None,
+    errors: "comparison.SpecimenErrors | None" = None,
 ) -> Entry:
     """The initial entry with the fitted characteristic, a new provenance and its 95 % bands,
     without its checks.
@@ -156,7 +150,7 @@ def fitted_entry(
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
 
 
-def left_out_ratio(best: RankedModel) -> float:
+def left_out_ratio(best: "comparison.RankedModel") -> float:
     """Rms error of the rows left out over that of all rows; 1 where it is unknown or smaller."""
     if not (best.in_sample_rmse > 0.0 and np.isfinite(best.cross_validated_rmse)):
         return 1.0
@@ -164,7 +158,7 @@ def left_out_ratio(best: RankedModel) -> float:
 
 
 def complete_band(
-    band: StatedBand, recordings: Sequence[Recording], errors: SpecimenErrors | None
+    band: StatedBand, recordings: Sequence[Recording], errors: "comparison.SpecimenErrors | None"
 ) -> StatedBand:
     """The band with the specimens, resting lengths and maximum rates of the records that it holds
     for, and, of a force, with that of specimens that were not measured, if their errors are
@@ -178,8 +172,8 @@ def complete_band(
         band,
         specimens=specimens_of(recordings),
         resting_lengths=tuple(resting_lengths_of(recordings).values()),
-        max_contraction_rate=maximum_rate(timed, "contraction") if timed else None,
-        max_pressure_rate=maximum_rate(timed, "pressure") if timed else None,
+        max_contraction_rate=inspection.maximum_rate(timed, "contraction") if timed else None,
+        max_pressure_rate=inspection.maximum_rate(timed, "pressure") if timed else None,
     )
 
 

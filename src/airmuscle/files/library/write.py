@@ -5,12 +5,12 @@ same numbers.
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from ... import physics
 from ...bench.statics import Fit
 from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
-from ...physics import Characteristic, Muscle, Ratings, ValidityRange
+from ...physics import Characteristic, Ratings, ValidityRange
 from .check import Check
 from .entry import OPTIONAL_PARTS, Entry
 from .fields import model_name
@@ -18,8 +18,9 @@ from .file_format import FORMAT, FORMAT_KEY
 from .fitted_entry import fitted_entry
 from .uncertainty import ParameterUncertainty, StatedBand
 
-Savable = Entry | Fit | Muscle | Characteristic
+Savable: TypeAlias = "Entry | Fit | physics.Muscle | Characteristic"
 """What a muscle file may contain."""
+
 WITHOUT_MODEL = Check | Reference | Ratings | ValidityRange | ParameterUncertainty | StatedBand
 """Objects of a file that are written without their class and without the values that are not
 stated.
@@ -162,8 +163,10 @@ def entry_of(thing: Savable) -> Entry:
         return Entry(
             name, name, "chosen", thing, validity_range=getattr(thing, "validity_range", None)
         )
-    if isinstance(thing, Muscle):  # the elements that differ from those of a muscle without any
-        absent = {field.name: field.default for field in dataclasses.fields(Muscle)}
+    if isinstance(
+        thing, physics.Muscle
+    ):  # the elements that differ from those of a muscle without any
+        absent = {field.name: field.default for field in dataclasses.fields(physics.Muscle)}
         parts = {
             name: getattr(thing, name)
             for name in OPTIONAL_PARTS

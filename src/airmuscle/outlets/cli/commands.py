@@ -61,7 +61,7 @@ COMMANDS = (
     ),
     CommandRow(
         "inspect",
-        "measurements",
+        "inspect",
         "inspect",
         "Inspect measurement files: columns, runs, sampling, outliers.",
     ),
@@ -72,10 +72,13 @@ COMMANDS = (
         "recipe", "recipe", "recipe", "Predict a muscle made by hand from tube, braid and length."
     ),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
-    CommandRow("approximate", "fit", "approximate", "Approximate one characteristic by another."),
     CommandRow(
-        "convert", "measurements", "convert", "Write measurement files as CSV, Parquet or HDF5."
+        "approximate",
+        "approximate",
+        "approximate",
+        "Approximate one characteristic by another.",
     ),
+    CommandRow("convert", "convert", "convert", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow(
         "hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."
     ),
@@ -105,7 +108,7 @@ COMMANDS = (
     ),
     CommandRow(
         "fit-volume",
-        "fit",
+        "fit_volume",
         "fit_volume_command",
         "Fit the volume of a muscle over its contraction.",
     ),

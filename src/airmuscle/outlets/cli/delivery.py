@@ -5,8 +5,8 @@ import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
+from ... import engine
 from ...core import AirmuscleError, FileError, SimulationError, counted
-from ...engine.cluster import dask_cluster
 from ...engine.processes import Workers, available_cores
 from ...engine.result_store import STORE_FOLDER, ResultStore, current_store, result_store
 from ...report.chapter import Chapter
@@ -88,7 +88,7 @@ class Execution:
             if self.cluster is None:
                 yield min(local, tasks or local)
                 return
-            with dask_cluster(self.cluster, lambda text: echo(text, err=True)) as cluster:
+            with engine.dask_cluster(self.cluster, lambda text: echo(text, err=True)) as cluster:
                 yield cluster
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.comparison.comparison_chapter import LawSelection, compare_chapters, select_law
+from ...bench import comparison, statics
 from ...bench.comparison.result_chapter import result_chapter, without_opening_figures
 from ...bench.comparison.specimen_errors import (
     odd_specimen_notes,
@@ -17,14 +17,10 @@ from ...bench.comparison.specimen_errors import (
 )
 from ...bench.diagnosis import DataUse, support_of
 from ...bench.estimation import UNCENSORED
-from ...bench.statics import Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
-from ...bench.statics.candidates import Candidate, standard_candidates
+from ...bench.statics import Candidate, Fit, fit, profile, standard_candidates, weakly_determined
 from ...bench.statics.fit_problem import fitted_quantity_of
-from ...bench.statics.length_errors import length_error_chapter
 from ...bench.statics.static_fit_chapter import fit_chapter
-from ...bench.statics.surface_shape import fit_shape_constrained
 from ...bench.statics.surface_violations import shape_violations_of_fit
-from ...bench.statics.uncertainty import Uncertainty
 from ...core import ParameterError
 from ...engine.processes import Workers
 from ...files.library import Entry, find_initial_law, missing_geometry, resting_lengths
@@ -52,7 +48,7 @@ class FittedMuscle:
     entry: Entry
     chapters: list[Chapter]
     notes: Sequence[str]
-    selection: LawSelection | None = None
+    selection: "comparison.LawSelection | None" = None
     refusal: str = ""
 
 
@@ -139,7 +135,7 @@ def _compare(
         )
         candidates = [*standard_candidates(recordings), named_candidate]
     both = None if request.purpose is None else request.purpose == "both"
-    selection = select_law(
+    selection = comparison.select_law(
         recordings,
         candidates,
         leave_out=request.split,
@@ -163,7 +159,9 @@ def _compare(
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
     entry, more, notes = _more(request, best.fit, entry, recordings, progress, workers)
-    comparisons = _in_one_screen(compare_chapters(selection.comparisons, best, selection.reason))
+    comparisons = _in_one_screen(
+        comparison.compare_chapters(selection.comparisons, best, selection.reason)
+    )
     odd = odd_specimen_notes(errors)
     notes = [*notes, *unused, *odd, *missing_geometry(entry)]
     comparisons[0] = dataclasses.replace(comparisons[0], notes=(*comparisons[0].notes, *notes))
@@ -193,7 +191,7 @@ def _more(
     names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
     if request.bootstrap is not None:
         report = None if progress is None else lambda fraction: progress("refits", fraction)
-        sample = bootstrap(
+        sample = statics.bootstrap(
             fitted,
             recordings,
             refits=request.bootstrap,
@@ -202,7 +200,6 @@ def _more(
             workers=workers,
         )
     profiles = tuple(profile(fitted, name) for name in names)
-    uncertainty = Uncertainty(fitted, sample, profiles, WEAK in request.profile and not weak)
     if request.shape:
         if not isinstance(fitted.model, ContractileSurface):
             raise ParameterError(
@@ -216,19 +213,21 @@ def _more(
             free = Recording(
                 {"pressure": pressure, "contraction": contraction}, "--free-contraction"
             )
-        shaped = fit_shape_constrained(fitted.model, recordings, free=free)
+        shaped = statics.fit_shape_constrained(fitted.model, recordings, free=free)
         chapters.append(shaped.chapter(fitted))
         note = f"{entry.note} With shape constraints: rms error {shaped.rmse:.4g} N."
         entry = dataclasses.replace(entry, characteristic=shaped.model, note=note, error_band=None)
     else:
         notes = list(map(str, shape_violations_of_fit(fitted)))
-    if sample is not None or profiles or uncertainty.none_weak:
-        chapters.append(uncertainty.chapter())
+    none_weak = WEAK in request.profile and not weak
+    if sample is not None or profiles or none_weak:
+        chapters.append(statics.Uncertainty(fitted, sample, profiles, none_weak).chapter())
     if request.length_error:
         errors = [
-            estimate_length_error(fitted.model, recordings, name) for name in request.length_error
+            statics.estimate_length_error(fitted.model, recordings, name)
+            for name in request.length_error
         ]
-        chapters.append(length_error_chapter(errors))
+        chapters.append(statics.length_error_chapter(errors))
     return entry, chapters, notes
 
 

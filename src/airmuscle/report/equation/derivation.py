@@ -128,12 +128,17 @@ def _record(
     value = nodes.as_node(getattr(model, quantity)(*points))
     autodiff.check_finite([value], f"{type(law).__name__}.{quantity}")
     parameters = dict(zip(symbols, leaves(law), strict=True))
-    bounds = {symbol: (float(leaf.value),) * 2 for symbol, leaf in parameters.items()}
-    bounds |= {point: ranges[name] for point, name in zip(points, arguments, strict=True)}
+    bounds: dict[Node, Bounds] = {}
+    for symbol, leaf in parameters.items():
+        number = float(leaf.value)
+        bounds[symbol] = (number, number)
+    named: dict[Node, Symbol] = {}
+    for point, name in zip(points, arguments, strict=True):
+        bounds[point] = ranges[name]
+        named[point] = ARGUMENTS[name]
     reached = within(value, bounds)
     if reached is None:
         return None
-    named = {point: ARGUMENTS[name] for point, name in zip(points, arguments, strict=True)}
     return _Recorded(named, parameters, ARGUMENTS[quantity], reached)
 
 

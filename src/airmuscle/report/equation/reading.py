@@ -146,12 +146,17 @@ def _ranged(operation: Operation, *operands: Any) -> _Ranged:
 
 
 def _chosen(condition: _Ranged, x: _Ranged, y: _Ranged) -> _Ranged:
-    if condition.low == condition.high:
+    """x or y by a condition, which may have one possible value."""
+    is_decided = condition.low == condition.high
+    if is_decided:
         return x if condition.low else y
     node = _choice(condition.node, x.node, y.node)
-    if node.operation in (Operation.FMIN, Operation.FMAX):
+    is_extreme = node.operation in (Operation.FMIN, Operation.FMAX)
+    if is_extreme:
         return _ranged(node.operation, x, y)
-    return _Ranged(node, min(x.low, y.low), max(x.high, y.high))
+    low = min(x.low, y.low)
+    high = max(x.high, y.high)
+    return _Ranged(node, low, high)
 
 
 def _at_most(small: _Ranged, large: _Ranged) -> bool:
@@ -165,12 +170,14 @@ def _bounds(operation: Operation, sides: Sequence[Bounds]) -> Bounds:
     """The range of an operation from those of its arguments, which are taken as independent."""
     if not _is_monotone(operation, sides):
         return (-1.0, 1.0) if operation in (Operation.SIN, Operation.COS) else UNKNOWN
-    values = [value_of(operation, *ends) for ends in itertools.product(*sides)]
+    ends_of_all = [*itertools.product(*sides)]
+    (low, high), *further = sides
+    if low < 0 < high and operation in _LEAST_AT_ZERO:
+        ends_of_further = [end for end, _ in further]
+        ends_of_all.append((0.0, *ends_of_further))
+    values = [value_of(operation, *ends) for ends in ends_of_all]
     if any(map(math.isnan, values)):
         return UNKNOWN
-    low, high = sides[0]
-    if low < 0 < high and operation in _LEAST_AT_ZERO:
-        values.append(value_of(operation, 0.0, *(end for end, _ in sides[1:])))
     return min(values), max(values)
 
 
