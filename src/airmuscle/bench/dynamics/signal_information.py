@@ -74,36 +74,53 @@ def knowledge_of(
     fit, are known to a factor of three. Targets are those with a relative standard error above 50 %
     (all if there are none), or those of `determine`. Raises ParameterError for an unknown path.
     """
-    groups = [(paths,) if isinstance(paths, str) else tuple(paths) for paths in parameters]
-    fitted = len(groups)
-    used = {path for group in groups for path in group}
-    groups += [(path,) for path in _usual_paths(plant) if path not in used]
+    fitted = [(paths,) if isinstance(paths, str) else tuple(paths) for paths in parameters]
+    groups = _with_further_groups(plant, fitted, determine)
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
+    sizes = np.array([_size(leaves[group[0]]) for group in groups])
+    information = np.eye(len(groups)) / PRIOR**2
+    if covariance is not None and fitted:
+        part = slice(len(fitted))
+        scale = np.outer(sizes[part], sizes[part])
+        information[part, part] += _inverse(covariance / scale)
+    targets = _targets(groups, information, determine)
+    return ParameterKnowledge(tuple(groups), sizes, information, targets)
+
+
+def _with_further_groups(
+    plant: Plant, fitted: Sequence[tuple[str, ...]], determine: Sequence[str]
+) -> list[tuple[str, ...]]:
+    """The parameters of a fit with those that it did not contain. Raises ParameterError."""
+    groups = list(fitted)
     known = {path for group in groups for path in group}
-    for path in determine:
-        if path not in leaves:
-            raise ParameterError(
-                f"plan: the plant has no parameter {path!r}; it has {listed(sorted(known))}."
-            )
+    for path in (*_usual_paths(plant), *determine):
         if path not in known:
             groups.append((path,))
+            known.add(path)
+    existing = {leaf.path for leaf in tree.leaves(plant)}
+    unknown = sorted(known - existing)
+    if unknown:
+        usual = listed(_usual_paths(plant))
+        raise ParameterError(f"plan: the plant has no parameter {unknown[0]!r}; it has {usual}.")
     if not groups:
         raise ParameterError(
             "plan: the plant has no parameter to determine. Name one with --determine, or plan for"
             " the scenario that fit-regulator or fit-joint has written."
         )
-    sizes = np.array([_size(leaves[group[0]]) for group in groups])
-    information = np.eye(len(groups)) / PRIOR**2
-    if covariance is not None and fitted:
-        sizes[:fitted] = np.maximum(sizes[:fitted], 0.0)
-        scale = np.outer(sizes[:fitted], sizes[:fitted])
-        information[:fitted, :fitted] += _inverse(covariance / scale)
-    errors = np.sqrt(np.diag(np.linalg.inv(information)))
-    weak = tuple(np.flatnonzero(errors > MAX_RELATIVE_ERROR).tolist())
-    targets = weak or tuple(range(len(groups)))
+    return groups
+
+
+def _targets(
+    groups: Sequence[tuple[str, ...]], information: Array, determine: Sequence[str]
+) -> tuple[int, ...]:
+    """The parameters to determine: those that are named, or those known weakly, or all."""
     if determine:
-        targets = tuple(i for i, group in enumerate(groups) if set(group) & set(determine))
-    return ParameterKnowledge(tuple(groups), sizes, information, targets)
+        wanted = set(determine)
+        named = [bool(wanted.intersection(group)) for group in groups]
+        return tuple(np.flatnonzero(named).tolist())
+    variances = np.diag(np.linalg.inv(information))
+    weak = np.flatnonzero(np.sqrt(variances) > MAX_RELATIVE_ERROR)
+    return tuple(weak.tolist()) or tuple(range(len(groups)))
 
 
 def _usual_paths(plant: Plant) -> list[str]:

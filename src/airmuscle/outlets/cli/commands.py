@@ -117,6 +117,12 @@ COMMANDS = (
         "play", "play", "play_signals", "Play planned signals on a test rig and record them."
     ),
     CommandRow(
+        "watch",
+        "watch",
+        "watch",
+        "Read, check and identify the new files of a folder as they come.",
+    ),
+    CommandRow(
         "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
     ),
     CommandRow(
