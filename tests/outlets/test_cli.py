@@ -99,6 +99,7 @@ NAMES = (
     "body",
     "fit-out",
     "route",
+    "cam",
     "simulate",
     "study",
     "tune",

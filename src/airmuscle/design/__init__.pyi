@@ -41,6 +41,15 @@ from .body import sample_routes as sample_routes
 from .body import study_body as study_body
 from .body import sweep_routes as sweep_routes
 from .body import table_demand as table_demand
+from .cam import Cam as Cam
+from .cam import CamCurve as CamCurve
+from .cam import CamOutline as CamOutline
+from .cam import cam_csv as cam_csv
+from .cam import cam_dxf as cam_dxf
+from .cam import cam_svg as cam_svg
+from .cam import design_cam as design_cam
+from .cam import linear_curve as linear_curve
+from .cam import read_cam_curve as read_cam_curve
 from .control_comparison import STANDARD_TASKS as STANDARD_TASKS
 from .control_comparison import Commissioning as Commissioning
 from .control_comparison import ComparedLoop as ComparedLoop

@@ -1,0 +1,9 @@
+from .cam import Cam as Cam
+from .cam import CamCurve as CamCurve
+from .cam import CamOutline as CamOutline
+from .cam_files import cam_csv as cam_csv
+from .cam_files import cam_dxf as cam_dxf
+from .cam_files import cam_svg as cam_svg
+from .design_of_cam import design_cam as design_cam
+from .design_of_cam import linear_curve as linear_curve
+from .design_of_cam import read_cam_curve as read_cam_curve
