@@ -15,16 +15,20 @@ import pytest
 from bodies import arm, written
 from command_line import airmuscle
 
+from airmuscle import files
 from airmuscle.design import (
+    MotionOfRoute,
     Poses,
     SizingConditions,
     by_number,
     fit_out,
     read_body,
+    route_flow,
     sample_routes,
     study_body,
 )
 from airmuscle.outlets import fitted_body
+from airmuscle.physics import Valve
 from airmuscle.units import bar
 
 pytestmark = pytest.mark.tool
@@ -222,3 +226,78 @@ def test_plugins_have_the_torque_of_the_muscles_of_the_library(result, mujoco, t
                 length = data.ten_length[choice.sweep.route.index]
                 law = float(choice.muscle.force(pressure, choice.contraction_at(length)))
                 assert force == pytest.approx(max(law, 0.0), rel=1e-6, abs=1e-6)
+
+
+def motion_file(folder, period):
+    """A motion of the rod on its hinge: a sine of 15 degrees."""
+    time = np.linspace(0.0, period, 81)
+    angle = 15.0 * np.sin(2.0 * np.pi * time / period)
+    rows = "".join(f"{t:.9g},{q:.9g}\n" for t, q in zip(time, angle, strict=True))
+    path = folder / f"motion_{period:.4g}.csv"
+    path.write_text(f"time [s],arm [deg]\n{rows}", encoding="utf-8")
+    return path
+
+
+def test_the_flow_of_a_motion_is_the_change_of_the_air_of_the_muscles(mujoco, tmp_path):
+    """Slow motions of twice the speed have twice the flow; the air is p V/(R T) at the pressure
+    that gives the tension, and a valve of the stated conductance is just enough."""
+    body = read_body(written(tmp_path, arm()))
+    flows = {}
+    for period in (40.0, 80.0):
+        study = study_body(body, motion=motion_file(tmp_path, period))
+        fitted = fit_out(study, SUPPLY)
+        flows[period] = {flow.route: flow for flow in fitted.flows}
+        assert set(flows[period]) == {choice.name for choice in fitted.muscles}
+    for name, flow in flows[40.0].items():
+        assert flow.fill == pytest.approx(2.0 * flows[80.0][name].fill, rel=0.02)
+        assert flow.fill > 0.0
+        enough = Valve(flow.conductance, 0.3)
+        study = study_body(body, motion=motion_file(tmp_path, 40.0))
+        for valve, use in ((enough, 1.0), (Valve(0.5 * flow.conductance, 0.3), 2.0)):
+            compared = {item.route: item for item in fit_out(study, SUPPLY, valve=valve).flows}
+            assert compared[name].use == pytest.approx(use, rel=1e-6)
+    choice = next(item for item in fitted.muscles if item.muscle.entry.geometry is not None)
+    motion = MotionOfRoute(
+        np.array([0.0, 1.0, 2.0]),
+        np.array([1.0, 0.995, 0.99]) * choice.sweep.longest.length,
+        np.full(3, choice.count / choice.tackle * 100.0),
+    )
+    flow = route_flow(choice, motion, SUPPLY)
+    air = []
+    for contraction in choice.contraction_at(motion.length):
+        end = choice.muscle.end_point(float(contraction), 100.0)
+        volume = choice.muscle.entry.geometry.volume(float(contraction))
+        air.append((end.pressure + 1.0e5) * float(volume))
+    ambient = SUPPLY.ambient
+    steps = np.gradient(np.array(air) / (287.0 * ambient.temperature))
+    assert max(flow.fill, flow.discharge) == pytest.approx(np.abs(steps).max(), rel=0.02)
+
+
+def test_a_valve_that_is_too_small_for_a_motion_is_named(mujoco, tmp_path):
+    path = written(tmp_path, arm())
+    motion = motion_file(tmp_path, 0.2)
+    options = ("--supply", "6 bar", "--motion", motion, "--valve", "matrix-821")
+    answer = airmuscle("fit-out", path, *options, "--json")
+    assert answer.exit_code == 0, answer.output
+    chapter = json.loads(answer.stdout)["fit_out"]
+    small = [row["route"] for row in chapter["flows"] if row["part_of_the_valve"] > 1.0]
+    texts = " ".join(chapter["problems"])
+    for name in ("arm_flexor", "arm_extensor"):
+        assert (f"{name}: the motion demands" in texts) == (name in small)
+    assert small
+    assert "would serve" in texts
+
+
+def test_an_own_muscle_file_serves_as_a_muscle_of_the_library(mujoco, tmp_path):
+    source = Path(files.__file__).parent / "library" / "dmsp-20-300.toml"
+    own = tmp_path / "muscle.toml"
+    own.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
+    path = written(tmp_path, arm())
+    rows = []
+    for muscle in ("dmsp-20-300", own):
+        answer = airmuscle("fit-out", path, "--supply", "6 bar", "--muscle", muscle, "--json")
+        assert answer.exit_code == 0, answer.output
+        rows.append(json.loads(answer.stdout)["fit_out"]["muscles"])
+    for listed, read in zip(*rows, strict=True):
+        assert read["nominal_length"] == pytest.approx(listed["nominal_length"])
+        assert read["number"] == listed["number"]

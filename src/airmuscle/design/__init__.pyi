@@ -6,6 +6,7 @@ from .body import BodyStudy as BodyStudy
 from .body import Clearance as Clearance
 from .body import FitOut as FitOut
 from .body import FrontPoint as FrontPoint
+from .body import MotionOfRoute as MotionOfRoute
 from .body import MovedRoute as MovedRoute
 from .body import MovedRoutes as MovedRoutes
 from .body import MoveRequest as MoveRequest
@@ -13,6 +14,7 @@ from .body import PointMove as PointMove
 from .body import Poses as Poses
 from .body import RouteDemand as RouteDemand
 from .body import RouteFault as RouteFault
+from .body import RouteFlow as RouteFlow
 from .body import RouteMuscle as RouteMuscle
 from .body import RouteSamples as RouteSamples
 from .body import RouteSweep as RouteSweep
@@ -37,6 +39,7 @@ from .body import read_move as read_move
 from .body import read_moves as read_moves
 from .body import read_poses as read_poses
 from .body import resolved_moves as resolved_moves
+from .body import route_flow as route_flow
 from .body import sample_routes as sample_routes
 from .body import study_body as study_body
 from .body import sweep_routes as sweep_routes

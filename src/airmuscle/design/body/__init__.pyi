@@ -16,6 +16,9 @@ from .joints import BodyJoint as BodyJoint
 from .kinematics import Poses as Poses
 from .kinematics import RouteSamples as RouteSamples
 from .kinematics import sample_routes as sample_routes
+from .motion_flow import MotionOfRoute as MotionOfRoute
+from .motion_flow import RouteFlow as RouteFlow
+from .motion_flow import route_flow as route_flow
 from .moved_routes import FrontPoint as FrontPoint
 from .moved_routes import MovedRoute as MovedRoute
 from .moved_routes import MovedRoutes as MovedRoutes

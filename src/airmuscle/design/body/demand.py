@@ -31,12 +31,14 @@ class TorqueDemand(ShortRepr):
     poses   of all joints of routes (N, J)
     torque  torques [N m] of these joints, forces [N] of slides (N, J); nan where none is stated
     speed   speeds of the joints [rad/s or m/s] (N, J); None where the poses are at rest
+    time    instants [s] (N,) of a motion; None of other poses
     """
 
     name: str
     poses: Poses
     torque: Array
     speed: Array | None = None
+    time: Array | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -96,7 +98,7 @@ def motion_demand(body: Body, path: Path) -> TorqueDemand:
         forces = dynamics.torque(row, speeds[number], accelerations[number])
         torque[number] = forces @ projection[number]
     columns = [body.joints[name].speed for name in poses.joints]
-    return TorqueDemand(path.name, poses, torque, speeds[:, columns])
+    return TorqueDemand(path.name, poses, torque, speeds[:, columns], table.time)
 
 
 def table_demand(body: Body, path: Path) -> TorqueDemand:

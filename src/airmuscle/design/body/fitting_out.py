@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,16 @@ import numpy as np
 from ...bench.reported import Reported
 from ...core import Array, ParameterError, plotting
 from ...files.library import Entry
+from ...physics.pneumatics import Orifice
+from ...physics.pneumatics.gas import REFERENCE_DENSITY
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ..sizing import SizingConditions, catalogue
 from ..sizing.laws_of_product import LawOfProduct, coverage_of, sorted_laws
 from ..sizing.static_muscle import product_of
+from .body import BodyRoute
 from .demand import balance
 from .kinematics import sample_routes
+from .motion_flow import MotionOfRoute, RouteFlow, route_flow
 from .picture import body_figure
 from .route_muscle import (
     FITTING_DIAMETERS,
@@ -45,6 +49,8 @@ class FitOut(Reported):
     muscles     of the routes that are served
     unserved    the other routes, with what would serve them
     demands     lengths and demanded tensions of each route
+    flows       flows of air that the motions of the study demand; empty without a motion
+    valve       valve of each muscle with which they are compared; None without
     """
 
     study: BodyStudy
@@ -53,6 +59,8 @@ class FitOut(Reported):
     muscles: tuple[RouteMuscle, ...]
     unserved: tuple[UnservedRoute, ...]
     demands: Mapping[str, RouteDemand]
+    flows: tuple[RouteFlow, ...] = ()
+    valve: Orifice | None = None
 
     def check_served(self) -> None:
         """Raise SolveError if a route is not served, with what would serve it."""
@@ -79,12 +87,14 @@ class FitOut(Reported):
                 NamedValue("number of routes", len(body.routes)),
                 NamedValue("number of muscles", sum(choice.count for choice in self.muscles)),
             ),
-            tables=(*self._choice_tables(), *self._order_tables(), *self._unserved_tables()),
-            plots=tuple(plots),
-            problems=tuple(
-                f"{item.sweep.route.name}: no muscle serves it. {item.reason}."
-                for item in self.unserved
+            tables=(
+                *self._choice_tables(),
+                *self._order_tables(),
+                *self._flow_tables(),
+                *self._unserved_tables(),
             ),
+            plots=tuple(plots),
+            problems=tuple(self._problems()),
             notes=self._notes(),
             chosen=(
                 (
@@ -176,6 +186,45 @@ class FitOut(Reported):
         }
         return (Table("order", "Order list", columns, brief=len(items)),)
 
+    def _problems(self) -> Iterator[str]:
+        """Routes that are not served, and valves that are too small for a motion."""
+        for item in self.unserved:
+            yield f"{item.sweep.route.name}: no muscle serves it. {item.reason}."
+        for flow in self.flows:
+            if flow.use is not None and flow.use > 1.0:
+                yield (
+                    f"{flow.route}: the motion demands {flow.use:.3g} times the flow of the valve."
+                    f" A sonic conductance of {1e8 * flow.conductance:.3g} dm3/(s bar) for each"
+                    " muscle would serve, or a slower motion."
+                )
+
+    def _flow_tables(self) -> tuple[Table, ...]:
+        flows = self.flows
+        if not flows:
+            return ()
+        columns: dict[str, Any] = {
+            "route": [flow.route for flow in flows],
+            "muscles": [flow.count for flow in flows],
+            "greatest flow in": TableColumn(
+                [flow.volume_flow for flow in flows], "m3/s", "l/min", 3
+            ),
+            "greatest flow out": TableColumn(
+                [flow.discharge / REFERENCE_DENSITY for flow in flows], "m3/s", "l/min", 3
+            ),
+            "conductance": TableColumn(
+                [flow.conductance for flow in flows], "m3/(s Pa)", "dm3/(s bar)", 3
+            ),
+            "part of the valve": TableColumn([flow.use for flow in flows], "1", "%", 3),
+        }
+        total = sum(flow.count * flow.volume_flow for flow in flows)
+        note = (
+            "Of one muscle of each route, at the reference atmosphere (ANR); the air stays at the"
+            " temperature of the surroundings. Conductance: the least of a valve to the supply and"
+            " to the surroundings. All muscles that fill at once at their greatest flows would take"
+            f" {6e4 * total:.3g} l/min from the supply; the motion demands at most that."
+        )
+        return (Table("flows", "Flows that the motion demands", columns, note, brief=len(flows)),)
+
     def _unserved_tables(self) -> tuple[Table, ...]:
         if not self.unserved:
             return ()
@@ -192,6 +241,8 @@ def fit_out(
     muscles: Sequence[Entry] | None = None,
     criterion: Criterion = by_volume,
     progress: Callable[[float], None] = lambda fraction: None,
+    *,
+    valve: Orifice | None = None,
 ) -> FitOut:
     """The muscles of the routes of a body, each of least cost.
 
@@ -199,6 +250,7 @@ def fit_out(
     conditions  supply, factor on the demand, greatest number side by side
     muscles     library entries; by default those of the catalogue
     criterion   what is made least: by_volume, by_number, by_total_length
+    valve       valve of each muscle, with whose flow that of a motion is compared
 
     The demand contains the residual tension of the other muscles at the least working pressure; it
     is repeated with the muscles chosen before until the choice remains. Raises ParameterError.
@@ -235,7 +287,10 @@ def fit_out(
         for name, choice in chosen.items()
     )
     progress(1.0)
-    return FitOut(study, conditions, criterion, final, tuple(unserved.values()), demands)
+    flows = tuple(_flows(study, {item.name: item for item in final}, conditions, valve))
+    return FitOut(
+        study, conditions, criterion, final, tuple(unserved.values()), demands, flows, valve
+    )
 
 
 def _is_sufficient(
@@ -265,14 +320,7 @@ def laws_of_products(
 def _demands(study: BodyStudy, chosen: Mapping[str, RouteMuscle]) -> dict[str, RouteDemand]:
     """Lengths and demanded tensions of all routes, with the residual tensions of their muscles."""
     routes = study.body.routes
-
-    def floor(lengths: Array) -> Array:
-        floors = np.zeros(lengths.shape)
-        for column, route in enumerate(routes):
-            if route.name in chosen:
-                floors[:, column] = chosen[route.name].floor(lengths[:, column])
-        return floors
-
+    floor = _floor(routes, chosen)
     lengths: list[Array] = []
     tensions: list[Array] = []
     for item in study.balances:
@@ -284,6 +332,44 @@ def _demands(study: BodyStudy, chosen: Mapping[str, RouteMuscle]) -> dict[str, R
         route.name: RouteDemand(everywhere[:, column], needed[:, column])
         for column, route in enumerate(routes)
     }
+
+
+def _floor(
+    routes: Sequence[BodyRoute], chosen: Mapping[str, RouteMuscle]
+) -> Callable[[Array], Array]:
+    """The function from lengths (N, R) [m] to the residual tensions of the muscles [N]."""
+
+    def floor(lengths: Array) -> Array:
+        floors = np.zeros(lengths.shape)
+        for column, route in enumerate(routes):
+            if route.name in chosen:
+                floors[:, column] = chosen[route.name].floor(lengths[:, column])
+        return floors
+
+    return floor
+
+
+def _flows(
+    study: BodyStudy,
+    chosen: Mapping[str, RouteMuscle],
+    conditions: SizingConditions,
+    valve: Orifice | None,
+) -> Iterator[RouteFlow]:
+    """The flows of all routes whose muscles are chosen, in the motions of the study."""
+    routes = study.body.routes
+    for item in study.balances:
+        time = item.demand.time
+        if time is None:
+            continue
+        lengths = sample_routes(study.body, item.demand.poses).length
+        tensions = balance(study.body, item.demand, _floor(routes, chosen)).tension
+        for column, route in enumerate(routes):
+            if route.name not in chosen:
+                continue
+            motion = MotionOfRoute(time, lengths[:, column], tensions[:, column])
+            flow = route_flow(chosen[route.name], motion, conditions, valve)
+            if flow is not None:
+                yield flow
 
 
 def route_figure(choice: RouteMuscle, demand: RouteDemand) -> Any:

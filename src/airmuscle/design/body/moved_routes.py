@@ -4,7 +4,7 @@ number of muscles.
 
 import dataclasses
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -235,6 +235,7 @@ class MovedRoutes(Reported):
     def _route_table(self) -> Table:
         routes = self.routes
         befores = [route.before for route in routes]
+        answers = [route.after for route in routes]
         columns: dict[str, Any] = {
             "route": [route.name for route in routes],
             "number": [route.count for route in routes],
@@ -243,14 +244,10 @@ class MovedRoutes(Reported):
                 [route.after.choice.length for route in routes], "m", "mm"
             ),
             "tackle": [f"{route.tackle}:1" for route in routes],
-            "pressure": TableColumn([route.after.pressure for route in routes], "Pa", "bar", 3),
-            "deficit": TableColumn([route.after.deficit for route in routes], "1", "%", 3),
-            "pressure before": TableColumn(
-                [None if before is None else before.pressure for before in befores], "Pa", "bar", 3
-            ),
-            "deficit before": TableColumn(
-                [None if before is None else before.deficit for before in befores], "1", "%", 3
-            ),
+            "pressure": TableColumn([item.pressure for item in answers], "Pa", "bar", 3),
+            "deficit": TableColumn([item.deficit for item in answers], "1", "%", 3),
+            "pressure before": TableColumn(_of_each(befores, "pressure"), "Pa", "bar", 3),
+            "deficit before": TableColumn(_of_each(befores, "deficit"), "1", "%", 3),
             "contraction": TableColumn(
                 [route.after.choice.contraction for route in routes], "1", "%", 3
             ),
@@ -318,6 +315,11 @@ class MovedRoutes(Reported):
             declared[name] = TableColumn(columns[name], "N m")
         declared["moment arm"] = TableColumn(moment_arms, "m", "mm")
         return Table("curves", "Torques over the angles", declared, head=20)
+
+
+def _of_each(answers: Sequence[TorqueAnswer | None], name: str) -> list[float | None]:
+    """A quantity of answers; None where there is none."""
+    return [None if answer is None else float(getattr(answer, name)) for answer in answers]
 
 
 def curve_figure(body: Body, route: MovedRoute) -> Any:

@@ -85,9 +85,7 @@ def move_routes(
     check_limits(body)
     resolved = resolved_moves(body, moves)
     _check_demanded(body, curves, resolved)
-    demanded = tuple(
-        rows._replace(torque=factor * rows.torque) for rows in curves if np.any(rows.torque)
-    )
+    demanded = _loaded(curves, factor)
     entries = catalogue() if muscles is None else tuple(muscles)
     laws = laws_of_products(entries, conditions)
     chosen_laws = tuple(entries_of_product[0] for entries_of_product in laws.values())
@@ -116,6 +114,12 @@ def move_routes(
     return MovedRoutes(
         body, moved, conditions, factor, resolved, routes, tuple(_front(routes)), dict(refused)
     )
+
+
+def _loaded(curves: Sequence[TorqueRows], factor: float) -> tuple[TorqueRows, ...]:
+    """The curves that demand a torque, times the factor."""
+    loaded = [rows for rows in curves if np.any(rows.torque)]
+    return tuple(rows._replace(torque=factor * rows.torque) for rows in loaded)
 
 
 def moved_body(body: Body, sites: Mapping[str, Array]) -> Body:

@@ -205,7 +205,8 @@ def _draw_cam(axes: Any, cam: Cam, row: int) -> None:
     angle = float(cam.angle[row])
     closed = _turned(cam.outline.closed, angle)
     _draw_line(axes, np.append(closed, closed[:1], axis=0), plotting.BLACK)
-    wrapped = _turned(cam.outline.working[row:], angle)
+    touched = cam.outline.working[row:]
+    wrapped = _turned(touched, angle)
     end = wrapped[0] + _free_part(cam, row)
     cable = np.insert(wrapped, 0, end, axis=0)
     _draw_line(axes, cable, plotting.BLUE, linewidth=2.5)
@@ -229,11 +230,13 @@ def _turned(points: Array, angle: float) -> Array:
 
 def _free_part(cam: Cam, row: int) -> Array:
     """The shown part of the free cable [m] (2,), from the cam on."""
-    direction = cam.normal[row] + cam.angle[row] + 0.5 * np.pi
-    along = np.array([np.cos(direction), np.sin(direction)])
-    greatest = float(cam.arm.max())
-    reach = min(CABLE * greatest, 0.9 * cam.distance)
-    return np.asarray(reach * along)
+    normal = cam.normal[row] + cam.angle[row]
+    direction = normal + 0.5 * np.pi
+    cosine = np.cos(direction)
+    sine = np.sin(direction)
+    shown = CABLE * float(cam.arm.max())
+    reach = min(shown, 0.9 * cam.distance)
+    return np.array([reach * cosine, reach * sine])
 
 
 def _draw_line(axes: Any, points: Array, colour: str, **style: Any) -> None:

@@ -42,6 +42,7 @@ def fit_out_command(
     Examples:
       airmuscle fit-out leg.xml --supply "6 bar" --out leg
       airmuscle fit-out leg.xml --supply "6 bar" --motion walk.csv --least number
+          --valve matrix-821
     """
     if out is not None:
         check_writable(out)
@@ -53,6 +54,7 @@ def fit_out_command(
             request.entries(),
             request.least,  # type: ignore[arg-type]
             lambda fraction: show("muscles", fraction),
+            valve=request.orifice(),
         )
     files: dict[str, str | Callable[[Path], object]] = {}
     if out is not None and result.muscles:

@@ -15,7 +15,8 @@ from ...design.body.route_muscle import CRITERIA
 from ...design.body.torque_curve import read_curves
 from ...design.sizing import SizingConditions
 from ...engine.processes import Workers
-from ...files.library import Entry, load_law
+from ...files.library import Entry, load_law, load_valve
+from ...physics.pneumatics import Orifice
 from .declaration import RequestError, Where, many, option, optional, request
 from .reading import Pairs
 
@@ -120,6 +121,11 @@ class FitOutRequest:
         metavar="KEY",
     )
 
+    valve: str | None = optional(
+        "Valve of the library or a file, one for each muscle, with whose flow that of --motion is"
+        " compared.",
+        metavar="NAME",
+    )
     plugins: bool = optional(
         "Build MuJoCo plugins with the laws of the muscles, in DIR/plugins; needs a C compiler."
     )
@@ -127,6 +133,10 @@ class FitOutRequest:
     def conditions(self) -> SizingConditions:
         """The conditions of the choice. Raises ParameterError."""
         return SizingConditions(self.supply, self.safety, max_count=self.max_count)
+
+    def orifice(self) -> Orifice | None:
+        """The valve that is named; None without. Raises UnknownNameError and FileError."""
+        return None if self.valve is None else load_valve(self.valve).valve
 
     def entries(self) -> tuple[Entry, ...] | None:
         """The muscles that are named; None without. Raises UnknownNameError and FileError."""
