@@ -115,9 +115,10 @@ def _use(
     surroundings = conditions.ambient.pressure
     greatest = 0.0
     for demanded, pressure in zip(flow.tolist(), absolute.tolist(), strict=True):
-        ends = (supply, pressure) if demanded > 0.0 else (pressure, surroundings)
-        given = float(valve.mass_flow(*ends, 1.0, temperature))
         if abs(demanded) <= NO_FLOW:
             continue
+        upstream = supply if demanded > 0.0 else pressure
+        downstream = pressure if demanded > 0.0 else surroundings
+        given = float(valve.mass_flow(upstream, downstream, 1.0, temperature))
         greatest = max(greatest, abs(demanded) / given if given > 0.0 else np.inf)
     return greatest

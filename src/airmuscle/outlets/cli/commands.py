@@ -146,7 +146,9 @@ COMMANDS = (
         "route",
         "Move points of routes so that they meet torques over angles.",
     ),
-    CommandRow("cam", "cam", "cam", "Design a cam on which a muscle gives a torque over an angle."),
+    CommandRow(
+        "cam", "cam", "cam", "Design a cam on which a muscle gives a torque over the angle."
+    ),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),

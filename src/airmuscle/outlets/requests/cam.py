@@ -67,7 +67,8 @@ class CamRequest:
             return read_cam_curve(self.curve)
         assert self.torque is not None
         assert self.angle is not None
-        return linear_curve(*self.angle, self.torque, self.stiffness)
+        low, high = self.angle
+        return linear_curve(low, high, self.torque, self.stiffness)
 
     def cam(self, muscle: str) -> Cam:
         """The cam of a muscle. Raises FileError, ParameterError and SolveError."""
