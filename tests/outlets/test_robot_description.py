@@ -198,7 +198,12 @@ def test_of_stick_slip_the_constant_friction_is_written_and_the_rest_is_named(
     else:
         frictions = [each.get("friction") for each in root.iter("dynamics")]
     assert list(map(float, frictions)) == [0.4, 0.7]
-    assert [text.split()[-1] for text in written.left_out] == ["muscles", "bearing", "sliding"]
+    assert written.left_out == (
+        "the friction by the tensions of the muscles, at 100 N each: 0.4 N m (joint2.angle)",
+        "the friction by the load of a bearing, at 100 N: 2 N m (joint2.angle)",
+        "stiction above the friction in sliding: 0.2 N m (joint1.angle)",
+        "the deflection before sliding: 0.115 deg (joint1.angle), 0.115 deg (joint2.angle)",
+    )
     assert all(
         f"left out: {text}" in written.path.read_text(encoding="utf-8") for text in written.left_out
     )

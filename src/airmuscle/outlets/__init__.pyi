@@ -35,6 +35,7 @@ from .export import write_law as write_law
 from .export import write_mjcf as write_mjcf
 from .export import write_modelica as write_modelica
 from .export import write_mujoco_plugin as write_mujoco_plugin
+from .export import write_plant_module as write_plant_module
 from .export import write_program as write_program
 from .export import write_ssp as write_ssp
 from .export import write_urdf as write_urdf

@@ -318,8 +318,10 @@ def predict_episodes(
 
 def _further(arm: IdentifiedArm, episodes: Episodes, rows: int) -> Windows:
     """The windows of the longest horizon, of LONGEST rows where an episode holds them."""
-    longest = max(map(len, episodes.runs)) - HISTORY - 2
-    further = min(max(rows, LONGEST), longest)
-    needed = HISTORY + further + 2
-    runs = tuple(run for run in episodes.runs if len(run) >= needed)
-    return cut(dataclasses.replace(episodes, runs=runs), arm.delay, further)
+    before = HISTORY + 2
+    longest = max(len(run) for run in episodes.runs)
+    further = min(max(rows, LONGEST), longest - before)
+    needed = before + further
+    long_runs = tuple(run for run in episodes.runs if len(run) >= needed)
+    part = dataclasses.replace(episodes, runs=long_runs)
+    return cut(part, arm.delay, further)

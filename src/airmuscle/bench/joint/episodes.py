@@ -280,20 +280,33 @@ def start_of(arm: PressureDriven, windows: Windows) -> Mapping[str, Array]:
     """State of the arm (N,) at the start of every window: measured motion, settled bristles and
     pressures.
     """
-    mechanism = arm.mechanism
-    before = windows.angle[:, : HISTORY + 1]
     state = {variable.name: np.zeros(len(windows)) for variable in arm.states}
-    for j, coordinate in enumerate(mechanism.coordinates):
-        state[coordinate.name] = before[:, -1, j]
+    for j, coordinate in enumerate(arm.mechanism.coordinates):
+        state[coordinate.name] = windows.angle[:, HISTORY, j]
         state[coordinate.speed] = windows.speed[:, HISTORY, j]
-    if isinstance(mechanism, WithStickSlip):
-        for j, element in enumerate(mechanism.elements):
-            bristle = mechanism.inner_states[j]
-            state[bristle.name] = _bristle(before[:, :, j], element.presliding_angle)
-    for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
-        readings = windows.pressure[:, : HISTORY + 1, i]
-        state[f"{prefix}pressure"] = lagged(readings, lag, windows.sample_time)
-    return state
+    if isinstance(arm.mechanism, WithStickSlip):
+        state |= _settled_bristles(arm.mechanism, windows)
+    return state | _settled_pressures(arm, windows)
+
+
+def _settled_pressures(arm: PressureDriven, windows: Windows) -> dict[str, Array]:
+    """Pressures (N,) behind the readings before every window."""
+    readings = windows.pressure[:, : HISTORY + 1]
+    columns = readings.transpose(2, 0, 1)
+    settled = {}
+    for prefix, lag, column in zip(arm.prefixes, arm.lags, columns, strict=True):
+        settled[f"{prefix}pressure"] = lagged(column, lag, windows.sample_time)
+    return settled
+
+
+def _settled_bristles(mechanism: WithStickSlip, windows: Windows) -> dict[str, Array]:
+    """Deflections (N,) of the bristles after the rows before every window."""
+    before = windows.angle[:, : HISTORY + 1]
+    settled = {}
+    for j, element in enumerate(mechanism.elements):
+        bristle = mechanism.inner_states[j]
+        settled[bristle.name] = _bristle(before[:, :, j], element.presliding_angle)
+    return settled
 
 
 def _bristle(angle: Array, presliding: float) -> Array:

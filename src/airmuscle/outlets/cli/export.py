@@ -9,7 +9,7 @@ from ...core import check_writable
 from ...engine.run.batch.lanes import Precision
 from ...files import list_plants
 from ...files.library import load_law, read_toml
-from ...files.scenario.scenario import load_scenario
+from ...files.scenario.scenario import Scenario, load_scenario
 from .. import export as outlet
 from ..export import PRECISIONS, OnnxStack, Stack, TorchStack, WarpStack
 from ..export.compiler import PLATFORMS, PROCESSORS, Processor, build_and_run, find_platform
@@ -56,7 +56,11 @@ class ExportRequest:
         "Binaries of an FMU for a platform, by the package ziglang; repeatable:"
         f" {', '.join(PLATFORMS)}. Default: this machine.",
     )
-    muscle: str = option("One muscle of the plant; --to mujoco, torch, warp, onnx.", default="")
+    muscle: str = option(
+        "One muscle of the plant; --to mujoco, torch, warp, onnx. Without it the last three get a"
+        " plant of several muscles as a whole.",
+        default="",
+    )
     precision: Precision = option(
         "Type of the numbers of a controller.",
         choices=PRECISIONS,
@@ -136,6 +140,7 @@ def export(
           fill_m
       airmuscle export dmsp-20-300 --law --to js --out law_js
       airmuscle export dmsp-20-300 --to torch --out actuator
+      airmuscle export joint-dmsp-20-regulators --to torch --out arm
       airmuscle export joint-dmsp-20-matrix --to mjcf --out robot
       airmuscle export examples/pressure_loop.toml --to c --out loop_c
       airmuscle export examples/pressure_loop.toml --controller --to c --out controller
@@ -245,11 +250,16 @@ def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
 
 
 def _export_actuator(source: str, out: Path, request: ExportRequest) -> Exported:
-    """The batched actuator of a muscle of a plant, or of a muscle behind a pressure regulator."""
+    """A plant of several muscles as a batched module, or the batched actuator of one muscle of a
+    plant or of a muscle behind a pressure regulator.
+    """
     file = Path(source)
     stack = STACKS[request.to]
     if source in list_plants() if not file.exists() else "plant" in read_toml(file):
-        plant = load_scenario(source).plant
+        scenario = load_scenario(source)
+        plant = scenario.plant
+        if len(plant.muscles) > 1 and not request.muscle:
+            return Exported(_written_plant(scenario, out, stack, request.name))
         return Exported(
             outlet.write_actuator(plant, out, stack, name=request.name, muscle=request.muscle)
         )
@@ -261,6 +271,24 @@ def _export_actuator(source: str, out: Path, request: ExportRequest) -> Exported
     }
     return Exported(
         outlet.write_actuator(outlet.regulated_plant(entry.muscle), out, stack, **about)
+    )
+
+
+def _written_plant(scenario: Scenario, out: Path, stack: Stack, name: str) -> Sequence[Path]:
+    """The batched module of a whole plant, at pressures such as those at its start."""
+    state = scenario.initial_state
+    outputs = scenario.plant.outputs(state, dict.fromkeys(scenario.plant.inputs, 0.0))
+    values = {**outputs, **state}
+    pressures = [float(values[f"{prefix}pressure"]) for prefix in scenario.plant.prefixes]
+    highest = max(pressures)
+    return outlet.write_plant_module(
+        scenario.plant,
+        out,
+        stack,
+        name=name,
+        title=scenario.title,
+        pressure=highest if highest > 0.0 else None,
+        uncertainty=scenario.uncertainty,
     )
 
 

@@ -16,6 +16,7 @@ from .learning import write_actuator as write_actuator
 from .modelica import write_modelica as write_modelica
 from .mujoco_plugin import MuscleActuator as MuscleActuator
 from .mujoco_plugin import write_mujoco_plugin as write_mujoco_plugin
+from .plant_module import write_plant_module as write_plant_module
 from .robot_description import WrittenRobot as WrittenRobot
 from .robot_description import write_mjcf as write_mjcf
 from .robot_description import write_urdf as write_urdf

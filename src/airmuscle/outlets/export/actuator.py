@@ -218,7 +218,10 @@ def single_muscle(plant: Plant, muscle: str) -> Plant:
             " and cannot be separate actuators; give each muscle a circuit of its own."
         )
     if muscle not in names:
-        raise ParameterError(f"choose one of the muscles {', '.join(names)}; given: '{muscle}'.")
+        raise ParameterError(
+            f'choose one of the muscles {", ".join(names)}, such as muscle="{names[0]}" (--muscle'
+            f" {names[0]}); given: '{muscle}'."
+        )
     k = names.index(muscle)
     return dataclasses.replace(
         plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad()

@@ -11,135 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ...core import AirmuscleError, Array, Leaf, ParameterError
-from ...engine.compile.ir import emission
+from ...core import Array, Leaf, ParameterError
 from ...engine.compile.ir.emission import TargetLanguage
-from ...engine.compile.ir.instructions import instructions
-from ...engine.compile.onnx_graph import GraphBody
 from ...engine.compile.text.languages import TorchLanguage, WarpLanguage
 from ...engine.run.batch import Double, Precision, Single
 from ...files import load_scenario
 from ...files.library.uncertainty import ParameterUncertainty
 from ...physics import ExternalLoad, Muscle, Plant
 from .actuator import ActuatorModel, actuator_model, control_range
-from .identifiers import filled, line_comment, program_name, provenance
+from .identifiers import filled, line_comment, program_name, provenance, template
+from .onnx_model import NEXT_STATE, Graph, OnnxInterface, onnx_files
 from .write import write_files
-
-OPSET = 17
-IR_VERSION = 8
-"""Versions of the operators and of the format: ONNX Runtime reads them from 1.12 on."""
-
-
-class _Graph(GraphBody):
-    """The nodes of a model; its arrays are the states and the parameters."""
-
-    def __init__(self) -> None:
-        super().__init__({"x": "state", "p": "parameters"})
-        self.scalars = frozenset({"h"})
-
-    def append(
-        self,
-        inputs: Mapping[str, Any],
-        result: Any,
-        rows: Mapping[str, dict[int, str]],
-        output: str,
-    ) -> None:
-        """Append a function of arrays, of which `rows` has the tensors of single elements."""
-        self.results |= {array: dict(elements) for array, elements in rows.items()}
-        values = emission.computed(
-            self, instructions(list(inputs.values()), [result]), list(inputs)
-        )
-        self.results[output] = {index: value for (_, index), value in values.items()}
-
-
-def _model(
-    onnx: Any,
-    graph: _Graph,
-    model: ActuatorModel,
-    single: bool,
-    tunable: bool,
-    inputs: Sequence[str],
-    arrays: Mapping[str, str],
-    rows: Mapping[str, str],
-) -> Any:
-    """A model whose inputs are rows (count,), the states (n, count), and numbers."""
-    helper = onnx.helper
-    kind = onnx.TensorProto.FLOAT if single else onnx.TensorProto.DOUBLE
-    number = np.float32 if single else np.float64
-    shapes = {"state": (len(model.part.states), "count"), "dt": ()}
-    nodes = [
-        helper.make_node(operator, list(operands), [result])
-        for operator, operands, result in graph.nodes
-    ]
-    row = next(name for name in inputs if name not in shapes)
-    nodes.append(helper.make_node("Shape", [row], ["count"]))
-    outputs = []
-    for name, value in rows.items():
-        nodes.append(helper.make_node("Expand", [value, "count"], [name]))
-        of_row = onnx.TensorProto.BOOL if name == "valid" else kind
-        outputs.append(helper.make_tensor_value_info(name, of_row, ("count",)))
-    for name, array in arrays.items():
-        elements = [graph.results[array][i] for i in sorted(graph.results[array])]
-        for i, value in enumerate(elements):
-            nodes.append(helper.make_node("Expand", [value, "count"], [f"{name}_row{i}"]))
-            nodes.append(
-                helper.make_node(
-                    "Unsqueeze", [f"{name}_row{i}", "first_axis"], [f"{name}_table{i}"]
-                )
-            )
-        nodes.append(
-            helper.make_node(
-                "Concat", [f"{name}_table{i}" for i in range(len(elements))], [name], axis=0
-            )
-        )
-        outputs.append(helper.make_tensor_value_info(name, kind, (len(elements), "count")))
-    constants: dict[str, Any] = {
-        key: np.int64(value) if key[0] == "i" else number(value)
-        for key, value in graph.constants.items()
-    }
-    defaults = np.array([float(leaf.value) for leaf in model.parameters], number)[:, None]
-    constants |= {
-        "first_axis": np.zeros(1, np.int64),
-        **({} if tunable else {"parameters": defaults}),
-    }
-    inputs_of_graph = [
-        helper.make_tensor_value_info(name, kind, shapes.get(name, ("count",))) for name in inputs
-    ]
-    if tunable:
-        inputs_of_graph.append(
-            helper.make_tensor_value_info("parameters", kind, (len(defaults), "width"))
-        )
-    stored = [
-        onnx.numpy_helper.from_array(np.asarray(value), name) for name, value in constants.items()
-    ]
-    graph_proto = helper.make_graph(nodes, "actuator", inputs_of_graph, outputs, stored)
-    opset = [helper.make_opsetid("", OPSET)]
-    made = helper.make_model(
-        graph_proto, opset_imports=opset, ir_version=IR_VERSION, producer_name="airmuscle"
-    )
-    onnx.checker.check_model(made)
-    return made
-
-
-def _of_permitted(
-    graph: _Graph, parameters: Sequence[Leaf], rows: Mapping[str, str]
-) -> dict[str, str]:
-    """Rows that are invalid, and NaN, where a parameter is beyond its bounds."""
-    permitted = ""
-    for i, leaf in enumerate(parameters):
-        value = graph.load("p", i)
-        low, high = leaf.declared.bounds
-        for operator, bound in (("GreaterOrEqual", low), ("LessOrEqual", high)):
-            within = graph.node(operator, value, graph.constant(float(bound)))
-            permitted = graph.node("And", permitted, within) if permitted else within
-    missing = graph.constant(float("nan"))
-    numbers = {
-        name: graph.node("Where", permitted, value, missing)
-        for name, value in rows.items()
-        if name != "valid"
-    }
-    return {**numbers, "valid": graph.node("And", rows["valid"], permitted)}
-
 
 NOTE = (
     "The functions are those of the model. The command is held and the length moves at its speed"
@@ -173,14 +55,10 @@ class ExportedActuator:
         command = f"{controls[0].name}: {controls[0].meaning}" if controls else "without effect"
         if len(controls) == 2:
             command = f"{controls[0].name} where positive, {controls[1].name} where negative"
-        bounds = np.array([leaf.declared.bounds for leaf in model.parameters], dtype=float).reshape(
-            -1, 2
+        places = more | parameter_places(
+            self.name, self.title, self.provenance, model.parameters, self.identified, self.root
         )
-        places = more | {
-            "provenance": line_comment(self.provenance).replace("%", "#"),
-            "title": self.title,
-            "class": "".join(word[:1].upper() + word[1:] for word in self.name.split("_")),
-            "file": self.name,
+        places |= {
             "functions": functions,
             "held": str(max(held_count, 1)),
             "unit": controls[0].unit if controls else "1",
@@ -189,13 +67,7 @@ class ExportedActuator:
             "low": repr(float(low)),
             "high": repr(float(high)),
             "step": repr(float(model.step)),
-            "states": _tuple(s.name for s in model.part.states),
-            "parameters": _tuple(leaf.path for leaf in model.parameters),
-            "defaults": _tuple(float(leaf.value) for leaf in model.parameters),
-            "lower": _tuple(bounds[:, 0].tolist()),
-            "upper": _tuple(bounds[:, 1].tolist()),
-            "identified": _tuple(self.identified),
-            "spread": _tuple(tuple(row) for row in self.root.tolist()),
+            "states": tuple_text(s.name for s in model.part.states),
         }
         return {
             f"{self.name}{end}.py": filled(f"{stack}_actuator.pyt", places, self.name)
@@ -215,10 +87,19 @@ class Stack(abc.ABC):
 class TorchStack(Stack):
     """A module of PyTorch, with adapters for mjlab and Isaac Lab."""
 
+    @property
+    def language(self) -> TorchLanguage:
+        """The language of its functions."""
+        return TorchLanguage()
+
+    @property
+    def places(self) -> dict[str, str]:
+        """Values of places of its templates that are common to all modules."""
+        return {"parameter_methods": template("torch_parameters.pyt")}
+
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
-        return actuator.files(
-            TorchLanguage(), {"": "torch", "_mjlab": "mjlab", "_isaaclab": "isaaclab"}
-        )
+        templates = {"": "torch", "_mjlab": "mjlab", "_isaaclab": "isaaclab"}
+        return actuator.files(self.language, templates, **self.places)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -227,9 +108,23 @@ class WarpStack(Stack):
 
     precision: Precision = Single()
 
+    @property
+    def language(self) -> WarpLanguage:
+        """The language of its functions."""
+        return WarpLanguage()
+
+    @property
+    def places(self) -> dict[str, str]:
+        """Values of places of its templates that are common to all modules."""
+        return {
+            "real": "wp.float32" if self.precision == Single() else "wp.float64",
+            "parameter_methods": template("warp_parameters.pyt"),
+            "own_functions": template("warp_functions.pyt").rstrip("\n"),
+        }
+
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
-        number = "wp.float32" if self.precision == Single() else "wp.float64"
-        return actuator.files(WarpLanguage(), {"_warp": "warp", "_newton": "newton"}, real=number)
+        templates = {"_warp": "warp", "_newton": "newton"}
+        return actuator.files(self.language, templates, **self.places)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -248,17 +143,11 @@ class OnnxStack(Stack):
         """
         name = actuator.name
         model = actuator.model
-        single = self.precision == Single()
-        try:
-            import onnx
-        except ImportError:
-            raise AirmuscleError(
-                "an ONNX graph needs the package 'onnx'; pip install airmuscle[learning]."
-            ) from None
-        start = _Graph()
+        arrays = {"x": "state", "p": "parameters"}
+        start = Graph(arrays)
         begun = ("pressure", "length")
         start.append(*model.start, {"q": dict(enumerate(begun))}, "x")
-        step = _Graph()
+        step = Graph(arrays)
         driven = ("command", "length", "speed")
         rows = dict(enumerate(driven))
         step.append(*model.observe, {"z": rows}, "o")
@@ -271,9 +160,6 @@ class OnnxStack(Stack):
         observed = step.results["o"]
         valid = step.node("Greater", observed[2], step.constant(0.5))
         rows_out = {"tension": observed[0], "pressure": observed[1], "valid": valid}
-        if self.tunable:
-            rows_out = _of_permitted(step, model.parameters, rows_out)
-        stepped = ("state", *driven, "dt")
         low, high = control_range(model.controls)
         facts = {
             "title": actuator.title,
@@ -283,17 +169,16 @@ class OnnxStack(Stack):
             "states": ", ".join(s.name for s in model.part.states),
             "parameters": ", ".join(leaf.path for leaf in model.parameters),
         }
-        models = {
-            f"{name}_start.onnx": _model(
-                onnx, start, model, single, self.tunable, begun, {"state": "x"}, {}
+        each = dict.fromkeys((*begun, *driven), ("count",))
+        stepped: dict[str, tuple[Any, ...]] = {"state": (len(model.part.states), "count")}
+        stepped |= {name: each[name] for name in driven} | {"dt": ()}
+        interfaces = {
+            f"{name}_start.onnx": OnnxInterface(
+                start, {name: each[name] for name in begun}, {"state": "x"}, {}
             ),
-            f"{name}.onnx": _model(
-                onnx, step, model, single, self.tunable, stepped, {"next_state": "x"}, rows_out
-            ),
+            f"{name}.onnx": OnnxInterface(step, stepped, {NEXT_STATE: "x"}, rows_out),
         }
-        for model_proto in models.values():
-            onnx.helper.set_model_props(model_proto, facts)
-        return {file: model_proto.SerializeToString() for file, model_proto in models.items()}
+        return onnx_files(interfaces, model.parameters, self.precision, self.tunable, facts)
 
 
 def write_actuator(
@@ -353,6 +238,32 @@ def regulated_plant(muscle: Muscle) -> Plant:
     return Plant(muscle, load_scenario("vessel-smc-itv2050").plant.circuit, ExternalLoad())
 
 
-def _tuple(values: Any) -> str:
+def parameter_places(
+    name: str,
+    title: str,
+    lines: Sequence[str],
+    parameters: Sequence[Leaf],
+    identified: Sequence[str],
+    root: Array,
+) -> dict[str, str]:
+    """Values of the places of a template that state a program, its parameters and their
+    covariance.
+    """
+    bounds = np.array([leaf.declared.bounds for leaf in parameters], dtype=float).reshape(-1, 2)
+    return {
+        "provenance": line_comment(lines).replace("%", "#"),
+        "title": title,
+        "class": "".join(word[:1].upper() + word[1:] for word in name.split("_")),
+        "file": name,
+        "parameters": tuple_text(leaf.path for leaf in parameters),
+        "defaults": tuple_text(float(leaf.value) for leaf in parameters),
+        "lower": tuple_text(bounds[:, 0].tolist()),
+        "upper": tuple_text(bounds[:, 1].tolist()),
+        "identified": tuple_text(identified),
+        "spread": tuple_text(tuple(row) for row in root.tolist()),
+    }
+
+
+def tuple_text(values: Any) -> str:
     """A tuple as text of Python."""
     return re.sub(r"-?\binf\b", lambda match: f'float("{match[0]}")', repr(tuple(values)))

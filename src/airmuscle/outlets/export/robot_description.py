@@ -26,6 +26,10 @@ from .identifiers import program_name, provenance
 from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin
 from .write import write_files
 
+LOAD = 100.0
+"""Tension of a muscle and load of a bearing [N] at which the friction that they cause is stated
+(chosen).
+"""
 LEAST = 1e-9
 """Mass [kg] and moment of inertia [kg m2] that stand for zero, which simulators refuse (chosen)."""
 
@@ -134,21 +138,36 @@ def _spatial_model(mechanism: SerialArm) -> RobotModel:
 def _stick_slip_model(mechanism: WithStickSlip) -> RobotModel:
     inner = robot_model(mechanism.inner)
     elements = mechanism.elements
-    shares = {
-        "the friction by the tensions of the muscles": any(
-            any(element.load_arms) for element in elements
-        ),
-        "the friction by the load of a bearing": any(
-            any(element.bearing_arms) for element in elements
-        ),
-        "stiction above the friction in sliding": any(
-            element.static_excess for element in elements
-        ),
-        "the residual law": mechanism.residual is not None,
+    sizes = {
+        f"the friction by the tensions of the muscles, at {LOAD:g} N each": [
+            (LOAD * sum(element.load_arms), "N m") for element in elements
+        ],
+        f"the friction by the load of a bearing, at {LOAD:g} N": [
+            (LOAD * sum(element.bearing_arms), "N m") for element in elements
+        ],
+        "stiction above the friction in sliding": [
+            (element.static_excess * element.coulomb_torque, "N m") for element in elements
+        ],
+        "the deflection before sliding": [
+            (math.degrees(element.presliding_angle), "deg") for element in elements
+        ],
     }
-    left_out = tuple(text for text, has in shares.items() if has)
+    left_out = []
+    for text, of_joints in sizes.items():
+        stated = [
+            f"{size:.3g} {unit} ({joint})"
+            for joint, (size, unit) in zip(inner.joints, of_joints, strict=True)
+            if size
+        ]
+        if stated:
+            left_out.append(f"{text}: {', '.join(stated)}")
+    if mechanism.residual is not None:
+        energy = max(map(abs, mechanism.residual.energies), default=0.0)
+        left_out.append(f"the residual law, of up to {energy:.3g} J for each centre")
     return dataclasses.replace(
-        inner, frictions=[element.coulomb_torque for element in elements], left_out=left_out
+        inner,
+        frictions=[element.coulomb_torque for element in elements],
+        left_out=tuple(left_out),
     )
 
 
