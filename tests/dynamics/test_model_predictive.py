@@ -6,6 +6,7 @@ is kept, and a program without solution is stated.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import pickle
 from dataclasses import replace
@@ -14,9 +15,9 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.control import design_predictive
+from airmuscle.control import design_lqg, design_predictive, linearise_loop
 from airmuscle.control.estimation.lqg_and_adrc import regulator
-from airmuscle.engine import ControlLoop, Measurement
+from airmuscle.engine import ControlLoop, Measurement, Problem, Schedule, solve
 from airmuscle.errors import ParameterError
 from airmuscle.physics import linearise
 
@@ -396,3 +397,64 @@ def test_bounded_disturbances_that_leave_no_room_are_refused():
         law(limits={"angle": (-0.1, 0.1)}, bounded={"angular_speed": 500.0})
     with pytest.raises(ParameterError, match="max_rate names 'left'"):
         law(max_rate={"left": 1.0})
+
+
+# Margins, while no limit acts
+
+
+def feedback_with_disturbances():
+    """The state feedback of the same weights, with the same observer of disturbances."""
+    return design_lqg(AT, H, **GIVEN)
+
+
+def test_margins_of_predictive_control_are_those_of_its_state_feedback():
+    """The linear law while no limit acts, against the law that is linearised by its slopes.
+
+    Opened at the angle: of the two pressures, which one set point leaves free, both designs choose
+    the smallest in other units.
+    """
+    setpoint = Schedule({"angle": ((0.0, 0.0),)})
+    inputs = {"left.setpoint": SETPOINT, "right.setpoint": SETPOINT}
+    predictive, feedback = (
+        linearise_loop(REGULATED, ControlLoop(controller, H, setpoint), {**REST}, inputs)
+        for controller in (law(), feedback_with_disturbances())
+    )
+    assert predictive.is_stable
+    assert np.abs(predictive.poles).max() == pytest.approx(np.abs(feedback.poles).max(), rel=1e-6)
+    ours, theirs = (loop.margins("angle") for loop in (predictive, feedback))
+    assert 1.0 < ours.gain < 3.0
+    assert dataclasses.astuple(ours) == pytest.approx(dataclasses.astuple(theirs), rel=1e-5)
+
+
+def test_the_linear_law_is_what_predictive_control_commands_without_an_active_limit():
+    """Sample by sample, from any readings that reach no limit."""
+    judged = law()
+    linear = judged.linear_law()
+    rng = np.random.default_rng(4)
+    memory = judged.init()
+    state = np.zeros(len(linear.memory))
+    operating = judged.model.measured
+    for _ in range(20):
+        reading = operating + rng.normal(size=3) * [100.0, 100.0, 1e-4]
+        wanted = 1e-4 * rng.normal()
+        pressures = tuple(reading[:2])
+        told, memory = judged.step(memory, measurement(reading[2], wanted, -1e9, 1e9, pressures), H)
+        deviation = reading - operating
+        point = np.array([wanted]) - judged.model.controlled
+        expected = linear.C @ state + linear.D @ deviation + linear.F @ point
+        state = linear.A @ state + linear.B @ deviation + linear.E @ point
+        commands = np.array(list(told.values())) - SETPOINT
+        assert commands == pytest.approx(expected, abs=1e-9 * SETPOINT)
+
+
+def test_where_a_limit_acts_predictive_control_is_not_linearised():
+    """A run that ends with the command at its limit; without its memory the linear law is."""
+    wide = Schedule({"angle": ((0.0, 20.0),)})
+    loop = ControlLoop(law(), H, wide)
+    solution = solve(Problem(REGULATED, loop, 0.05, REST))
+    inputs = {"left.setpoint": SETPOINT, "right.setpoint": SETPOINT}
+    assert np.any(solution.control_state.controller.active)
+    with pytest.raises(ParameterError, match="limits of LinearModelPredictive act") as refusal:
+        linearise_loop(REGULATED, loop, {**REST}, inputs, control_state=solution.control_state)
+    assert "or none" in str(refusal.value)
+    assert linearise_loop(REGULATED, loop, {**REST}, inputs).is_stable

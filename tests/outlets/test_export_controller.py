@@ -42,7 +42,7 @@ from airmuscle.engine import (
 from airmuscle.engine.run import prepare_loop
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
-from airmuscle.outlets.export import write
+from airmuscle.outlets.export import printed_predictive
 from airmuscle.outlets.export.compiler import COMPILER, EMULATOR, PROCESSORS, build_and_run
 from airmuscle.outlets.export.printed_controller import print_controller
 from airmuscle.physics import linearise
@@ -296,7 +296,27 @@ def test_a_predictive_controller_in_c_gives_the_commands_of_python(tmp_path):
             r"50 samples, 0 commands differ by more than 1e-09 of their range", done.stdout
         )
     source = (tmp_path / "law.c").read_text()
+    tables = re.findall(r"^static (.*?)(?:double|int) law_\w+\[", source, re.MULTILINE)
+    assert len(tables) > 15
+    assert set(tables) == {"const "}, "a table that takes memory of a microcontroller"
     assert not re.search(r"\b(malloc|calloc|realloc|free\(|goto|while)\b", source.split("*/", 1)[1])
+
+
+def test_the_header_of_a_predictive_controller_states_its_design(tmp_path):
+    """Horizon, weights, limits, noise, model and operating point of the scenario."""
+    write_controller(predictive_problem(), tmp_path, name="law")
+    header = " ".join((tmp_path / "law.h").read_text().replace("*", " ").split())
+    for text in (
+        "Horizon: 15 samples of 0.01 s; inputs are held over 1, 2, 4, 8 samples",
+        "states air_mass, position, speed; disturbances of the rates of air_mass",
+        "Operating point, inputs (SI): fill 0.05, discharge 0.05",
+        "(weight 1/d^2) (SI): position 0.001, speed 0.1, fill 0.1, discharge 0.1",
+        "Process noise, deviation after 1 s (SI): air_mass 1e-06",
+        "Measurement noise (SI): position 0.0001",
+        "Greatest rates of inputs, over 1 s (SI): fill 20",
+        "Limits of columns (SI): pressure 100000 to 220000, weight of a violation 10000",
+    ):
+        assert text in header, text
 
 
 def test_a_predictive_controller_in_c_counts_samples_without_a_solution(tmp_path):
@@ -339,7 +359,7 @@ def test_a_predictive_controller_in_single_precision_stays_within_the_stated_tol
 
 def test_tolerances_of_doubles_do_not_suit_a_predictive_controller_of_floats(tmp_path, monkeypatch):
     """The export runs the program in single precision, and refuses one whose commands differ."""
-    monkeypatch.setattr(write, "SINGLE_TOLERANCES", (1e-9, 1e-12, 1e-12, 1e-9))
+    monkeypatch.setattr(printed_predictive, "SINGLE_TOLERANCES", (1e-9, 1e-12, 1e-12, 1e-9))
     with pytest.raises(
         ParameterError, match="LinearModelPredictive in single precision: the command '"
     ):
@@ -365,8 +385,8 @@ def test_what_cannot_be_printed_is_refused_by_name(tmp_path):
     with pytest.raises(
         ParameterError,
         match=(
-            "Called is a controller in Python and cannot be exported here; of predictive"
-            " control the"
+            r"Called is a controller in Python and has no printed form\. Derive a law of your own"
+            " from ControlLaw"
         ),
     ):
         write_controller(problem_of(Called(PRESSURE)), tmp_path)

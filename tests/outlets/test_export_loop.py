@@ -29,6 +29,7 @@ from airmuscle.engine import (
     solve,
 )
 from airmuscle.errors import ParameterError
+from airmuscle.files import load_scenario
 from airmuscle.outlets import C99, JavaScript, Octave, write_program
 
 STEP = Schedule({"pressure": ((0.0, 1e5), (0.1, 3e5))})
@@ -43,6 +44,9 @@ SENSED = (
 )
 FILL = PID("pressure", "fill", gain=1e-5)
 LEAK = SampledSignal({"discharge": ((0.0, 0.0), (0.033, 0.2), (0.04, 0.0), (0.3, 0.1))})
+SCENARIO = Path(__file__).resolve().parents[2] / "examples" / "predictive_lift.toml"
+PREDICTIVE = dataclasses.replace(load_scenario(SCENARIO).problem, duration=0.4)
+"""A declaration of predictive control, whose limits act within the run."""
 CASES = {
     "held commands, and an end between two samples": Problem(
         LIFT, ControlLoop(PRESSURE, 0.02, RAMP), 0.31, START
@@ -85,6 +89,7 @@ CASES = {
         0.3,
         START,
     ),
+    "predictive control": PREDICTIVE,
     "sensors with noise": Problem(
         LIFT,
         ControlLoop(
@@ -96,7 +101,7 @@ CASES = {
         START,
     ),
 }
-SOME = list(CASES)[:3]
+SOME = [*list(CASES)[:3], "predictive control"]
 
 
 def run_c(folder, *options):
@@ -266,7 +271,7 @@ def of_loop(controller=PRESSURE, **changes):
             of_loop(Called(PRESSURE)),
             C99(),
             {},
-            "Called is a controller in Python and cannot be exported here; of predictive",
+            "Called is a controller in Python and has no printed form. Derive a law of your own",
         ),
         (
             of_loop(drivers={"fill": Slow()}),

@@ -16,7 +16,7 @@ import pytest
 from command_line import airmuscle
 from control_plants import LIFT, PRESSURE, SPLIT
 
-from airmuscle.control import PID, Cascade, OnOffController, SuperTwisting
+from airmuscle.control import PID, Cascade, OnOffController, SuperTwisting, design_predictive
 from airmuscle.engine import (
     PWM,
     ColumnSensor,
@@ -29,6 +29,7 @@ from airmuscle.engine import (
 )
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_controller_fmu, write_ssp
+from airmuscle.physics import linearise
 
 pytestmark = pytest.mark.tool
 SAMPLE = 0.005
@@ -42,12 +43,32 @@ SENSED = (
     ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3),
     ColumnSensor("pressure", noise=500.0, delay=1),
 )
+
+
+def predictive_law():
+    """Predictive control of the position, whose limits act within the run."""
+    openings = {"fill": 0.05, "discharge": 0.05}
+    model = linearise(LIFT, LIFT.state_at(pressure=2e5), openings)
+    return design_predictive(
+        model,
+        SAMPLE,
+        measured=("position",),
+        controlled=("position",),
+        disturbed=("air_mass",),
+        horizon=12,
+        permitted={"position": 1e-3, "speed": 0.1, "fill": 0.1, "discharge": 0.1},
+        process_noise={"air_mass": 1e-6, "speed": 0.1, "air_mass.disturbance": 1e-5},
+        measurement_noise={"position": 1e-4},
+    )
+
+
 LAWS = {
     "PI": (PRESSURE, "pressure", 3e5),
     "cascade": (CASCADE, "position", 0.01),
     "super-twisting": (SuperTwisting("position", SPLIT, 10.0, 1.0, 0.05, 5e-3), "position", 0.01),
     "on-off": (OnOffController("pressure", SPLIT, 1e4), "pressure", 3e5),
     "sensors with noise": (WithSensors(CASCADE, SENSED, 7.0), "position", 0.01),
+    "predictive": (predictive_law(), "position", 0.01),
 }
 
 

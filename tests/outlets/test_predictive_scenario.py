@@ -266,3 +266,25 @@ def test_the_command_exports_it_as_c(tmp_path):
     assert re.match(
         r"130 samples, 0 commands differ by more than 1e-09 of their range", replay.stdout
     )
+
+
+REMEDIES = {
+    "C": ("c", "*_controller.c"),
+    "JavaScript": ("js", "*.run.mjs"),
+    "Octave": ("octave", "run_*.m"),
+    "FMUs of an SSP package": ("ssp", "*.ssp"),
+}
+"""What the refusal of an export as one FMU names, with the target of the command and a file."""
+
+
+def test_the_refusal_of_one_fmu_names_what_the_command_then_writes(tmp_path):
+    """Each named target, with the sources alone."""
+    refused = airmuscle("export", EXAMPLE, "--to", "fmu", "--out", tmp_path / "lift.fmu")
+    assert refused.exit_code == 1
+    for name, (target, pattern) in REMEDIES.items():
+        assert name in refused.stderr, name
+        out = tmp_path / ("lift.ssp" if target == "ssp" else target)
+        done = airmuscle("export", EXAMPLE, "--to", target, "--out", out)
+        assert done.exit_code == 0, done.output
+        found = list(tmp_path.glob(pattern)) if target == "ssp" else list(out.glob(pattern))
+        assert found, name

@@ -11,8 +11,13 @@ from ...engine.loop.controller import Measurement, MultivariableController, rela
 from ...physics.analysis.linear_model import LinearModel, linearise
 from ...physics.equilibrium import nearest_equilibrium
 from ...physics.plant.plant import Plant
-from ..laws import CHISCI2001, RAWLINGS2017, LinearModelPredictive
-from ..laws.linear_model_predictive import CondensedProblem, ObservedModel, PredictiveMemory
+from ..laws import CHISCI2001, RAWLINGS2017, LinearLaw, LinearModelPredictive
+from ..laws.linear_model_predictive import (
+    CondensedProblem,
+    ObservedModel,
+    PredictiveDesign,
+    PredictiveMemory,
+)
 from .lqg_and_adrc import (
     DISTURBANCE,
     check_numbers,
@@ -140,8 +145,22 @@ def design_predictive(
         columns,
         *ends,
     )
+    design = PredictiveDesign(
+        sample_time,
+        blocks,
+        dict(model.state),
+        dict(model.input_values),
+        tuple(disturbed),
+        dict(permitted),
+        dict(process_noise),
+        dict(measurement_noise),
+        dict(limits),
+        dict(max_rate),
+        dict(bounded),
+        slack_weight,
+    )
     return LinearModelPredictive(
-        tuple(measured), tuple(controlled), model.inputs, observed, problem
+        tuple(measured), tuple(controlled), model.inputs, observed, problem, design
     )
 
 
@@ -262,6 +281,10 @@ class PredictiveControl(MultivariableController):
         unit = units[name.removesuffix(DISTURBANCE)] or "1"
         rate = declared.name in ("max_rate", "bounds") or name.endswith(DISTURBANCE)
         return relative_unit("u/s", "", unit) if rate else unit
+
+    def linear_law(self) -> LinearLaw:
+        """The designed law while no limit acts."""
+        return self.law.linear_law()
 
     def init(self) -> PredictiveMemory:
         return self.law.init()

@@ -5,13 +5,19 @@ margins.
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ParameterError, System, check_known
-from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
+from ...engine.loop import (
+    ControlLaw,
+    Controller,
+    ControlLoop,
+    ControlLoopState,
+    designed_loop,
+)
 from ...physics.analysis import LinearModel, linearise
 from ...physics.analysis.sampled_model import (
     SampledModel,
@@ -40,6 +46,15 @@ REST_TOLERANCE = 0.1
 state may move in it with the inputs held (chosen)."""
 REST_INSTANTS = 10
 """Instants in that time."""
+
+
+@runtime_checkable
+class HasLinearLaw(Protocol):
+    """A controller that states its linear law, which holds while no limit acts."""
+
+    def linear_law(self) -> LinearLaw:
+        """The law by its slopes."""
+        ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -390,17 +405,21 @@ def linearise_loop(
     Sensors have neither noise nor steps. A driver counts as its mean: the opening is the command.
     A law with a part that is sampled at every n-th sample is lifted over its period, whatever the
     sample is at which a run has ended.
-    Set points that are measured columns are their values. Raises ParameterError for a controller
-    that is no ControlLaw, a state or input that does not fit, a state that moves (by more than a
-    tenth of a nominal value within 0.1 s, with the inputs held), a working point at a kink of the
-    law, and a law whose samples have no common period or differ at random.
+    Set points that are measured columns are their values. A controller that is no ControlLaw needs
+    a method `linear_law`, as predictive control has, which is linear while no limit acts. Raises
+    ParameterError for another controller, an active limit, a state or input that does not fit, a
+    state that moves (by more than a tenth of a nominal value within 0.1 s, with the inputs held), a
+    working point at a kink of the law, and a law whose samples have no common period or differ at
+    random.
     """
     loop = designed_loop(loop, plant)
     law = loop.controller
-    if not isinstance(law, ControlLaw):
+    if not isinstance(law, ControlLaw | HasLinearLaw):
         raise ParameterError(
-            f"linearise_loop: {type(law).__name__} is no ControlLaw, its samples have no"
-            " derivatives. Write the controller as a ControlLaw over airmuscle.core.ops."
+            f"linearise_loop: {type(law).__name__} is neither a ControlLaw nor has it a"
+            " `linear_law`: its samples have no derivatives. Write the controller as a ControlLaw"
+            " over airmuscle.core.ops, or give it a method `linear_law` that returns the LinearLaw"
+            " of its samples."
         )
     present = control_state.applied_inputs if control_state else ()
     given = {
@@ -411,6 +430,10 @@ def linearise_loop(
     loop.check_columns(model.outputs, model.inputs)
     drift = _drift(model)
     _check_rest(plant, model, drift)
+    if not isinstance(law, ControlLaw):
+        _check_no_limit(law, control_state)
+        selected = model.select(law.inputs, law.measured_columns).with_delay(delay)
+        return LinearLoop(selected, (law.linear_law(),), loop.sample_time, drift)
     columns = model.output_values
     measured = [columns[name] for name in law.measured_columns]
     nominal = {each.name: abs(each.nominal) for each in plant.states}
@@ -433,6 +456,19 @@ def linearise_loop(
         loop.sample_time,
         drift,
     )
+
+
+def _check_no_limit(law: Controller, control_state: ControlLoopState | None) -> None:
+    """Raise ParameterError for a run that ends where a limit of a controller acts: it is the linear
+    law nowhere near.
+    """
+    active = getattr(control_state.controller, "active", None) if control_state else None
+    if active is not None and np.any(active):
+        raise ParameterError(
+            f"linearise_loop: at this working point {np.count_nonzero(active)} limits of"
+            f" {type(law).__name__} act, where it is no linear law. Give the control_state of a run"
+            " that ends within the limits, or none."
+        )
 
 
 def _drift(model: LinearModel) -> dict[str, float]:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ...core import Array, Reference, ShortRepr, Status, published
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
+from .linear_law import LinearLaw
 
 RAWLINGS2017 = published("rawlings-2017")
 CHISCI2001 = published("chisci-2001")
@@ -106,6 +107,57 @@ class ObservedModel(ShortRepr):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PredictiveDesign(ShortRepr):
+    """The numbers from which a controller was designed, by names of signals, in SI units.
+
+    sample_time    [s]
+    blocks         samples over which the planned inputs are held, one after the other
+    state, inputs  the operating point
+    permitted, process_noise, measurement_noise, limits, max_rate, bounded, slack_weight
+                   as of `design_predictive`
+    disturbed      states with a disturbance
+    """
+
+    sample_time: float
+    blocks: tuple[int, ...]
+    state: Mapping[str, float]
+    inputs: Mapping[str, float]
+    disturbed: tuple[str, ...]
+    permitted: Mapping[str, float]
+    process_noise: Mapping[str, float]
+    measurement_noise: Mapping[str, float]
+    limits: Mapping[str, tuple[float, float]]
+    max_rate: Mapping[str, float]
+    bounded: Mapping[str, float]
+    slack_weight: float
+
+    def lines(self) -> list[str]:
+        """The numbers as lines of a text, for the header of a program."""
+        horizon = sum(self.blocks)
+        lines = [
+            f"Horizon: {horizon} samples of {self.sample_time:g} s; inputs are held over"
+            f" {', '.join(map(str, self.blocks))} samples.",
+            f"Model: linear, states {', '.join(self.state)}; disturbances of the rates of"
+            f" {', '.join(self.disturbed)}.",
+        ]
+        for heading, numbers in (
+            ("Operating point, states", self.state),
+            ("Operating point, inputs", self.inputs),
+            ("Permitted deviations (weight 1/d^2)", self.permitted),
+            ("Process noise, deviation after 1 s", self.process_noise),
+            ("Measurement noise", self.measurement_noise),
+            ("Greatest rates of inputs, over 1 s", self.max_rate),
+            ("Bounded disturbances", self.bounded),
+        ):
+            texts = [f"{name} {value:.6g}" for name, value in numbers.items()]
+            lines.append(f"{heading} (SI): {', '.join(texts) or 'none'}.")
+        limits = [f"{name} {low:.6g} to {high:.6g}" for name, (low, high) in self.limits.items()]
+        weight = f", weight of a violation {self.slack_weight:g}" if limits else ""
+        lines.append(f"Limits of columns (SI): {', '.join(limits) or 'none'}{weight}.")
+        return lines
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class LinearModelPredictive(ShortRepr, MultivariableController):
     """Linear model predictive control (MPC): the first input of the plan that minimises a quadratic
     cost.
@@ -144,6 +196,38 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     commanded: tuple[str, ...]
     model: ObservedModel
     problem: CondensedProblem
+    design: PredictiveDesign | None = None
+    """From what it was designed, for reports and exported programs."""
+
+    def linear_law(self) -> LinearLaw:
+        """The controller while no limit acts: observer and linear-quadratic regulator.
+
+        Its memory is the predicted deviation of states and disturbances.
+        """
+        model = self.model
+        constants = self.constants
+        states = len(model.transition)
+        inputs = len(self.commanded)
+        points = len(self.controlled)
+        correction = model.gain
+        corrected = np.eye(states) - correction @ model.output_matrix
+        by_point = constants["plan_by_point"][:inputs]
+        by_state = by_point[:, :states]
+        by_setpoint = by_point[:, states : states + points]
+        closed = model.transition + model.input_matrix @ by_state
+        sizes = model.input_sizes[:, None]
+        return LinearLaw(
+            A=closed @ corrected,
+            B=closed @ correction,
+            E=model.input_matrix @ by_setpoint,
+            C=sizes * (by_state @ corrected),
+            D=sizes * (by_state @ correction),
+            F=sizes * by_setpoint,
+            memory=tuple(f"predicted{i}" for i in range(states)),
+            measured=self.measured,
+            setpoints=self.controlled,
+            inputs=self.commanded,
+        )
 
     @functools.cached_property
     def _idle(self) -> list[Any]:

@@ -23,7 +23,8 @@ from ...engine.run.sampled_loop import (
     snapped,
 )
 from .parameter_bounds import ParameterBounds
-from .printed_controller import PrintedController, check_control_law, print_controller
+from .printed_controller import PrintedController
+from .printed_predictive import check_control_law, print_any_controller, with_printable_controller
 from .printed_system import ExportedSystem
 
 SHAPES: dict[str, tuple[str, ...]] = {
@@ -214,6 +215,7 @@ def export_loop(
     Raises ParameterError for what cannot be printed, by its name: a controller in Python, a driver
     of another kind, and a run that continues another.
     """
+    problem = with_printable_controller(problem)
     loop = check_control_law(problem)
     if problem.control_state is not None:
         raise ParameterError(
@@ -241,7 +243,7 @@ def export_loop(
         loop.other_inputs, prepared.input_names, prepared.instants, near
     ).as_floats()
     other_inputs.values[:, prepared.commanded] = other_inputs.slopes[:, prepared.commanded] = 0.0
-    printed = print_controller(prepared, name, title, tunable)
+    printed = print_any_controller(prepared, name, title, tunable)
     drivers = DriverTable(prepared, loop.init(problem.start_time), capacity)
     return ExportedLoop(printed, prepared, other_inputs, drivers, capacity)
 

@@ -19,7 +19,8 @@ from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
 from .identifiers import block_comment, c_number, c_values, filled, program_name
-from .printed_controller import PrintedController, check_control_law, print_controller
+from .printed_controller import PrintedController
+from .printed_predictive import check_control_law, print_any_controller, with_printable_controller
 
 STRUCTURE, COMMON = (
     f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common")
@@ -55,10 +56,11 @@ def write_controller_fmu(
 
 def controller_package(problem: Problem, fmi: int, name: str = "", title: str = "") -> FmuPackage:
     """The FMU of the control law of a problem, without its binary."""
+    problem = with_printable_controller(problem)
     loop = check_control_law(problem)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     chosen = program_name(name, title or type(loop.controller).__name__)
-    printed = print_controller(prepared, chosen, title, None)
+    printed = print_any_controller(prepared, chosen, title, None)
     variables = _variables(problem, printed, prepared)
     start = [float(v.start or 0.0) for v in variables if v.causality == "input"]
     token = token_of(*variables, *printed.source_files().values(), fmi)
@@ -150,6 +152,7 @@ def write_ssp(
     other arguments and errors are those of `write_fmu`.
     """
     target = check_target(path, fmi, ".ssp")
+    problem = with_printable_controller(problem)
     loop = check_control_law(problem)
     if loop.drivers:
         raise ParameterError(

@@ -14,13 +14,16 @@ import numpy as np
 
 from ...core import Leaf, ParameterError, abridged, cite, leaves, printable
 from ...core.tree import fingerprint
-from ...engine.compile.text.languages import CLanguage
+from ...engine.compile.text.languages import CLanguage, MatlabLanguage
 
 LONGEST = 48
 """Characters of an identifier: with a prefix it stays within the 63 that C99 and MATLAB
 distinguish.
 """
 _DIGEST = 8
+MATLAB = MatlabLanguage()
+IN_LINE = 6
+"""Numbers in a line of MATLAB."""
 
 
 def template(name: str) -> str:
@@ -269,3 +272,22 @@ def filled(name: str, values: Mapping[str, str], prefix: str) -> str:
         flags=re.MULTILINE,
     )
     return re.sub(r"@(\w+)@", lambda mark: values[mark.group(1)], text)
+
+
+def m_number(value: float) -> str:
+    """A number as MATLAB text; it is read back bit by bit."""
+    return MATLAB.constant(float(value)).strip("()")
+
+
+def m_array(values: Any) -> str:
+    """An array (N,) as a column, or a table (N, m)."""
+    table = np.asarray(values, dtype=float)
+    if not table.size:
+        shape = table.shape if table.ndim == 2 else (0, 1)
+        return f"zeros({', '.join(map(str, shape))})"
+    if table.ndim == 2:
+        lines = [", ".join(map(m_number, row)) for row in table.tolist()]
+    else:
+        numbers = [m_number(value) for value in table.tolist()]
+        lines = ["; ".join(numbers[i : i + IN_LINE]) for i in range(0, len(numbers), IN_LINE)]
+    return f"[{f'; ...{chr(10)}    '.join(lines)}]"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, Leaf, Node, ParameterError, leaves, nodes
-from ...engine import ControlLaw, ControlLoop, Problem
+from ...engine import ControlLaw
 from ...engine.compile.functions import Printer
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
@@ -254,24 +254,6 @@ class PrintedController:
                 f" {k * sample_time:.4g} s after the start of the run; {SINGLE_TOLERANCE:g} is"
                 " allowed. Export it in double precision."
             )
-
-
-def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:
-    """The control loop of a problem. Raises ParameterError where its controller is neither a
-    ControlLaw nor `also`.
-    """
-    loop = problem.input
-    if not isinstance(loop, ControlLoop):
-        raise ParameterError(
-            "the problem has no controller to export; its input is a signal. Give it a ControlLoop."
-        )
-    if not isinstance(loop.controller, ControlLaw | also):
-        raise ParameterError(
-            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported"
-            " here; of predictive control the controller alone can, as C. Derive a law of your own"
-            " from ControlLaw and write its step over airmuscle.core.ops."
-        )
-    return loop
 
 
 def _limited_command(command: Node, least: float, most: float) -> Node:

@@ -46,6 +46,8 @@ from .identifiers import (
     c_values,
     filled,
     line_comment,
+    m_array,
+    m_number,
     provenance,
     template,
     with_cmake,
@@ -73,9 +75,6 @@ FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, s
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 _json = functools.partial(json.dumps, default=np.ndarray.tolist)
 """A value as JavaScript text: ASCII only, numbers bit by bit, infinities by name."""
-_LANGUAGE = MatlabLanguage()
-_IN_LINE = 6
-"""Numbers in a line of MATLAB."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -420,25 +419,6 @@ def _fields(name: str, value: Any) -> str:
         else m_number(value)
     )
     return f"  {name} = {text};\n"
-
-
-def m_number(value: float) -> str:
-    """A number as MATLAB text; it is read back bit by bit."""
-    return _LANGUAGE.constant(float(value)).strip("()")
-
-
-def m_array(values: Any) -> str:
-    """An array (N,) as a column, or a table (N, m)."""
-    table = np.asarray(values, dtype=float)
-    if not table.size:
-        shape = table.shape if table.ndim == 2 else (0, 1)
-        return f"zeros({', '.join(map(str, shape))})"
-    if table.ndim == 2:
-        lines = [", ".join(map(m_number, row)) for row in table.tolist()]
-    else:
-        numbers = [m_number(value) for value in table.tolist()]
-        lines = ["; ".join(numbers[i : i + _IN_LINE]) for i in range(0, len(numbers), _IN_LINE)]
-    return f"[{f'; ...{chr(10)}    '.join(lines)}]"
 
 
 def m_string(text: str) -> str:

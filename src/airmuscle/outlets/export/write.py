@@ -3,182 +3,30 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ...control import LinearModelPredictive, PredictiveControl
-from ...core import Array, ParameterError, atomic_folder, check_known
-from ...engine.compile.kernel_text import CKernels, plain_kernels
+from ...core import ParameterError, atomic_folder, check_known
 from ...engine.loop import (
     MEASURED,
     ControlLoop,
     EnclosingLaw,
-    Measurement,
     WithSensors,
     without_simulated,
 )
 from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
-from ...engine.run.sampled_loop import SampledLoop, prepare_loop
+from ...engine.run.sampled_loop import prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_run import CONTROLLER, ExportedRun, export_loop
-from .identifiers import c_integers, c_number, c_values, filled, program_name, provenance
-from .printed_controller import (
-    SINGLE_TOLERANCE,
-    PrintedController,
+from .identifiers import program_name, provenance
+from .printed_predictive import (
     check_control_law,
-    print_controller,
+    print_any_controller,
+    with_printable_controller,
 )
 from .printed_system import export_system
 from .targets import C99, Target, print_law
-
-TOLERANCE = 1e-9
-"""Part of its range by which a command in C may differ from that in Python (chosen): sums are in
-another order.
-"""
-SINGLE_TOLERANCES = (1e-5, 1e-3, 1e-6, 1e-5)
-"""Tolerances of the quadratic program in single precision, in place of `TOLERANCES` of the law
-(chosen).
-"""
-FRAME = ("y", "r", "low", "high", "predicted", "plan", "inputs", "active", "counts")
-"""Arguments of the kernel that the frame in C names itself."""
-PREDICTIVE_NOTE = (
-    "The quadratic program is solved by the dual active-set method that runs in Python, printed"
-    " from the same source; no library is needed. A sample without a solution applies the last plan"
-    " and counts it in the last number of the memory."
-)
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class PrintedPredictive(PrintedController):
-    """A predictive controller as the kernel of its sample with its constants."""
-
-    law: LinearModelPredictive  # type: ignore[assignment]
-
-    def source_files(self) -> dict[str, str]:
-        law = self.law
-        arrays = self.law.arrays()
-        number = self.number
-        shapes = {name: tuple(map(str, array.shape)) for name, array in arrays.items()}
-        model = law.model
-        known = {
-            **law.constants,
-            **self._given,
-            "operating": model.inputs,
-            "sizes": model.input_sizes,
-            "at_measured": model.measured,
-            "at_controlled": law.model.controlled,
-        }
-        places = {
-            **self.places,
-            "tables": "".join(
-                _table(f"{self.name}_{name}", array, number) for name, array in known.items()
-            ),
-            "functions": CKernels(shapes, number=number).text("predictive", ["predictive_sample"]),
-            "work": (
-                "".join(
-                    f"  {'int' if array.dtype == np.int64 else number}"
-                    f" {name}{''.join(f'[{k}]' for k in array.shape)};\n"
-                    for name, array in arrays.items()
-                    if name not in {*FRAME, *law.constants}
-                ).rstrip()
-            ),
-            "arguments": ", ".join(
-                f"{self.name}_{name}" if name in known else name for name in arrays
-            ),
-            **{
-                f"{name}_at": str(list(law.initial_memory).index(f"{name}0"))
-                for name in law.init()._fields
-            },
-            "measured": str(len(law.measured)),
-            "controlled": str(len(law.controlled)),
-        }
-        return {
-            f"{self.name}.h": filled("controller.h", places, self.name),
-            f"{self.name}.c": filled("predictive.c", places, self.name),
-        }
-
-    @property
-    def _given(self) -> dict[str, Array]:
-        """The limits of the inputs as scaled deviations, and the tolerances, by the names of the
-        kernel.
-        """
-        model = self.law.model
-        low, high = np.array(self.ranges).T
-        ends = {
-            "low": (low - model.inputs) / model.input_sizes,
-            "high": (high - model.inputs) / model.input_sizes,
-        }
-        return ends | (
-            {"tolerances": np.array(SINGLE_TOLERANCES)} if self.number == "float" else {}
-        )
-
-    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> Array:
-        """The commands (K, c) to measurements (K, p) and set points (K, q), in Python.
-
-        single  the operations of the program itself, each rounded to single precision
-        """
-        law = self.law
-        memory = self.law.init()
-        rows = list[Any]()
-        if single:
-            sample = plain_kernels("predictive")["predictive_sample"]
-            known = {**law.arrays(), **self._given}
-            arrays = {
-                name: array if array.dtype == np.int64 else array.astype(np.float32)
-                for name, array in known.items()
-            }
-            at = law.model.measured.astype(np.float32)
-            to = law.model.controlled.astype(np.float32)
-            sizes = law.model.input_sizes.astype(np.float32)
-            operating = law.model.inputs.astype(np.float32)
-            for values, points in zip(
-                measured.astype(np.float32), setpoints.astype(np.float32), strict=True
-            ):
-                arrays |= {"y": values - at, "r": points - to}
-                sample(*arrays.values())
-                rows.append(operating + sizes * arrays["inputs"])
-            return np.array(rows, dtype=float)
-        ranges = dict(zip(law.inputs, self.ranges, strict=True))
-        for values, points in zip(measured.tolist(), setpoints.tolist(), strict=True):
-            seen = Measurement(
-                dict(zip(law.measured, values, strict=True)),
-                dict(zip(law.controlled, points, strict=True)),
-                ranges,
-            )
-            commands, memory = law.step(memory, seen, 0.0)
-            rows.append([commands[name] for name in law.inputs])
-        return np.array(rows)
-
-
-def print_predictive(
-    prepared: SampledLoop, name: str, title: str, number: str
-) -> PrintedPredictive:
-    """The predictive controller of a prepared loop, with its ranges as constants."""
-    law = prepared.loop.controller
-    assert isinstance(law, LinearModelPredictive)
-    about = (
-        f"Sample time {c_number(prepared.loop.sample_time)} s; set points"
-        f" {', '.join(law.controlled)}; measured {', '.join(law.measured)}; commanded"
-        f" {', '.join(law.inputs)}."
-    )
-    lines = provenance(title or type(law).__name__, law, notes=[about, PREDICTIVE_NOTE])
-    tolerance = SINGLE_TOLERANCE if number == "float" else TOLERANCE
-    ranges = [prepared.ranges[n] for n in law.inputs]
-    return PrintedPredictive(name, law, {}, {}, ranges, (), lines, number, tolerance)
-
-
-def _table(name: str, array: Array, number: str) -> str:
-    """A constant array; a table is not const, because C converts no pointer to rows of
-    constants.
-    """
-    if array.dtype == np.int64:
-        return f"static const int {name}[{len(array)}] = {{{c_integers(array.tolist())}}};\n"
-    size = "".join(f"[{k}]" for k in array.shape)
-    constant = "const " if array.ndim == 1 else ""
-    return f"static {constant}{number} {name}{size} = {{{c_values(array, number=number)}}};\n"
-
 
 NOTE = (
     "The equations are those of the model. The program does not report where a run leaves the"
@@ -343,27 +191,15 @@ def write_controller(
     ControlLaw nor a LinearModelPredictive, and one that single precision changes by more;
     SimulationError if the run fails, and FileError.
     """
-    if isinstance(problem.input, ControlLoop) and isinstance(
-        problem.input.controller, PredictiveControl
-    ):
-        designed = dataclasses.replace(problem.input, controller=problem.input.controller.law)
-        problem = dataclasses.replace(problem, input=designed)
-    loop = check_control_law(problem, also=LinearModelPredictive)
+    problem = with_printable_controller(problem)
+    loop = check_control_law(problem)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     law = without_simulated(loop.controller)
     of_real_plant = dataclasses.replace(prepared, loop=dataclasses.replace(loop, controller=law))
     notes = () if law == loop.controller else (LEFT_OUT,)
     name = program_name(name, title or type(law).__name__)
     number = "float" if precision == Single() else "double"
-    printed: PrintedController
-    if isinstance(law, LinearModelPredictive):
-        if tunable:
-            raise ParameterError(
-                f"LinearModelPredictive has no tunable parameter '{tunable[0]}'; leave it out."
-            )
-        printed = print_predictive(of_real_plant, name, title, number)
-    else:
-        printed = print_controller(of_real_plant, name, title, tunable, number, notes)
+    printed = print_any_controller(of_real_plant, name, title, tunable, number, notes)
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
     measured = np.column_stack(

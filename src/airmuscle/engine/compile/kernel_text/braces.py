@@ -5,7 +5,7 @@ first assignment.
 import abc
 import ast
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from .printer import KernelPrinter
 from .types import ElementType, TypedKernel, pairs, stored_names
@@ -141,6 +141,7 @@ class CKernels(BraceKernels):
             "CAPACITY")
     prefix  beginning of the names of the functions of the system
     number  type of all numbers, double or float
+    tables  arguments of several dimensions that are tables of constants
     """
 
     reserved = frozenset(_C_KEYWORDS.split())
@@ -151,9 +152,14 @@ class CKernels(BraceKernels):
     flags = ("0", "1")
 
     def __init__(
-        self, shapes: Mapping[str, Sequence[str]], prefix: str = "", number: str = "double"
+        self,
+        shapes: Mapping[str, Sequence[str]],
+        prefix: str = "",
+        number: str = "double",
+        tables: Collection[str] = (),
     ) -> None:
         self.shapes = shapes
+        self.tables = frozenset(tables)
         self.prefix = prefix
         self.type = number
         self.suffix = "f" if number == "float" else ""
@@ -202,7 +208,10 @@ class CKernels(BraceKernels):
         if len(shape) != kind.rank:
             raise self.source.unprintable(self.source.node, f"the array '{name}' without a shape")
         widths = "".join(f"[{width}]" for width in shape[1:])
-        return f"{scalar} {printed}[]{widths}"
+        if name in self.tables and name in self.kernel.written:
+            raise self.source.unprintable(self.source.node, f"the constant table '{name}', written")
+        constant = "const " if name in self.tables else ""
+        return f"{constant}{scalar} {printed}[]{widths}"
 
     def _type(self, scalar: ElementType) -> str:
         return self.type if scalar == ElementType.NUMBER else "int"
