@@ -5,6 +5,7 @@ for 12 and for 80 routes; of the search of places of points for 27 routes in 5 c
 from __future__ import annotations
 
 import functools
+import importlib.util
 import math
 import tempfile
 import time
@@ -15,6 +16,7 @@ from measure import Section, format_time, print_section
 
 import airmuscle as am
 
+TITLE = "Bodies with routes"
 HEADER = ("body", "step", "time of the processor")
 TEXT = (
     "Limbs of three hinges with a pair of routes at each; of 80 routes, further ones cross two and"
@@ -131,7 +133,10 @@ def routing(folder: Path) -> Callable[[], am.design.MovedRoutes]:
 
 
 def section(rounds: int = 1) -> Section:
-    """The complete benchmark."""
+    """The complete benchmark; a note alone where MuJoCo is not installed."""
+    if importlib.util.find_spec("mujoco") is None:
+        note = "Omitted, because mujoco is not installed: pip install mujoco."
+        return Section(TITLE, note, HEADER, ())
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for name, text in BODIES.items():
@@ -148,7 +153,7 @@ def section(rounds: int = 1) -> Section:
         start = time.process_time()
         call()
         rows.append(("27 routes", "moved points", format_time(time.process_time() - start)))
-    return Section("Bodies with routes", TEXT, HEADER, tuple(rows))
+    return Section(TITLE, TEXT, HEADER, tuple(rows))
 
 
 if __name__ == "__main__":

@@ -92,3 +92,16 @@ def test_a_wrong_request_writes_nothing(inputs, tmp_path, options, code, message
     assert answer.exit_code == code, answer.output
     assert message in answer.stderr
     assert not out.exists()
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_what_one_process_gives(inputs, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    quiet = {"dashboard_address": None, "worker_dashboard_address": None}
+    options = ("--move", MOVE, "--out")
+    assert route(inputs, *options, tmp_path / "one").exit_code == 0
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, **quiet) as cluster:
+        address = cluster.scheduler_address
+        assert route(inputs, *options, tmp_path / "many", "--cluster", address).exit_code == 0
+    for name in ("body.xml", "data/curves.csv", "data/moves.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "many" / name).read_bytes()
