@@ -199,7 +199,7 @@ def test_fmpy_runs_a_package_to_the_band_of_an_on_off_law(tmp_path):
     printed.require("gcc")
     # its master begins with measurements of zero, to which a law without memory is indifferent, and
     # passes signals after each step, so that its steps are short
-    path = write_ssp(problem_of("on-off"), tmp_path / "loop.ssp", fmi=2, name="lift").path
+    path = write_ssp(problem_of("on-off"), tmp_path / "loop.ssp", name="lift").path
     result = simulation.simulate_ssp(
         str(path),
         stop_time=0.5,

@@ -4,10 +4,13 @@ it."""
 
 from __future__ import annotations
 
+import io
 import re
 import subprocess
+import zipfile
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import printed
@@ -288,3 +291,25 @@ def test_the_refusal_of_one_fmu_names_what_the_command_then_writes(tmp_path):
         assert done.exit_code == 0, done.output
         found = list(tmp_path.glob(pattern)) if target == "ssp" else list(out.glob(pattern))
         assert found, name
+
+
+def test_a_package_states_the_start_of_every_signal_between_its_fmus(tmp_path):
+    """Of FMI 2.0 unless another version is asked for; measurements as at the first sample."""
+    path = tmp_path / "lift.ssp"
+    done = airmuscle("export", EXAMPLE, "--to", "ssp", "--sources-only", "--out", path)
+    assert done.exit_code == 0, done.output
+    first = load_scenario(EXAMPLE).simulate()
+    with zipfile.ZipFile(path) as package:
+        root = ElementTree.fromstring(package.read("SystemStructure.ssd"))
+        with zipfile.ZipFile(io.BytesIO(package.read("resources/controller.fmu"))) as fmu:
+            about = ElementTree.fromstring(fmu.read("modelDescription.xml"))
+    assert about.attrib["fmiVersion"] == "2.0"
+    stated = {
+        parameter.attrib["name"]: float(parameter[0].attrib["value"])
+        for parameter in root.iter()
+        if parameter.tag.endswith("}Parameter")
+    }
+    for column in ("position", "pressure"):
+        assert stated[column] == first[f"measured.{column}"][0], column
+    assert stated["setpoint.position"] == first["setpoint.position"][0]
+    assert stated["fill"] == first["command.fill"][0]

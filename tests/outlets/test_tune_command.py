@@ -216,9 +216,7 @@ def test_an_interruption_writes_the_best_gains_so_far(scenario, monkeypatch):
 def test_a_scenario_that_cannot_be_tuned_is_refused(scenario):
     without = SCENARIO[: SCENARIO.index("[input.controller]")] + SCENARIO[SCENARIO.index("[run]") :]
     scenario.write_text(without, encoding="utf-8")
-    assert "there is no [input.controller]; tune needs a controller with its gains" in refused(
-        scenario
-    )
+    assert "there is no [input.controller]; give a controller with its gains" in refused(scenario)
     assert "Of a plant of the library write a scenario file with [plant] library and" in refused(
         "joint-dmsp-20-matrix"
     )

@@ -8,6 +8,7 @@ metrics are those of the single run.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import pickle
 from typing import ClassVar
@@ -561,3 +562,22 @@ def test_a_tuning_shows_its_gains_in_their_units_and_the_response_of_the_nominal
         "tuned gains",
         "set point",
     ]
+
+
+def test_further_local_processes_are_started_where_they_shorten_the_search(monkeypatch):
+    """Compiled loops use all cores of one process; a controller that is called from Python one."""
+    asked = []
+
+    def record(workers):
+        asked.append(workers)
+        return contextlib.nullcontext(None)
+
+    monkeypatch.setattr("airmuscle.design.tuning.optimisation.process_pool", record)
+    called = ControlLoop(Called(PRESSURE), 0.01, STEPS)
+    cases = {
+        1: (LoopCase("compiled", LIFT, LOOP, START), BOUNDS),
+        2: (LoopCase("called", LIFT, called, START), {"inner.gain": (1e-6, 1e-4)}),
+    }
+    for expected, (case, bounds) in cases.items():
+        tune([case], bounds, duration=0.05, budget=8, workers=2)
+        assert asked.pop() == expected

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core import Array, ParameterError, SimulationError, check_known, leaves
 from ...engine.distribution import DistributedCalls
+from ...engine.loop import ControlLaw
 from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
 from .case import GainRange, LoopCase, check_cases, gain_ranges, to_coordinates, to_gains
@@ -176,8 +177,9 @@ def tune(
     start_time, integrator  as in simulate_batch
     progress    called with the number of loops simulated so far, and the budget
     workers     number of processes, for several of which a script needs `if __name__ ==
-                "__main__":`, or an executor; by default this process, which uses all cores. The
-                result does not depend on it
+                "__main__":`, or an executor; by default this process, which uses all cores. Loops
+                of a ControlLaw are compiled and use all cores in one process, so that further local
+                ones are started for other controllers alone. The result does not depend on it
 
     The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every
     controller. The first generation are Sobol points, from whose best one a descent begins; further
@@ -200,7 +202,7 @@ def tune(
     )
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
     start_points = search.given(start)
-    with process_pool(workers) as executor:
+    with process_pool(useful_workers(workers, family)) as executor:
         interrupted = search.run(start_points, seed, executor)
     if not search.values:
         raise KeyboardInterrupt
@@ -232,6 +234,16 @@ def tune(
             " cases that no controller can hold."
         )
     return result
+
+
+def useful_workers(workers: Workers, family: Sequence[LoopCase]) -> Workers:
+    """The workers that shorten a search: an executor as given, and local processes for controllers
+    that are called from Python, whose loops use one core.
+    """
+    if isinstance(workers, Executor) or workers < 2:
+        return workers
+    compiled = all(isinstance(case.loop.controller, ControlLaw) for case in family)
+    return 1 if compiled else workers
 
 
 def _check_options(

@@ -50,7 +50,10 @@ class ExportRequest:
         "A parameter that the program can change; repeatable. Default: all, of a controller none.",
         metavar="PATH",
     )
-    fmi: int | None = optional("Version of FMI for --to fmu and ssp. Default: 3.", metavar="2|3")
+    fmi: int | None = optional(
+        "Version of FMI: by default 3 for --to fmu, and 2 for ssp, which its masters know.",
+        metavar="2|3",
+    )
     sources_only: bool = option("An FMU without a binary; --to fmu, ssp.", default=False)
     platforms: tuple[str, ...] = many(
         "Binaries of an FMU for a platform, by the package ziglang; repeatable:"
@@ -179,7 +182,7 @@ def _export_fmu(source: str, out: Path, request: ExportRequest) -> Exported:
     file.
     """
     platforms = [find_platform(platform) for platform in dict.fromkeys(request.platforms)]
-    fmi = 3 if request.fmi is None else request.fmi
+    fmi = request.fmi or (2 if request.to == "ssp" else 3)
     part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
     suffix = ".ssp" if part == "ssp" else ".fmu"
     path = out if out.suffix == suffix else out / f"{request.name}{suffix}"

@@ -22,8 +22,9 @@ from .identifiers import block_comment, c_number, c_values, filled, program_name
 from .printed_controller import PrintedController
 from .printed_predictive import check_control_law, print_any_controller, with_printable_controller
 
-STRUCTURE, COMMON = (
-    f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common")
+STRUCTURE, COMMON, VALUES = (
+    f"http://ssp-standard.org/SSP1/SystemStructure{kind}"
+    for kind in ("Description", "Common", "ParameterValues")
 )
 """Namespaces of SSP 1.0."""
 FMU_TYPE = "application/x-fmu-sharedlibrary"
@@ -137,7 +138,7 @@ def write_ssp(
     problem: Problem,
     path: str | Path,
     *,
-    fmi: int = 3,
+    fmi: int = 2,
     name: str = "",
     title: str = "",
     tunable: Sequence[str] | None = None,
@@ -147,8 +148,10 @@ def write_ssp(
     """Write a plant with its control loop as an SSP 1.0 package: two FMUs, and how they are joined.
 
     The inputs of the package are the set points and the inputs of the plant that the loop does not
-    command; their start values are those of the problem. The step of the default experiment is the
-    sample time. Raises ParameterError for a loop with drivers, which would stand between the FMUs;
+    command; their start values, and those of all signals between the FMUs, are those of the problem
+    at its start, so that a master that exchanges them after a step begins right. The FMUs are of
+    FMI 2.0 by default, which the masters know. Raises ParameterError for a loop with drivers, which
+    would stand between the FMUs;
     other arguments and errors are those of `write_fmu`.
     """
     target = check_target(path, fmi, ".ssp")
@@ -181,7 +184,8 @@ def write_ssp(
 
 def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
     """The file SystemStructure.ssd of a plant and a controller."""
-    described = {"xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "version": "1.0", "name": name}
+    names = {"xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "xmlns:ssv": VALUES}
+    described = {**names, "version": "1.0", "name": name}
     root = Element("ssd:SystemStructureDescription", described)
     system = SubElement(root, "ssd:System", name=name)
     inside = {
@@ -197,6 +201,7 @@ def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
             elements, "ssd:Component", name=part, type=FMU_TYPE, source=f"resources/{part}.fmu"
         )
         _connectors(component, list(ports.values()))
+        _start_values(component, [v for v in ports.values() if v.causality == "input"])
     connections = SubElement(system, "ssd:Connections")
     for part, v in outside:
         SubElement(
@@ -227,6 +232,17 @@ def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
         {key: repr(experiment[key]) for key in ("startTime", "stopTime")},
     )
     return fmi_package.xml_text(root)
+
+
+def _start_values(component: Element, variables: Sequence[Variable]) -> None:
+    """The start values of the inputs of a component, as parameters that its master sets."""
+    bindings = SubElement(component, "ssd:ParameterBindings")
+    values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
+    parameter_set = SubElement(values, "ssv:ParameterSet", version="1.0", name="start")
+    parameters = SubElement(parameter_set, "ssv:Parameters")
+    for v in variables:
+        parameter = SubElement(parameters, "ssv:Parameter", name=v.name)
+        SubElement(parameter, "ssv:Real", value=repr(float(v.start or 0.0)))
 
 
 def _joined_ports(inside: Mapping[str, Mapping[str, Variable]]) -> list[tuple[str, str, str]]:
