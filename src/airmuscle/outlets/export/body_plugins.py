@@ -8,7 +8,7 @@ import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...core import AirmuscleError, AirmuscleWarning, leaves
+from ...core import AirmuscleError, AirmuscleWarning, ParameterError, leaves
 from ...design.body import RouteMuscle
 from ...design.sizing import SizingConditions
 from ...design.sizing.laws_of_product import with_volume
@@ -17,7 +17,7 @@ from ...files.library import Entry
 from ...physics import HangingMass, Isothermal, LinearDamper, Plant
 from ...physics.plant import open_plant
 from ...physics.pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
-from .mujoco_plugin import MuscleActuator, write_mujoco_plugin
+from .mujoco_plugin import MuscleActuator, check_mujoco, write_mujoco_plugin
 
 BASE_LENGTH = 0.2
 """Resting length [m] of the muscle of which a plugin is built (chosen); an actuator has its own as
@@ -54,6 +54,8 @@ class MusclePlugins:
     """The plugins of the muscles of a body, one for each law, in a folder."""
 
     def __init__(self, folder: Path, conditions: SizingConditions) -> None:
+        """Raises ParameterError for a MuJoCo whose plugins do not work."""
+        check_mujoco()
         self.folder = folder
         self.conditions = conditions
         self.built: dict[str, MuscleActuator | None] = {}
@@ -86,7 +88,9 @@ class MusclePlugins:
         return RoutePlugin(actuator, names)
 
     def _actuator(self, entry: Entry) -> MuscleActuator | None:
-        """The plugin of a law; None where it cannot be built."""
+        """The plugin of a law; None for one that gives no force. Raises ParameterError where no
+        plugin can be built, such as without a C compiler.
+        """
         if entry.name not in self.built:
             name = "fit_out_" + entry.name.replace("-", "_")
             try:
@@ -95,7 +99,9 @@ class MusclePlugins:
             except AirmuscleError:
                 self.built[entry.name] = None
             else:
-                self.built[entry.name] = None if built.library is None else built
+                if built.library is None:
+                    raise ParameterError(built.remark)
+                self.built[entry.name] = built
         return self.built[entry.name]
 
     def _plant(
