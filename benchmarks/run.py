@@ -36,6 +36,7 @@ import new_plant
 import ode8
 import outlets
 import peers
+import rig_day
 import rodas4
 import sensitivities
 import startup
@@ -80,6 +81,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (outlets.section, 1),
     (new_plant.section, 7),
     (startup.section, 7),
+    (rig_day.section, 5),
     (studio_latency.section, 1),
 )
 HEAD = """# Benchmark results

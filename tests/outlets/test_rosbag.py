@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import ColumnMapping, read
+from airmuscle.bench import ColumnMapping, SignalLimits, SignalPlan, read
 from airmuscle.errors import FileError
+from airmuscle.outlets import signal_files
 
 pytestmark = pytest.mark.tool
 
@@ -172,6 +173,20 @@ def test_a_bag_without_its_metadata_is_refused(bag):
     (bag / "metadata.yaml").unlink()
     with pytest.raises(FileError, match=r"no metadata\.yaml next to it; copy the whole folder"):
         read(bag)
+
+
+def test_an_mcap_file_is_read_without_metadata(tmp_path):
+    """The file of a plan, whose commands come back at their times."""
+    pytest.importorskip("rosbags", reason="needs the package rosbags")
+    commands = np.array([[1e5, 2e5], [1.5e5, 1e5], [3e5, 0.5e5]])
+    names = ("left.setpoint", "right.setpoint")
+    plan = SignalPlan(names, commands, 0.01, (), (), SignalLimits(4e5), 1.0, {})
+    path = tmp_path / "plan.mcap"
+    signal_files(plan)[path.name](path)
+    (run,) = read(path, ColumnMapping(units=dict.fromkeys(names, "Pa")))
+    assert run["time"] == pytest.approx([0.0, 0.01, 0.02])
+    for name, column in zip(names, commands.T, strict=True):
+        assert run[name] == pytest.approx(column)
 
 
 def test_a_damaged_bag_is_refused(bag):

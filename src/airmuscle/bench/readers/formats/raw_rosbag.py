@@ -54,7 +54,7 @@ class _Field:
 
 def read_rosbag_tables(path: Path, selection: Selection = Selection()) -> tuple[RawTable, ...]:
     """One table from a bag of ROS 1 (.bag) or ROS 2 (.db3 or .mcap, in a folder with
-    metadata.yaml).
+    metadata.yaml; an MCAP file also alone).
 
     Columns are named `topic.field`: `joint_states.position.elbow`, with the name of the joint where
     a message has some. The field `data` alone is named by its topic. Fields of standard messages
@@ -65,26 +65,30 @@ def read_rosbag_tables(path: Path, selection: Selection = Selection()) -> tuple[
     FileError or ColumnError.
     """
     highlevel = import_lab_package("rosbags.highlevel", path)
-    folder = path if path.suffix == ".bag" else path.parent
-    if path.suffix != ".bag" and not (folder / "metadata.yaml").exists():
+    has_metadata = (path.parent / "metadata.yaml").exists()
+    if path.suffix == ".db3" and not has_metadata:
         raise FileError(
             f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag."
         )
-    if path.suffix != ".bag":
-        parts = [part for part in folder.iterdir() if part.suffix == path.suffix]
+    # An MCAP file describes its topics itself.
+    is_alone = path.suffix == ".bag" or not has_metadata
+    bag_path = path if is_alone else path.parent
+    name = path.stem if path.suffix == ".mcap" and is_alone else bag_path.name
+    if not is_alone:
+        parts = [part for part in path.parent.iterdir() if part.suffix == path.suffix]
         if path != min(parts):
             return ()  # the first file of the folder stands for all of them
     with reading(path, "ROS bag"):
         typestore = import_lab_package("rosbags.typesys", path)
         default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
-        with highlevel.AnyReader([folder], default_typestore=default) as bag:
-            topics = _messages_by_topic(bag, folder.name, selection)
+        with highlevel.AnyReader([bag_path], default_typestore=default) as bag:
+            topics = _messages_by_topic(bag, name, selection)
     channels = list[Channel]()
     for topic, messages in topics.items():
         channels += _topic_channels(topic, messages)
     if not channels:
         raise FileError(f"{path}: no topic contains numbers.")
-    table = merge_channels(folder.name, channels, {}, "message", selection.columns)
+    table = merge_channels(name, channels, {}, "message", selection.columns)
     return (table.noted(*_repeated_times(topics)),)
 
 

@@ -19,6 +19,8 @@ POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _CONSTANT_COMMENT = re.compile(
     r"[#%]\s*(?P<name>[^\W\d][\w -]*?)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)"
 )
+EMPTY_CORNER = "corner"
+"""Heading of the first column of a grid that has none."""
 MAX_PREAMBLE = 1000
 """Maximum number of lines above the headings (chosen)."""
 _TEXT_CONSTANTS = ("resting_length", "ambient", "ambient_temperature", "specimen", "run")
@@ -63,6 +65,21 @@ def stated_heading_row(
     return best
 
 
+def has_empty_corner(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether the first row of cells are the headings of a grid whose corner is empty: rising or
+    falling numbers above rows of numbers that begin in the first column.
+    """
+    corner, *across = rows[0]
+    if corner or len(across) < 2 or len(rows) < 2 or not all(map(is_number, across)):
+        return False
+    values = [float(cell.replace(",", ".")) for cell in across]
+    is_rising = values == sorted(values)
+    is_falling = values == sorted(values, reverse=True)
+    if len(set(values)) < len(values) or not (is_rising or is_falling):
+        return False
+    return all(len(row) == len(rows[0]) and is_number(row[0]) for row in rows[1:])
+
+
 def parse_headings(
     origin: str,
     place: str,
@@ -87,6 +104,9 @@ def parse_headings(
     elif headerless:
         headings = [str(i) for i in range(1, len(cells) + 1)]
         count = 0
+    elif has_empty_corner(rows):
+        headings = [EMPTY_CORNER, *cells[1:]]
+        count = 1
     else:
         mapped = {1: "pressure [kPa]", 2: "force [N]"}
         raise ColumnError(

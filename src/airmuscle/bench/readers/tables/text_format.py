@@ -262,14 +262,14 @@ def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int
 
 
 def _is_grid_heading(cells: list[str], below: list[list[str]]) -> bool:
-    """Whether cells are the headings of a grid: a text and rising numbers, above rows of numbers
-    alone.
+    """Whether cells are the headings of a grid: a text or an empty corner and rising numbers, above
+    rows of numbers alone.
     """
     first = cells[0]
     numbers = [cell.replace(",", ".") for cell in cells[1:]]
     if len(numbers) < MIN_GRID or not below:
         return False
-    if header.is_number(first) or not any(map(str.isalpha, first)):
+    if header.is_number(first) or (first and not any(map(str.isalpha, first))):
         return False
     if not all(map(header.is_number, numbers)):
         return False
