@@ -292,12 +292,22 @@ def _write_loops(folder: Path) -> None:
         (folder / f"{name}.toml").write_text(short, encoding="utf-8")
 
 
+def _write_audited(folder: Path) -> None:
+    """A model of a user and its constants, as `audit` examines them."""
+    shutil.copy(Path(__file__).with_name("audited_models.py"), folder / "mymodel.py")
+    with (folder / "mymodel.py").open("a", encoding="utf-8") as file:
+        file.write("\n\nforce = ideal\nflow = iso\n")
+    constants = "name,value,unit,printed\ncritical ratio,0.3,,0.3\nbraid angle,25,deg,\n"
+    (folder / "constants.csv").write_text(constants, encoding="utf-8")
+
+
 WRITERS: tuple[Callable[[Path], None], ...] = (
     _write_static,
     _write_campaign,
     _write_dynamic,
     _write_joint,
     _write_simulation,
+    _write_audited,
 )
 
 

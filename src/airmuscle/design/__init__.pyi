@@ -1,3 +1,13 @@
+from .audit import AuditedLaw as AuditedLaw
+from .audit import AuditFinding as AuditFinding
+from .audit import AuditResult as AuditResult
+from .audit import EnclosedVolume as EnclosedVolume
+from .audit import FunctionProcess as FunctionProcess
+from .audit import audit_constants as audit_constants
+from .audit import audit_law as audit_law
+from .audit import audit_orifice as audit_orifice
+from .audit import law_of_entry as law_of_entry
+from .audit import law_of_points as law_of_points
 from .body import Body as Body
 from .body import BodyFile as BodyFile
 from .body import BodyJoint as BodyJoint

@@ -69,6 +69,12 @@ COMMANDS = (
         "check", "check", "check", "Check whether records are usable, right after a measurement."
     ),
     CommandRow(
+        "audit",
+        "audit",
+        "audit",
+        "Examine a law, an orifice or constants of others.",
+    ),
+    CommandRow(
         "recipe", "recipe", "recipe", "Predict a muscle made by hand from tube, braid and length."
     ),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
@@ -167,6 +173,7 @@ COMMANDS = (
 RUN_CODE = (
     "show",
     "evaluate",
+    "audit",
     "fit",
     "approximate",
     "hysteresis",

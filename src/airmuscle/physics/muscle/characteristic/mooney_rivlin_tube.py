@@ -72,7 +72,8 @@ class MooneyRivlinTube(ForceLaw):
         widening = -(pitch**2) * stretch / radius
         outer = radius - geometry.thread_distance
         volume_by_length = ops.pi * outer * (outer + 2.0 * stretch * widening)
-        return self._wall_force(stretch, outer, widening) - pressure * volume_by_length
+        wall = self._wall_force(stretch, outer, widening)
+        return wall - pressure * volume_by_length
 
     def _wall_force(self, stretch: Value, outer: Value, widening: Value) -> Value:
         """Tension of the wall dU/dL [N], at a stretch [1] and an outer radius [m] that changes with

@@ -1,0 +1,10 @@
+from .audited_law import AuditedLaw as AuditedLaw
+from .audited_law import EnclosedVolume as EnclosedVolume
+from .constants import audit_constants as audit_constants
+from .finding import AuditFinding as AuditFinding
+from .finding import AuditResult as AuditResult
+from .function_process import FunctionProcess as FunctionProcess
+from .known_law import law_of_entry as law_of_entry
+from .known_law import law_of_points as law_of_points
+from .law_audit import audit_law as audit_law
+from .orifice import audit_orifice as audit_orifice
