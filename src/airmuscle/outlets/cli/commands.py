@@ -68,21 +68,13 @@ COMMANDS = (
     CommandRow(
         "check", "check", "check", "Check whether records are usable, right after a measurement."
     ),
-    CommandRow(
-        "audit",
-        "audit",
-        "audit",
-        "Examine a law, an orifice or constants of others.",
-    ),
+    CommandRow("audit", "audit", "audit", "Examine a law, an orifice or constants of others."),
     CommandRow(
         "recipe", "recipe", "recipe", "Predict a muscle made by hand from tube, braid and length."
     ),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow(
-        "approximate",
-        "approximate",
-        "approximate",
-        "Approximate one characteristic by another.",
+        "approximate", "approximate", "approximate", "Approximate one characteristic by another."
     ),
     CommandRow("convert", "convert", "convert", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow(
@@ -119,27 +111,15 @@ COMMANDS = (
         "Fit the volume of a muscle over its contraction.",
     ),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
-    CommandRow(
-        "play", "play", "play_signals", "Play planned signals on a test rig and record them."
-    ),
-    CommandRow(
-        "watch",
-        "watch",
-        "watch",
-        "Read, check and identify the new files of a folder as they come.",
-    ),
+    CommandRow("play", "play", "play_signals", "Play planned signals on a test rig."),
+    CommandRow("watch", "watch", "watch", "Identify the new files of a folder as they come."),
     CommandRow(
         "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
     ),
     CommandRow(
         "size", "size", "size", "Size muscles of the catalogue for a lift, a joint or a gripper."
     ),
-    CommandRow(
-        "body",
-        "body",
-        "body",
-        "Study the routes of muscles on a robot's body.",
-    ),
+    CommandRow("body", "body", "body", "Study the routes of muscles on a robot's body."),
     CommandRow(
         "fit-out",
         "fit_out",
@@ -147,10 +127,7 @@ COMMANDS = (
         "Choose the muscles of a robot's body for its routes.",
     ),
     CommandRow(
-        "route",
-        "route",
-        "route",
-        "Move points of routes so that they meet torques over angles.",
+        "route", "route", "route", "Move points of routes so that they meet torques over angles."
     ),
     CommandRow(
         "cam", "cam", "cam", "Design a cam on which a muscle gives a torque over the angle."
