@@ -99,9 +99,11 @@ def convergence(result: ControlComparison) -> str:
     ended = [list(map(int, str(each).split(" of "))) for each in found.columns["converged"]]
     pairs = zip(found.columns["controller"], found.columns["spread"], strict=True)
     beyond = [str(name) for name, value in pairs if value is not None and value > SEARCH_SPREAD]
+    open_ended = ", ".join(result.unfinished) or "none"
     text = (
         f"{sum(n for n, _ in ended)} of {sum(m for _, m in ended)} searches converged within their"
-        " sets of gains; "
+        f" sets of gains (not: {open_ended}; their scores say as much about the search as about the"
+        " controller); "
     )
     if len(result.seeds) == 1:
         return text + "one search each, so that its spread is not known."

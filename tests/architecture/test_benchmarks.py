@@ -64,6 +64,11 @@ def test_the_page_of_the_control_benchmark_has_the_tables_of_a_result_in_their_u
         (searched,) = re.findall(r"\| controller \| gains .*\n.*\n(.*)", text)
         assert re.search(spread, searched)
         assert f"0 of {len(seeds)} searches converged" in control_page.convergence(found)
+        assert "(not: feed-forward; their scores say as much" in control_page.convergence(found)
+        assert found.unfinished == {"feed-forward": len(seeds)}
+        assert f"feed-forward ({len(seeds)} of {len(seeds)})" in " ".join(found.chapter().notes)
+        ranked = found.ranking_table(Group.MODELS).columns["searches converged"]
+        assert ranked.values == [f"0 of {len(seeds)}"]
 
 
 def test_contenders_of_the_benchmark_are_run_on_some_tasks(tmp_path, capsys):

@@ -146,6 +146,18 @@ class ControlComparison(Reported):
         scores = {name: spread(values) for name, values in self.ratios(group).items()}
         return dict(sorted(scores.items(), key=lambda item: item[1].median))
 
+    @property
+    def unfinished(self) -> dict[str, int]:
+        """The contenders with searches that ended with their budget, and the number of those: their
+        scores are at most as good as those of a longer search.
+        """
+        counts = dict[str, int]()
+        for result in self.results:
+            tuning = result.tuning
+            if tuning is not None and not tuning.converged:
+                counts[result.name] = counts.get(result.name, 0) + 1
+        return counts
+
     def chapter(self, curves: Sequence[LearningCurve] = ()) -> Chapter:
         """The description of the comparison: ranking and errors of each group, searches, gains,
         truths; and learning.
@@ -195,7 +207,7 @@ class ControlComparison(Reported):
             values=(NamedValue("seeds", ", ".join(map(str, self.seeds)), brief=False),),
             tables=tuple(table for table in tables if table is not None),
             plots=tuple(plots),
-            notes=tuple(learned),
+            notes=(*self._search_notes(), *learned),
             references=tuple(
                 {reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values()
             ),
@@ -230,6 +242,7 @@ class ControlComparison(Reported):
                 "air, mean": metric_column("air", [sum(values) / len(values) for values in air]),
                 "strokes at rest": metric_column("strokes", strokes),
                 "valve life at rest": metric_column("valve_life", life, short="life at rest"),
+                "searches converged": [self._converged(name) for name in scores],
                 "runs completed": TableColumn(
                     [float(np.isfinite(e).mean()) for e in errors], "1", "%", brief=False
                 ),
@@ -296,6 +309,30 @@ class ControlComparison(Reported):
         figure = partial(run_figure, results, chosen, group, truth)
         caption = f"Angle and error over time, {group}, {truth}, first search."
         return Plot("runs", caption, figure)
+
+    def _converged(self, name: str) -> str:
+        """How many searches of a contender have converged, or the contender whose gains it has."""
+        results = [result for result in self.results if result.name == name]
+        source = results[0].contender.tuned_as
+        tunings = [result.tuning for result in results if result.tuning is not None]
+        if not tunings:
+            return "not tuned"
+        converged = sum(tuning.converged for tuning in tunings)
+        text = f"{converged} of {len(tunings)}"
+        return f"{text}, of {source.name}" if source is not None else text
+
+    def _search_notes(self) -> list[str]:
+        """Which scores are those of searches that have not ended."""
+        searches = len(self.seeds)
+        names = [f"{name} ({count} of {searches})" for name, count in self.unfinished.items()]
+        if not names:
+            return []
+        return [
+            "searches that ended with their sets of gains before they converged:"
+            f" {', '.join(names)}; the scores of these controllers say as much about the search as"
+            " about the controller,"
+            " and a longer search may lower them"
+        ]
 
     @property
     def _task_names(self) -> list[str]:
