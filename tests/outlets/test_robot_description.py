@@ -198,14 +198,19 @@ def test_of_stick_slip_the_constant_friction_is_written_and_the_rest_is_named(
     else:
         frictions = [each.get("friction") for each in root.iter("dynamics")]
     assert list(map(float, frictions)) == [0.4, 0.7]
-    assert written.left_out == (
+    libraries = [text for text in written.left_out if text.startswith("the library of the plugin")]
+    assert len(libraries) == (len(written.plugins) if writer is write_mjcf else 0)
+    assert all("not built in this test" in text for text in libraries)
+    assert tuple(text for text in written.left_out if text not in libraries) == (
         "the friction by the tensions of the muscles, at 100 N each: 0.4 N m (joint2.angle)",
         "the friction by the load of a bearing, at 100 N: 2 N m (joint2.angle)",
         "stiction above the friction in sliding: 0.2 N m (joint1.angle)",
         "the deflection before sliding: 0.115 deg (joint1.angle), 0.115 deg (joint2.angle)",
     )
     assert all(
-        f"left out: {text}" in written.path.read_text(encoding="utf-8") for text in written.left_out
+        f"left out: {text}" in written.path.read_text(encoding="utf-8")
+        for text in written.left_out
+        if text not in libraries
     )
 
 

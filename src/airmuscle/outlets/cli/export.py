@@ -245,10 +245,8 @@ def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
     for plugin in written.plugins:
         paths += plugin.files
     remarks = list(dict.fromkeys(plugin.remark for plugin in written.plugins if plugin.remark))
-    lines = [f"plugins, source only: {remark}" for remark in remarks]
     left_out = list(written.left_out)
-    if left_out:
-        lines.append(f"left out: {', '.join(left_out)}")
+    lines = [f"left out: {', '.join(left_out)}"] if left_out else []
     return Exported(paths, lines, {"remarks": remarks, "left_out": left_out})
 
 

@@ -7,12 +7,26 @@ import functools
 import hashlib
 import math
 import re
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core import Array, Input, ParameterError, ShortRepr, check_known, leaves, with_parameters
+import numpy as np
+
+from ...core import (
+    AirmuscleWarning,
+    Array,
+    Input,
+    ParameterError,
+    ShortRepr,
+    check_known,
+    leaves,
+    with_parameters,
+)
 from ...engine.compile.program import compile_system
+from ...engine.loop import Schedule
+from ...engine.run import simulate
 from ...engine.run.integrators import Rodas4
 from ...physics.mechanism import HangingMass
 from ...physics.plant import Plant, open_plant
@@ -32,14 +46,21 @@ from .printed_system import export_system
 from .write import write_files
 
 OLDEST = (3, 17)
-BROKEN = ("4.0.0",)
-"""First version of MuJoCo whose plugin actuators have several states, and versions in which they do
-not work.
+NEWEST = (4, 0)
+"""First version of MuJoCo whose plugin actuators have several states, and the last one with which
+the plugins were tried.
+"""
+SELF_TEST_STEPS = 20
+SELF_TEST_TOLERANCE = 1e-4
+"""Steps of a self-test, and the greatest difference of a state from the library that it permits,
+relative to its change (chosen).
 """
 TOLERANCE = 1e-7
 """Relative tolerance of the integration of the muscle within a step of MuJoCo; chosen."""
 REST_LENGTH = "rest_length"
 """Attribute: the length of the transmission [m] at which the muscle has its resting length."""
+_TESTED: set[str] = set()
+"""The plugins of this process that were tested against the library."""
 _LOADED: dict[str, str] = {}
 """The plugins of this process by name, each with the digest of its library."""
 NOTE = (
@@ -128,6 +149,8 @@ class MuscleActuator(ShortRepr):
                     f" {low:g} to {high:g} {leaf.declared.unit}."
                 )
         _load(self.plugin_name, self.library)
+        if is_unread(mujoco) and self.plugin_name not in _TESTED:
+            self.self_test()
         if self.plugin_name not in {p.plugin_name for p in spec.plugins}:
             spec.activate_plugin(self.plugin_name)
         instance = spec.add_plugin(name=f"{name}_plugin", plugin_name=self.plugin_name)
@@ -142,6 +165,49 @@ class MuscleActuator(ShortRepr):
         actuator.plugin.plugin_name = self.plugin_name
         actuator.plugin.active = True
         return actuator
+
+    def self_test(self) -> float:
+        """Run the muscle at a constant length in MuJoCo and in the library; the greatest difference
+        of its states, relative to their changes.
+
+        `add_to` does this once with a version of MuJoCo that is newer than those with which the
+        plugins were tried. Raises ParameterError where they differ.
+        """
+        mujoco = check_mujoco(warn=False)
+        _TESTED.add(self.plugin_name)
+        spec = mujoco.MjSpec()
+        body = spec.worldbody.add_body()
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0.0, 0.0], mass=1e12)
+        body.add_joint(name="held", type=mujoco.mjtJoint.mjJNT_SLIDE)
+        spec.option.gravity = [0.0, 0.0, 0.0]
+        self.add_to(spec, name="muscle", joint="held", rest_length=0.0)
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        level = 0.5 * self.control_range[1]
+        before = self.initialise(model, data, "muscle", pressure=1e5).copy()
+        data.ctrl[0] = level
+        for _ in range(SELF_TEST_STEPS):
+            mujoco.mj_step(model, data)
+        found = data.act[: before.size]
+        duration = SELF_TEST_STEPS * float(model.opt.timestep)
+        wanted = self._run_of_library(level, duration)
+        size = np.maximum(np.abs(wanted - before), 1e-3 * np.abs(before) + 1e-12)
+        difference = float((np.abs(found - wanted) / size).max())
+        if not difference <= SELF_TEST_TOLERANCE:
+            raise ParameterError(
+                f"MuJoCo {mujoco.__version__} does not run the plugin {self.plugin_name} as the"
+                f" library runs the muscle: states differ by {difference:.2g} of their change."
+                f" Install mujoco>={version_text(OLDEST)},<={version_text(NEWEST)}.*."
+            )
+        return difference
+
+    def _run_of_library(self, level: float, duration: float) -> Array:
+        """The states of the muscle after a time at constant length, with a control."""
+        plant = open_plant(self.plant, (0.0,))
+        inputs = Schedule({self.controls[0].name: ((0.0, level),)})
+        start = plant.state_at(pressure=1e5)
+        record = simulate(plant, inputs, duration=duration, initial_state=start)
+        return np.array([record[state.name][-1] for state in self.plant.states])
 
     def initialise(self, model: Any, data: Any, name: str, *, pressure: float = 0.0) -> Array:
         """Set the states of an actuator to a gauge pressure [Pa] at its present length; returns
@@ -230,22 +296,41 @@ def write_mujoco_plugin(
     )
 
 
-def check_mujoco() -> Any:
-    """The module mujoco. Raises ParameterError where it is missing, too old, or of a version that
-    does not work.
+def version_text(numbers: tuple[int, ...]) -> str:
+    """A version as text."""
+    return ".".join(map(str, numbers))
+
+
+def version_of(mujoco: Any) -> tuple[int, ...]:
+    """The first two numbers of the version of a module."""
+    return tuple(int(n) for n in re.findall(r"\d+", mujoco.__version__)[:2])
+
+
+def is_unread(mujoco: Any) -> bool:
+    """Whether a version of MuJoCo is newer than those with which the plugins were tried."""
+    return version_of(mujoco) > NEWEST
+
+
+def check_mujoco(*, warn: bool = True) -> Any:
+    """The module mujoco, with a warning of a version that was not tried. Raises ParameterError
+    where it is missing or too old.
     """
     try:
         import mujoco
     except ImportError:
+        raise ParameterError("the package mujoco is not installed; install mujoco>=3.17") from None
+    if version_of(mujoco) < OLDEST:
         raise ParameterError(
-            "the package mujoco is not installed; install mujoco>=3.17,!=4.0.0"
-        ) from None
-    version: str = mujoco.__version__
-    numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:2])
-    if numbers < OLDEST or version in BROKEN:
-        raise ParameterError(
-            f"MuJoCo {version} is not supported, because its plugin actuators cannot have several"
-            " states; install mujoco>=3.17,!=4.0.0"
+            f"MuJoCo {mujoco.__version__} is not supported, because its plugin actuators cannot"
+            " have several states; install mujoco>=3.17"
+        )
+    if warn and is_unread(mujoco):
+        warnings.warn(
+            f"MuJoCo {mujoco.__version__} is newer than {version_text(NEWEST)}, the last version"
+            " with which the plugins were tried; the first actuator is tested against the library"
+            " before it is used.",
+            AirmuscleWarning,
+            stacklevel=2,
         )
     return mujoco
 

@@ -176,7 +176,8 @@ class WrittenRobot:
     """The path of a robot description; of MJCF also the plugins of its muscles, which MuJoCo loads
     before the file.
 
-    left_out  what the mechanism has and the description cannot state, in words
+    left_out  what the mechanism has and the description cannot state, and libraries of plugins
+              that were not built, in words
     """
 
     path: Path
@@ -245,7 +246,13 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
         qpos=_numbers((0.0,) * len(robot.links)),
         act=_numbers(states),
     )
-    return WrittenRobot(_written(root, folder, f"{program}.xml"), tuple(made), robot.left_out)
+    missing = tuple(
+        f"the library of the plugin {plugin.plugin_name}: {plugin.remark}"
+        for plugin in made
+        if plugin.library is None
+    )
+    path = _written(root, folder, f"{program}.xml")
+    return WrittenRobot(path, tuple(made), (*robot.left_out, *missing))
 
 
 def _mjcf_body(
