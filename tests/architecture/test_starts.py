@@ -105,7 +105,7 @@ LINES = {
     "list": (("list",), 3_000),
     "evaluate": (
         ("evaluate", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"),
-        10_800,
+        10_900,
     ),
     "evaluate a law of measurements": (
         ("evaluate", "dmsp-20-300", "--pressure", "3 bar", "--force", "100 N"),
