@@ -75,18 +75,33 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
             continue
         cells = [column.values[i] for i in rows]
         heading = (brief and column.short) or name
-        if column.unit == BY_ROW:
-            pairs = zip(cells, scales, strict=True)
-            cells = [_times(cell, factor) for cell, (factor, _) in pairs]
-        elif name == UNIT:
+        if name == UNIT and column.unit != BY_ROW:
             cells = ["" if unit == "1" else unit for _, unit in scales]
         else:
-            factor, heading = _scaled_heading(name, heading, column, chosen=chosen)
-            cells = [_times(cell, factor) for cell in cells]
+            cells, heading = _scaled_cells(name, heading, column, cells, scales, chosen=chosen)
         if chosen and heading == MEANING:
             cells = _without_repetition(cells)
         shown.append(ShownColumn(heading, cells, column))
     return shown
+
+
+def _scaled_cells(
+    name: str,
+    heading: str,
+    column: TableColumn,
+    cells: Sequence[Any],
+    scales: Sequence[tuple[float, str]],
+    *,
+    chosen: bool,
+) -> tuple[list[Any], str]:
+    """The cells in the units in which they are shown, each in that of its row or all in one, and
+    the heading with the unit of all."""
+    if column.unit == BY_ROW:
+        factors = [factor for factor, _ in scales]
+    else:
+        factor, heading = _scaled_heading(name, heading, column, chosen=chosen)
+        factors = [factor] * len(cells)
+    return list(map(_times, cells, factors)), heading
 
 
 def _scales_of_rows(table: Table, rows: Sequence[int], *, chosen: bool) -> list[tuple[float, str]]:

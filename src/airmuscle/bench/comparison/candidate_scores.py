@@ -152,10 +152,10 @@ def _cross_validate(
         int(np.count_nonzero(rows.measured)) or rows.force.size for rows in points.left_out_rows
     )
     try:
-        for name, each, measured in points.left_out_residuals(candidate, fit, loss):
-            left_out += (
-                [FoldScore.of(name, np.clip(each, -limit, limit), measured)] if each.size else []
-            )
+        for name, errors, measured in points.left_out_residuals(candidate, fit, loss):
+            if errors.size:
+                score = FoldScore.of(name, np.clip(errors, -limit, limit), measured)
+                left_out.append(score)
             least = float(np.sqrt(sum(score.rmse**2 * score.rows for score in left_out) / count))
             if least > bound:
                 return _excess_error(
@@ -163,13 +163,13 @@ def _cross_validate(
                 )
     except AirmuscleError as error:
         return ExcludedModel(candidate.name, error.message, cause_of(error))
-    rows = np.array([each.rows for each in left_out])
+    rows = np.array([score.rows for score in left_out])
     return RankedModel(
         candidate,
         fit,
         rmse,
         cross_validated_rmse=float(
-            np.sqrt(np.average([each.rmse**2 for each in left_out], weights=rows))
+            np.sqrt(np.average([score.rmse**2 for score in left_out], weights=rows))
         ),
         aicc=aicc(rmse**2, measured_rows, count_parameters(fit)),
         fold_scores=tuple(left_out),
@@ -204,9 +204,9 @@ def score_candidates(
     `can_exclude` the laws that are not linear in all parameters, whose fits take longest, are
     scored last, and not cross-validated further where they cannot be recommended. The scores do not
     depend on the number of workers."""
-    late = [
-        i for i, each in enumerate(candidates) if can_exclude and max_excess(each) < float("inf")
-    ]
+    late = []
+    if can_exclude:
+        late = [i for i, law in enumerate(candidates) if max_excess(law) < float("inf")]
     early = [i for i in range(len(candidates)) if i not in late]
     scores_of: dict[int, tuple[Score, ...]] = {}
     with process_pool(workers, one_thread_each=True) as pool:
@@ -215,24 +215,9 @@ def score_candidates(
                 _ = split.points.findings  # before they are sent
         distribution = DistributedCalls(pool, _score_tasks, (tuple(splits), loss))
         for indices in (early, late):
-            lowest = [
-                min(
-                    (each.cross_validated_rmse for each in scores if isinstance(each, RankedModel)),
-                    default=np.inf,
-                )
-                for scores in zip(*scores_of.values(), strict=True)
-            ]
-            of_population: dict[Any, list[int]] = {}  # whose fits are computed once
-            for i in indices:
-                of_population.setdefault(
-                    tree.structure(population_of(candidates[i].law)), []
-                ).append(i)
-            groups = list(of_population.values())
-            if pool is not None:  # those that take longest first
-                groups.sort(
-                    key=lambda group: -sum(1 for i in group for _ in tree.leaves(candidates[i].law))
-                )
-            limits = {i: [max_excess(candidates[i]) * each for each in lowest] for i in indices}
+            lowest = _lowest_errors(list(scores_of.values()))
+            groups = _of_one_population(candidates, indices, longest_first=pool is not None)
+            limits = {i: [max_excess(candidates[i]) * error for error in lowest] for i in indices}
             tasks = [[(candidates[i], limits[i]) for i in group] for group in groups]
             for position, scores in distribution.completed(tasks):
                 for i, score in zip(groups[position], scores, strict=True):
@@ -242,6 +227,31 @@ def score_candidates(
     if progress is not None:
         progress("", 1.0)
     return [scores_of[i] for i in range(len(candidates))]
+
+
+def _lowest_errors(scores_of: Sequence[tuple[Score, ...]]) -> list[float]:
+    """The lowest cross-validated error of the laws for each split."""
+    lowest = []
+    for scores in zip(*scores_of, strict=True):
+        ranked = [score for score in scores if isinstance(score, RankedModel)]
+        lowest.append(min((model.cross_validated_rmse for model in ranked), default=np.inf))
+    return lowest
+
+
+def _of_one_population(
+    candidates: Sequence[Candidate], indices: Sequence[int], *, longest_first: bool
+) -> list[list[int]]:
+    """The candidates in groups of one population law, whose fits are computed once."""
+    of_population: dict[Any, list[int]] = {}
+    for i in indices:
+        structure = tree.structure(population_of(candidates[i].law))
+        of_population.setdefault(structure, []).append(i)
+    groups = list(of_population.values())
+
+    def size(group: Sequence[int]) -> int:
+        return sum(len(list(tree.leaves(candidates[i].law))) for i in group)
+
+    return sorted(groups, key=size, reverse=True) if longest_first else groups
 
 
 def max_excess(candidate: Candidate) -> float:

@@ -173,8 +173,10 @@ def compare_chapters(
     first.
     """
     return [
-        compare_chapter(each, recommended, reason, figures_of_fit=each is comparisons[0])
-        for each in comparisons
+        compare_chapter(
+            comparison, recommended, reason, figures_of_fit=comparison is comparisons[0]
+        )
+        for comparison in comparisons
     ]
 
 

@@ -149,11 +149,11 @@ def is_contradicted(model: RankedModel, best: RankedModel) -> bool:
     correlated."""
     if len(best.fold_scores) >= MIN_FOLDS:
         return False
-    own, other = (
-        aicc(each.in_sample_rmse**2, best.effective_rows, each.parameter_count)
-        for each in (model, best)
+    criterion, criterion_of_best = (
+        aicc(law.in_sample_rmse**2, best.effective_rows, law.parameter_count)
+        for law in (model, best)
     )
-    return bool(np.isfinite(other) and own - other > MAX_AICC_EXCESS)
+    return bool(np.isfinite(criterion_of_best) and criterion - criterion_of_best > MAX_AICC_EXCESS)
 
 
 def excess_error(model: RankedModel, best: RankedModel) -> float:
@@ -224,8 +224,8 @@ class Comparison(Reported):
         data.
         """
         names: dict[str, list[str]] = {}
-        for each in self.unavailable:
-            names.setdefault(each.cause, []).append(each.name)
+        for law in self.unavailable:
+            names.setdefault(law.cause, []).append(law.name)
         excluded = _unranked("excluded", "Laws that are not ranked", self.excluded, SHORT_LISTED)
         unavailable = _unranked("not-compared", "Laws that are not compared", self.unavailable, 0)
         return Chapter(
@@ -296,12 +296,13 @@ class Comparison(Reported):
 def _unranked(name: str, title: str, models: Sequence[ExcludedModel], brief: int) -> Table:
     too_large = "its error, {:.4g} N, is too large; its cross-validation was not completed"
     columns: dict[str, Any] = {
-        "law": [each.name for each in models],
+        "law": [model.name for model in models],
         "cause": [
-            each.cause if each.error is None else too_large.format(each.error) for each in models
+            model.cause if model.error is None else too_large.format(model.error)
+            for model in models
         ],
-        "error": TableColumn([each.error for each in models], "N", brief=False),
-        "reason": TableColumn([each.reason for each in models], brief=False),
+        "error": TableColumn([model.error for model in models], "N", brief=False),
+        "reason": TableColumn([model.reason for model in models], brief=False),
     }
     return Table(name, title, columns, brief=brief)
 
@@ -369,8 +370,8 @@ def compare_splits(
     )
     comparisons = []
     for split, of_split in zip(splits, zip(*scores, strict=True), strict=True):
-        ranking = [each for each in of_split if isinstance(each, RankedModel)]
-        excluded = tuple(each for each in of_split if isinstance(each, ExcludedModel))
+        ranking = [model for model in of_split if isinstance(model, RankedModel)]
+        excluded = tuple(model for model in of_split if isinstance(model, ExcludedModel))
         if not ranking:
             reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
             text = f"the data determine none of the {len(excluded)} candidates."

@@ -158,8 +158,8 @@ def ranked_specimen_errors(
 def _checked(
     scores: "Sequence[comparison.FoldScore]", law: Characteristic, recordings: Sequence[Recording]
 ) -> SpecimenErrors | None:
-    names = tuple(each.fold for each in scores)
-    rms = tuple(each.rmse for each in scores)
+    names = tuple(score.fold for score in scores)
+    rms = tuple(score.rmse for score in scores)
     if len(rms) < MIN_MEMBERS or not np.isfinite(rms).all() or max(rms) == 0.0:
         return None
     lengths = resting_lengths_of(recordings) if hasattr(law, "with_resting_length") else {}

@@ -68,6 +68,11 @@ def limits(values: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def files_of(recordings: Sequence[Recording]) -> str:
+    """The names of the files of recordings, as `file_list`."""
+    return file_list([recording.origin for recording in recordings])
+
+
 def file_list(origins: Sequence[str], most: int = 3) -> str:
     """Names of files as text, the first ones and the number of the others."""
     names = list(dict.fromkeys(origins))

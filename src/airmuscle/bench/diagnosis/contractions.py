@@ -11,7 +11,7 @@ from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from ..inspection import estimate_noise
 from ..readers import CODES, DropMissing, file_conversion
-from .bench_rows import BenchRows, bench_rows, file_list, limits, recordings_with
+from .bench_rows import BenchRows, bench_rows, file_list, files_of, limits, recordings_with
 from .pressures import REVERSED
 
 MAX_STRETCH = 0.05
@@ -47,29 +47,30 @@ MIN_RANGE = 0.02
 
 def check_contraction_signs(recordings: Sequence[Recording]) -> Iterator[str]:
     """A contraction of reversed sign, or that of percent as ratios."""
-    given = recordings_with(recordings, "contraction")
-    widest = max((limits(each["contraction"])[1] for each in given), default=0.0)
-    for each in given:
-        low, high = limits(each["contraction"])
+    measured = recordings_with(recordings, "contraction")
+    widest = max((limits(recording["contraction"])[1] for recording in measured), default=0.0)
+    for recording in measured:
+        low, high = limits(recording["contraction"])
         if low < -MAX_STRETCH and -low > REVERSED * max(high, 0.0):
             yield (
-                f"{each.origin}: the contraction is down to {100 * low:.3g} %, an elongation that"
-                " muscles do not bear. The contraction (L0 - L)/L0 of a shortened muscle is"
+                f"{recording.origin}: the contraction is down to {100 * low:.3g} %, an elongation"
+                " that muscles do not bear. The contraction (L0 - L)/L0 of a shortened muscle is"
                 " positive: check the resting length, or, if the column is a strain (L - L0)/L0,"
                 " multiply it by -1."
             )
             return
-        held = high - low <= NOISE_RANGE * estimate_noise(each["contraction"])
-        small = high - low > 2e-4 and high <= SMALL_CONTRACTION and low > -1e-3
+        is_held = high - low <= NOISE_RANGE * estimate_noise(recording["contraction"])
+        is_small = high - low > 2e-4 and high <= SMALL_CONTRACTION and low > -1e-3
         if (
-            each.units.get("contraction") == "%"
-            and small
-            and not held
+            recording.units.get("contraction") == "%"
+            and is_small
+            and not is_held
             and widest <= SMALL_CONTRACTION
         ):
             yield (
-                f"{each.origin}: the contraction changes from {100 * low:.3g} to {100 * high:.3g} %"
-                " only. If these numbers are ratios and not percent, state the unit '1'."
+                f"{recording.origin}: the contraction changes from {100 * low:.3g} to"
+                f" {100 * high:.3g} % only. If these numbers are ratios and not percent, state the"
+                " unit '1'."
             )
             return
 
@@ -104,15 +105,19 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
     """A muscle that pulls beyond `MAX_CONTRACTION`. Raises ColumnError where it pulls nowhere
     else.
     """
-    given = recordings_with(recordings, *BenchRows._fields)
-    rows = bench_rows(given)
+    measured = recordings_with(recordings, *BenchRows._fields)
+    rows = bench_rows(measured)
     pulling = rows.pulling.contraction
     beyond = pulling[pulling > MAX_CONTRACTION]
     if not beyond.size or not rows.greatest > 0:
         return
     low, high = limits(beyond)
     files = file_list(
-        [each.origin for each in given if limits(each["contraction"])[1] > MAX_CONTRACTION]
+        [
+            recording.origin
+            for recording in measured
+            if limits(recording["contraction"])[1] > MAX_CONTRACTION
+        ]
     )
     text = (
         f"{files}: the muscle pulls at a contraction of {100 * low:.3g} to {100 * high:.3g} %, but"
@@ -126,20 +131,22 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
 
 def check_length_and_contraction(recordings: Sequence[Recording]) -> Iterator[str]:
     """A length and a contraction of one file that contradict each other with the resting length."""
-    for each in recordings:
-        rest = each.constants.get("resting_length")
-        if not isinstance(rest, float | int) or not {"length", "contraction"} <= set(each.columns):
+    for recording in recordings:
+        rest = recording.constants.get("resting_length")
+        if not isinstance(rest, float | int) or not {"length", "contraction"} <= set(
+            recording.columns
+        ):
             continue
-        of_length = (rest - each["length"]) / rest
-        difference = np.abs(of_length - each["contraction"])
+        of_length = (rest - recording["length"]) / rest
+        difference = np.abs(of_length - recording["contraction"])
         if float(np.nanmedian(difference)) > MAX_DIFFERENCE:
             row = int(np.nanargmax(difference))
             yield (
-                f"{each.origin}: with the resting length of {1e3 * rest:.4g} mm, the length of"
-                f" {1e3 * each['length'][row]:.4g} mm is a contraction of"
+                f"{recording.origin}: with the resting length of {1e3 * rest:.4g} mm, the length of"
+                f" {1e3 * recording['length'][row]:.4g} mm is a contraction of"
                 f" {100 * of_length[row]:.3g} %, but the file states"
-                f" {100 * each['contraction'][row]:.3g} %, which is used. Check the resting length"
-                " and the units."
+                f" {100 * recording['contraction'][row]:.3g} %, which is used. Check the resting"
+                " length and the units."
             )
 
 
@@ -163,7 +170,7 @@ def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:
             slopes.append(float(np.linalg.lstsq(matrix, part.force, rcond=None)[0][1]))
     if slopes and np.mean(np.array(slopes) > 0) >= MIN_RISING:
         yield (
-            f"{file_list([each.origin for each in recordings])}: the force rises with the"
+            f"{files_of(recordings)}: the force rises with the"
             " contraction at nearly every pressure, but that of a muscle falls. The column"
             " probably counts the elongation, or the displacement from the shortest length: the"
             " contraction (L0 - L)/L0 is 0 at the resting length and grows as the muscle shortens."
@@ -179,11 +186,13 @@ its rows (chosen).
 
 def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """A column whose extreme reading is a code for a missing value, far from all other readings."""
-    found: dict[tuple[str, float], list[tuple[str, int]]] = {}
-    for each in recordings:
-        for name, value, rows in _missing_codes(each):
-            found.setdefault((name, value), []).append((each.origin, int(np.count_nonzero(rows))))
-    for (name, value), places in found.items():
+    places_of: dict[tuple[str, float], list[tuple[str, int]]] = {}
+    for recording in recordings:
+        for name, value, rows in _missing_codes(recording):
+            places_of.setdefault((name, value), []).append(
+                (recording.origin, int(np.count_nonzero(rows)))
+            )
+    for (name, value), places in places_of.items():
         number = counted(sum(count for _, count in places), "row")
         yield HintedText(
             f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {number},"
@@ -195,10 +204,10 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
 
 def without_missing_codes(recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings without the rows in which a value is missing."""
-    missing = [[rows for _, _, rows in _missing_codes(each)] for each in recordings]
+    missing = [[rows for _, _, rows in _missing_codes(recording)] for recording in recordings]
     return [
-        each.rows(~np.any(own, axis=0)) if own else each
-        for each, own in zip(recordings, missing, strict=True)
+        recording.rows(~np.any(masks, axis=0)) if masks else recording
+        for recording, masks in zip(recordings, missing, strict=True)
     ]
 
 
@@ -217,10 +226,10 @@ def _missing_codes(recording: Recording) -> Iterator[tuple[str, float, Array]]:
             written = (
                 extreme if change is None else float((extreme - change.offset) / change.factor)
             )
-            others = known[known != extreme]
+            readings = known[known != extreme]
             is_code = any(abs(abs(written) - code) <= 1e-6 * code for code in CODES)
-            if is_code and others.size >= (1.0 - MAX_SHARE) * known.size:
-                distance = float(np.min(np.abs(others - extreme)))
-                if distance > max(MIN_DISTANCE * float(np.ptp(others)), 0.0):
+            if is_code and readings.size >= (1.0 - MAX_SHARE) * known.size:
+                distance = float(np.min(np.abs(readings - extreme)))
+                if distance > max(MIN_DISTANCE * float(np.ptp(readings)), 0.0):
                     yield name, written, values == extreme
                     break

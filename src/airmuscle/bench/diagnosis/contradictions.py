@@ -52,26 +52,26 @@ def find_repeated_rows(
     least = [
         max((rounding(name, run[name]) for run in recordings), default=0.0) for name in columns
     ]
-    found = []
+    repeated = []
     for here, there, offset in _candidates(recordings, columns):
-        one = recordings[here]
-        other = recordings[there]
+        later = recordings[here]
+        earlier_run = recordings[there]
         first = max(offset, 0)
-        last = min(len(one), len(other) + offset)
+        last = min(len(later), len(earlier_run) + offset)
         rows = slice(first, last)
         earlier = slice(first - offset, last - offset)
         same = np.logical_and.reduce(
             [
-                np.abs(one[name][rows] - other[name][earlier]) <= tolerance
+                np.abs(later[name][rows] - earlier_run[name][earlier]) <= tolerance
                 for name, tolerance in zip(columns, least, strict=True)
             ]
         )
         for stretch in true_intervals(same):
             rows = slice(first + stretch.start, first + stretch.stop)
-            is_long = len(stretch) >= min(MIN_ROWS, len(one), len(other))
-            if is_long and distinct_readings(one["force"][rows]).size >= MIN_LEVELS:
-                found.append(RepeatedRows(here, rows, (one.origin, other.origin)))
-    return tuple(found)
+            is_long = len(stretch) >= min(MIN_ROWS, len(later), len(earlier_run))
+            if is_long and distinct_readings(later["force"][rows]).size >= MIN_LEVELS:
+                repeated.append(RepeatedRows(here, rows, (later.origin, earlier_run.origin)))
+    return tuple(repeated)
 
 
 def _candidates(
@@ -104,8 +104,8 @@ def _candidates(
     if equal.size < MIN_LEVELS:
         return
     pairs = np.stack([run[equal + 1], run[equal], row[equal + 1] - row[equal]])
-    found, counts = np.unique(pairs, axis=1, return_counts=True)
-    yield from found[:, counts >= MIN_LEVELS].T.tolist()
+    candidates, counts = np.unique(pairs, axis=1, return_counts=True)
+    yield from candidates[:, counts >= MIN_LEVELS].T.tolist()
 
 
 MIN_DIFFERENCE = 0.04
@@ -131,32 +131,41 @@ def repeatability(matches: Matches) -> float | None:
     """The standard deviation of the force of a run from that of another at equal pressure,
     contraction and direction [N]; None where no runs overlap."""
     squares = [
-        float(np.mean(each.differences**2)) for each in matches.runs if not each.is_unordered
+        float(np.mean(runs.differences**2)) for runs in matches.runs if not runs.is_unordered
     ]
     return float(np.sqrt(np.mean(squares) / 2.0)) if squares else None
 
 
 def contradiction_notes(matches: Matches) -> list[str]:
     """The remark that runs contradict each other, with its cause; empty if they do not."""
-    found = []
-    for each in matches.runs:
-        share = MIN_DIFFERENCE if each.first.direction else MAX_HYSTERESIS
-        if (
-            abs(each.typical)
-            > (UNORDERED_DIFFERENCE if each.is_unordered else share) * matches.greatest
-        ):
-            found.append(each)
-    contradicting = [each for each in found if each.are_near] or found
-    if not contradicting:
+    differing = [runs for runs in matches.runs if _differ(runs, matches.greatest)]
+    contradicting = [runs for runs in differing if runs.are_near] or differing
+    if not contradicting or _rms_difference(matches) < MIN_RMS * matches.greatest:
         return []
-    rms = np.sqrt(np.mean([np.mean(each.differences**2) for each in matches.runs]))
-    if rms < MIN_RMS * matches.greatest:
-        return []
-    typical = float(np.median([abs(each.typical) for each in contradicting]))
-    worst = max(contradicting, key=lambda each: abs(each.typical))
-    unordered = all(each.is_unordered for each in contradicting)
+    return [_contradiction(contradicting, matches)]
+
+
+def _differ(runs: MatchedRuns, greatest: float) -> bool:
+    """Whether two runs differ by more than their hysteresis may be, at this maximum force [N]."""
+    if runs.is_unordered:
+        share = UNORDERED_DIFFERENCE
+    else:
+        share = MIN_DIFFERENCE if runs.first.direction else MAX_HYSTERESIS
+    return bool(abs(runs.typical) > share * greatest)
+
+
+def _rms_difference(matches: Matches) -> float:
+    squares = [np.mean(runs.differences**2) for runs in matches.runs]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _contradiction(contradicting: Sequence[MatchedRuns], matches: Matches) -> HintedText:
+    """The remark on contradicting runs, with an example and the cause."""
+    typical = float(np.median([abs(runs.typical) for runs in contradicting]))
+    worst = max(contradicting, key=lambda runs: abs(runs.typical))
+    unordered = all(runs.is_unordered for runs in contradicting)
     who = "rows" if unordered else f"{len(contradicting)} of {len(matches.runs)} pairs of runs"
-    at_one_place = all(each.are_near for each in contradicting)
+    at_one_place = all(runs.are_near for runs in contradicting)
     where = (
         "at equal pressure and contraction"
         if at_one_place
@@ -166,7 +175,7 @@ def contradiction_notes(matches: Matches) -> list[str]:
         f"Rows contradict each other: {where} the forces of {who} differ by {typical:.3g} N "
         f"(median), which no law can follow. {_example(worst)}"
     )
-    return [HintedText(text, *_cause(contradicting, matches), HYSTERESIS if unordered else "")]
+    return HintedText(text, *_cause(contradicting, matches), HYSTERESIS if unordered else "")
 
 
 def _example(runs: MatchedRuns) -> str:
@@ -189,12 +198,12 @@ def _example(runs: MatchedRuns) -> str:
 
 def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str | Hint]:
     """The cause and the remedy, as far as the contradictions show them."""
-    chosen = {id(each) for each in contradicting}
+    chosen = {id(runs) for runs in contradicting}
     for column in contradicting[0].first.labels:
         differs = {
-            id(each)
-            for each in matches.runs
-            if each.first.labels.get(column) != each.second.labels.get(column)
+            id(runs)
+            for runs in matches.runs
+            if runs.first.labels.get(column) != runs.second.labels.get(column)
         }
         if not chosen <= differs or len(differs - chosen) > 0.5 * len(differs):
             continue  # its values do not differ in all contradicting pairs, or in many others
@@ -208,14 +217,14 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
             " Fit each specimen by itself, or at least three together with --compare.",
         ]
     # The error of the pressure of the first block that would explain the differences.
-    slopes = [np.maximum(each.first.slopes[each.pairs[:, 0]], 1e-12) for each in contradicting]
+    slopes = [np.maximum(runs.first.slopes[runs.pairs[:, 0]], 1e-12) for runs in contradicting]
     shifts = -np.array(
-        [np.median(each.differences / s) for each, s in zip(contradicting, slopes, strict=True)]
+        [np.median(runs.differences / s) for runs, s in zip(contradicting, slopes, strict=True)]
     )
     if np.mean(np.abs(np.abs(shifts) / AMBIENT_PRESSURE - 1.0) < SHIFT_TOLERANCE) > 0.5:
         pairs = zip(contradicting, shifts, strict=True)
         names = [
-            (each.first if shift > 0 else each.second).recording.origin for each, shift in pairs
+            (runs.first if shift > 0 else runs.second).recording.origin for runs, shift in pairs
         ]
         return [
             f" A pressure of one atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa, explains the"
@@ -252,21 +261,24 @@ def two_muscle_notes(matches: Matches) -> list[str]:
     not. A drift has no gap between two levels. Hysteresis, and friction that grows with the speed,
     raise the force of one direction of the motion and lower that of the other, so that both
     directions must give the same groups; static points must differ by more than hysteresis."""
-    runs = [each for each in matches.runs if not each.is_unordered]
-    is_static = all(each.first.direction == 0 for each in runs)
-    ways, least = ((0,), MAX_HYSTERESIS) if is_static else ((1, -1), MIN_DIFFERENCE)
+    runs = [pair for pair in matches.runs if not pair.is_unordered]
+    is_static = all(pair.first.direction == 0 for pair in runs)
+    directions, least = ((0,), MAX_HYSTERESIS) if is_static else ((1, -1), MIN_DIFFERENCE)
     groups = [
-        _two_groups([each for each in runs if each.first.direction == way], least) for way in ways
+        _two_groups([pair for pair in runs if pair.first.direction == direction], least)
+        for direction in directions
     ]
-    found = [each for each in groups if each is not None]
-    if len(found) < len(ways) or not all(_agree(found[0], each) for each in found[1:]):
+    divided = [pair for pair in groups if pair is not None]
+    if len(divided) < len(directions) or not all(_agree(divided[0], pair) for pair in divided[1:]):
         return []
+    difference = min(pair.difference for pair in divided)
+    scatter = max(pair.scatter for pair in divided)
+    sides = (_places([block for pair in divided for block in pair.sides[i]]) for i in (0, 1))
     text = (
-        "The runs fall into two groups: their forces differ by"
-        f" {100 * min(g.difference for g in found):.2g} % at equal pressure and contraction, and"
-        f" agree to {100 * max(g.scatter for g in found):.2g} % within a group"
-        f" ({'; '.join(_places([b for g in found for b in g.sides[i]]) for i in (0, 1))}). Are they"
-        " two muscles, or has the muscle or a zero changed between them? "
+        f"The runs fall into two groups: their forces differ by {100 * difference:.2g} % at equal"
+        f" pressure and contraction, and agree to {100 * scatter:.2g} % within a group"
+        f" ({'; '.join(sides)}). Are they two muscles, or has the muscle or a zero changed between"
+        " them? "
     )
     purpose = "To fit each muscle by itself, write its name in a column, and"
     return [HintedText(text, Hint(purpose, "columns", {"muscle": "specimen"}, "ColumnMapping"))]
@@ -277,15 +289,15 @@ def _two_groups(runs: Sequence[MatchedRuns], least: float) -> TwoGroups | None:
     scatter divides them. The levels, of mean zero where matched rows connect them, solve the
     relative differences by least squares.
     """
-    blocks = list({id(b): b for each in runs for b in (each.first, each.second)}.values())
+    blocks = list({id(b): b for pair in runs for b in (pair.first, pair.second)}.values())
     if len(blocks) < MIN_GROUPED:
         return None
     number = {id(block): i for i, block in enumerate(blocks)}
     matrix = np.zeros((len(runs), len(blocks)))
     ratios = np.zeros(len(runs))
-    for i, each in enumerate(runs):
-        ratios[i] = 2.0 * np.median(each.differences / sum(each.forces))
-        matrix[i, [number[id(each.first)], number[id(each.second)]]] = 1.0, -1.0
+    for i, pair in enumerate(runs):
+        ratios[i] = 2.0 * np.median(pair.differences / sum(pair.forces))
+        matrix[i, [number[id(pair.first)], number[id(pair.second)]]] = 1.0, -1.0
     levels = np.linalg.lstsq(matrix, ratios, rcond=1e-10)[0]
     order = np.argsort(levels)
     gaps = np.diff(levels[order])

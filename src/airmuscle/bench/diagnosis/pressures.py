@@ -15,7 +15,7 @@ from .bench_rows import (
     PressureLine,
     RestLine,
     bench_rows,
-    file_list,
+    files_of,
     limits,
     pressure_lines,
     recordings_with,
@@ -55,11 +55,13 @@ def check_lowest_pressures(recordings: Sequence[Recording]) -> Iterator[HintedTe
     pull.
     """
     unstated = [
-        each for each in recordings_with(recordings, "pressure") if _states_reference(each) is False
+        recording
+        for recording in recordings_with(recordings, "pressure")
+        if _states_reference(recording) is False
     ]
     if not unstated:
         return
-    first = min(unstated, key=lambda each: float(each["pressure"].min()))
+    first = min(unstated, key=lambda recording: float(recording["pressure"].min()))
     lowest = float(first["pressure"].min())
     if not _is_atmosphere(lowest) or not _begins_at_ambient(first, _greatest_force(recordings)):
         return
@@ -74,23 +76,23 @@ def check_lowest_pressures(recordings: Sequence[Recording]) -> Iterator[HintedTe
 
 def check_mixed_pressures(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """Ramps that begin at the atmosphere beside ramps that begin at zero pressure."""
-    given = [
-        each
-        for each in recordings_with(recordings, "pressure", "force")
-        if not _states_reference(each)
+    unstated = [
+        recording
+        for recording in recordings_with(recordings, "pressure", "force")
+        if not _states_reference(recording)
     ]
-    ramps = [each for each in given if np.ptp(each["pressure"]) > MIN_RISE]
+    ramps = [recording for recording in unstated if np.ptp(recording["pressure"]) > MIN_RISE]
     greatest = _greatest_force(recordings)
-    lowest = {id(each): float(np.min(each["pressure"])) for each in ramps}
+    lowest = {id(recording): float(np.min(recording["pressure"])) for recording in ramps}
     absolute = [
         e for e in ramps if _is_atmosphere(lowest[id(e)]) and _begins_at_ambient(e, greatest)
     ]
-    gauge = [each for each in ramps if abs(lowest[id(each)]) <= NO_PRESSURE]
+    gauge = [recording for recording in ramps if abs(lowest[id(recording)]) <= NO_PRESSURE]
     if absolute and gauge:
         yield HintedText(
-            f"{file_list([each.origin for each in absolute])}: the pressure begins at"
+            f"{files_of(absolute)}: the pressure begins at"
             f" {lowest[id(absolute[0])] / 1e3:.4g} kPa, that of the atmosphere, and the muscle does"
-            f" not pull there, but in {file_list([each.origin for each in gauge])} it begins at"
+            f" not pull there, but in {files_of(gauge)} it begins at"
             f" {lowest[id(gauge[0])] / 1e3:.3g} kPa: absolute and gauge pressures are mixed. State"
             " the unit of the absolute ones in their headings, 'kPa(a)'."
         )
@@ -101,9 +103,9 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
     zero pressure.
     """
     unstated = [
-        each
-        for each in recordings_with(recordings, *BenchRows._fields)
-        if not _states_reference(each)
+        recording
+        for recording in recordings_with(recordings, *BenchRows._fields)
+        if not _states_reference(recording)
     ]
     rows = bench_rows(unstated)
     if not rows.force.size or float(np.min(rows.pressure)) < ATMOSPHERE[0]:
@@ -118,7 +120,7 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
     at_rest = rest_line(lines)
     if at_rest is not None and low <= at_rest.zero_force_pressure <= high:
         yield HintedText(
-            f"{file_list([each.origin for each in unstated])}: at zero contraction, where the wall"
+            f"{files_of(unstated)}: at zero contraction, where the wall"
             " has no force, the force extrapolates to zero at"
             f" {at_rest.zero_force_pressure / 1e3:.3g} kPa, near the pressure of the atmosphere"
             f" ({AMBIENT_PRESSURE / 1e3:.4g} kPa). The pressures are probably absolute, but read as"
@@ -127,7 +129,7 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
         )
     elif len(small) > 1 and low <= least and max(small) <= high:
         yield HintedText(
-            f"{file_list([each.origin for each in unstated])}: the force extrapolates to zero at"
+            f"{files_of(unstated)}: the force extrapolates to zero at"
             f" {least / 1e3:.3g} kPa or more at every contraction, {max(small) / 1e3:.3g} kPa or"
             " less at small ones, near the pressure of the atmosphere"
             f" ({AMBIENT_PRESSURE / 1e3:.4g} kPa). The pressures are probably absolute, but read as"
@@ -140,11 +142,14 @@ def check_pressure_zero(recordings: Sequence[Recording]) -> Iterator[HintedText]
     """A lowest pressure, but for two glitches, below that of the atmosphere, by less than the
     vacuum of a rig.
     """
-    given = [each for each in recordings_with(recordings, "pressure") if len(each) > 2]
+    measured = [
+        recording for recording in recordings_with(recordings, "pressure") if len(recording) > 2
+    ]
     lowest, origin = min(
-        ((float(np.sort(each["pressure"])[2]), each.origin) for each in given), default=(0.0, "")
+        ((float(np.sort(recording["pressure"])[2]), recording.origin) for recording in measured),
+        default=(0.0, ""),
     )
-    if MAX_ZERO_ERROR < lowest < -MAX_ZERO * _highest_pressure(given)[0]:
+    if MAX_ZERO_ERROR < lowest < -MAX_ZERO * _highest_pressure(measured)[0]:
         yield HintedText(
             f"{origin}: the gauge pressure is down to {lowest / 1e3:.3g} kPa. Unless the rig draws"
             " a vacuum, the zero of the pressure sensor is wrong, and all pressures by the same"
@@ -167,15 +172,16 @@ def check_pressure_limit(recordings: Sequence[Recording]) -> Iterator[str]:
 def _highest_pressure(recordings: Sequence[Recording]) -> tuple[float, str]:
     """The highest pressure [Pa] of all recordings and its file; 0 without any."""
     pressures = [
-        (float(np.nanmax(each["pressure"])), each.origin)
-        for each in recordings_with(recordings, "pressure")
+        (float(np.nanmax(recording["pressure"])), recording.origin)
+        for recording in recordings_with(recordings, "pressure")
     ]
     return max(pressures, default=(0.0, ""))
 
 
 def _greatest_force(recordings: Sequence[Recording]) -> float:
     return max(
-        (limits(each["force"])[1] for each in recordings_with(recordings, "force")), default=0.0
+        (limits(recording["force"])[1] for recording in recordings_with(recordings, "force")),
+        default=0.0,
     )
 
 
@@ -241,7 +247,10 @@ NEAR_RATED = 0.08
 
 def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
     """A force that is negative where the muscle pulls, or that states a pushing muscle."""
-    forces = {each.origin: limits(each["force"]) for each in recordings_with(recordings, "force")}
+    forces = {
+        recording.origin: limits(recording["force"])
+        for recording in recordings_with(recordings, "force")
+    }
     size = max((abs(value) for pair in forces.values() for value in pair), default=0.0)
     greatest = max((high for _, high in forces.values()), default=0.0)
     for origin, (low, high) in forces.items():
@@ -269,17 +278,18 @@ def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
     """A maximum force that no bore of a muscle explains at the highest pressure, or only a bore
     beyond those on sale at an unusually low pressure.
     """
-    given = recordings_with(recordings, "pressure", "force")
-    greatest = _greatest_force(given)
+    measured = recordings_with(recordings, "pressure", "force")
+    greatest = _greatest_force(measured)
     highest, _ = _highest_pressure(recordings)
     varied = any(
-        np.nanmax(each["pressure"]) - np.nanmin(each["pressure"]) > 0.1 * highest for each in given
+        np.nanmax(recording["pressure"]) - np.nanmin(recording["pressure"]) > 0.1 * highest
+        for recording in measured
     )
     if greatest <= 0 or highest <= 0 or (highest < 1e3 and not varied):
         return
     bore = float(np.sqrt(4.0 / np.pi * greatest / (RATED_FORCE * highest)))
     least, largest = BORES
-    if not _reaches_rest(given):
+    if not _reaches_rest(measured):
         least *= float(np.sqrt(MIN_REACH))
     is_unlikely = bore > USUAL_BORE and highest < USUAL_PRESSURE
     if least <= bore <= largest and not is_unlikely:
@@ -297,7 +307,10 @@ def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
 def _reaches_rest(recordings: Sequence[Recording]) -> bool:
     """Whether the force was measured near the resting length, or at lengths that are not known."""
     lengths = recordings_with(recordings, "contraction")
-    return not lengths or min(limits(each["contraction"])[0] for each in lengths) < NEAR_RATED
+    return (
+        not lengths
+        or min(limits(recording["contraction"])[0] for recording in lengths) < NEAR_RATED
+    )
 
 
 MAX_EXTRAPOLATED = 0.015
@@ -316,12 +329,12 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     and does not pull (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall:
     Tondu and Lopez 2000).
     """
-    given = recordings_with(recordings, *BenchRows._fields)
-    rows = bench_rows(given)
+    measured = recordings_with(recordings, *BenchRows._fields)
+    rows = bench_rows(measured)
     if not rows.force.size or not rows.greatest > 0:
         return
     places = {"at zero pressure and shortened length": rows.slack}
-    places["over a range of contractions at constant pressure"] = of_bench.slack_plateaus(given)
+    places["over a range of contractions at constant pressure"] = of_bench.slack_plateaus(measured)
     for place, slack in places.items():
         reading = float(np.median(slack.force)) if slack.force.size >= MIN_ROWS else 0.0
         low = -MAX_OFFSET * rows.greatest <= reading < -MAX_ZERO * rows.greatest and _is_constant(
@@ -329,7 +342,7 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
         )
         if reading > MAX_ZERO * rows.greatest or low:
             yield (
-                f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N"
+                f"{files_of(measured)}: the force is {reading:.3g} N"
                 f" {place}, where a muscle is slack: the zero of the force sensor is wrong, and all"
                 f" forces by the same amount. {_REMEDY}"
             )
@@ -344,7 +357,7 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     )
     if offset > MAX_EXTRAPOLATED * rows.greatest:
         yield (
-            f"{file_list([each.origin for each in given])}: the force extrapolates to {offset:.3g}"
+            f"{files_of(measured)}: the force extrapolates to {offset:.3g}"
             " N at zero pressure, where a muscle does not pull: the zero of the force sensor, or"
             f" that of the pressure, is probably wrong. {_REMEDY}"
         )

@@ -191,24 +191,26 @@ def prediction_chapters(
     the file of the muscle or plant `thing`, whose references are cited."""
     records = [
         dataclasses.replace(
-            _record(each).among(suffix=f"-{i}"), title=f"Record {i}: {each.origin}", brief=False
+            _record(prediction).among(suffix=f"-{i}"),
+            title=f"Record {i}: {prediction.origin}",
+            brief=False,
         )
-        for i, each in enumerate(predictions, 1)
+        for i, prediction in enumerate(predictions, 1)
     ]
     return [_overview(model, thing, predictions), *records]
 
 
 def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
     """Return the errors of every quantity of every record, beside those of the baselines."""
-    quantities = [quantity for each in predictions for quantity in each.quantities]
-    records = [each for each in predictions for _ in each.quantities]
+    quantities = [quantity for prediction in predictions for quantity in prediction.quantities]
+    records = [prediction for prediction in predictions for _ in prediction.quantities]
     names = [quantity.name for quantity in quantities]
     half_widths = [
         None if q.half_width is None else float(np.median(q.half_width[q.compared]))
         for q in quantities
     ]
     columns: dict[str, Any] = {
-        "record": [each.origin for each in records],
+        "record": [prediction.origin for prediction in records],
         "quantity": names,
         "rows": [int(quantity.compared.sum()) for quantity in quantities],
         "rms error": TableColumn([quantity.rms for quantity in quantities], BY_ROW),
@@ -221,14 +223,14 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
             [q.share for q in quantities], "1", "%", digits=3, short="within"
         ),
         "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
-        "notes": TableColumn(["; ".join(each.notes) for each in records], brief=False),
+        "notes": TableColumn(["; ".join(prediction.notes) for prediction in records], brief=False),
     }
     caption = "Errors: predicted minus measured." + (f" {BASELINES}" if "skill" in columns else "")
     return Table("predictions", "Errors of the predicted values", columns, caption, brief=MAX_BRIEF)
 
 
 def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
-    quantities = [quantity for each in predictions for quantity in each.quantities]
+    quantities = [quantity for prediction in predictions for quantity in prediction.quantities]
     number = counted(len(predictions), "record")
     sentences = [
         f"{number} that {model} was not fitted to, predicted and compared with the measured values."
@@ -269,7 +271,9 @@ def _missed(model: str, predictions: Sequence[RecordPrediction]) -> list[str]:
 def _notes(predictions: Sequence[RecordPrediction]) -> tuple[str, ...]:
     """The notes of all records with their names, misfits first."""
     return tuple(
-        f"{each.origin}: {note}" for each in predictions for note in (*_misfit(each), *each.notes)
+        f"{prediction.origin}: {note}"
+        for prediction in predictions
+        for note in (*_misfit(prediction), *prediction.notes)
     )
 
 
@@ -277,29 +281,41 @@ def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]
     """The rms errors of the baselines of all quantities, and the skill of the model; empty without
     records in time.
     """
-    timed = {each: record for each in predictions if (record := _timed(each)) is not None}
-    names = {each: tuple(quantity.name for quantity in each.quantities) for each in predictions}
-    errors: dict[QuantityPrediction, dict[str, float]] = {
-        q: {} for each in predictions for q in each.quantities
-    }
-    for kind in dict.fromkeys(
-        names.values()
-    ):  # the ARX model is fitted to the records with the same quantities
-        alike = [each for each in timed if names[each] == kind]
-        for each, found in zip(
-            alike, baseline_errors([timed[other] for other in alike]), strict=True
-        ):
-            for k, quantity in enumerate(each.quantities):
-                errors[quantity] = {name: float(values[k]) for name, values in found.items()}
+    errors = _baseline_errors(predictions)
     if not any(errors.values()):
         return {}
-    persistence, arx = ([each.get(name) for each in errors.values()] for name in (PERSISTENCE, ARX))
-    skills = [skill(quantity.rms, each) for quantity, each in errors.items()]
+    persistence, arx = (
+        [of_baselines.get(name) for of_baselines in errors.values()] for name in (PERSISTENCE, ARX)
+    )
+    skills = [skill(quantity.rms, of_baselines) for quantity, of_baselines in errors.items()]
     return {
         f"rms error of {PERSISTENCE}": TableColumn(persistence, BY_ROW, short=PERSISTENCE),
         f"rms error of an {ARX}": TableColumn(arx, BY_ROW, short="ARX"),
         "skill": TableColumn(skills, "1", digits=2),
     }
+
+
+def _baseline_errors(
+    predictions: Sequence[RecordPrediction],
+) -> dict[QuantityPrediction, dict[str, float]]:
+    """The rms errors of the baselines by name, for each predicted quantity; empty without time.
+
+    The ARX model is fitted to the records with the same quantities.
+    """
+    errors: dict[QuantityPrediction, dict[str, float]] = {}
+    alike: dict[tuple[str, ...], list[tuple[RecordPrediction, TimedRecord]]] = {}
+    for prediction in predictions:
+        errors |= {quantity: {} for quantity in prediction.quantities}
+        record = _timed(prediction)
+        if record is not None:
+            names = tuple(quantity.name for quantity in prediction.quantities)
+            alike.setdefault(names, []).append((prediction, record))
+    for timed in alike.values():
+        of_records = baseline_errors([record for _, record in timed])
+        for (prediction, _), of_baselines in zip(timed, of_records, strict=True):
+            for k, quantity in enumerate(prediction.quantities):
+                errors[quantity] = {name: float(rms[k]) for name, rms in of_baselines.items()}
+    return errors
 
 
 def _timed(prediction: RecordPrediction) -> TimedRecord | None:

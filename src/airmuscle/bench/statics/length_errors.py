@@ -77,7 +77,7 @@ def length_notes(errors: Sequence[LengthError]) -> tuple[str, ...]:
     if not errors:
         return ()
     before = errors[0].rmse_before
-    after = max(each.rmse_after for each in errors)
+    after = max(error.rmse_after for error in errors)
     several = " The data do not decide between these." if len(errors) > 1 else ""
     return (
         (
@@ -194,15 +194,15 @@ def find_length_errors(
         ]
     except IdentificationError:
         return ()
-    found = []
-    for each in estimates:
-        explained = each.rmse_before**2 - each.rmse_after**2 >= MIN_EXPLAINED * (
-            each.rmse_before**2 - separate**2
+    errors = []
+    for estimate in estimates:
+        explained = estimate.rmse_before**2 - estimate.rmse_after**2 >= MIN_EXPLAINED * (
+            estimate.rmse_before**2 - separate**2
         )
-        significant = abs(each.offset) > MIN_STANDARD_ERRORS * each.standard_error
-        if each.rmse_before > MIN_MISFIT * separate and explained and significant:
-            found.append(each)
-    return tuple(sorted(found, key=lambda each: abs(each.offset)))
+        significant = abs(estimate.offset) > MIN_STANDARD_ERRORS * estimate.standard_error
+        if estimate.rmse_before > MIN_MISFIT * separate and explained and significant:
+            errors.append(estimate)
+    return tuple(sorted(errors, key=lambda estimate: abs(estimate.offset)))
 
 
 class _Step(NamedTuple):
@@ -260,14 +260,14 @@ def _newton_step(
 def length_error_chapter(errors: Sequence[LengthError]) -> Chapter:
     """Return the chapter of the estimated errors of recorded resting lengths."""
     columns: dict[str, Any] = {
-        "specimen": [each.specimen for each in errors],
-        "resting length": TableColumn([each.resting_length for each in errors], "m", "mm"),
-        "offset": TableColumn([each.offset for each in errors], "m", "mm", digits=2),
+        "specimen": [error.specimen for error in errors],
+        "resting length": TableColumn([error.resting_length for error in errors], "m", "mm"),
+        "offset": TableColumn([error.offset for error in errors], "m", "mm", digits=2),
         "standard error": TableColumn(
-            [each.standard_error for each in errors], "m", "mm", digits=1
+            [error.standard_error for error in errors], "m", "mm", digits=1
         ),
-        "rms residual before": [each.rmse_before for each in errors],
-        "rms residual after": [each.rmse_after for each in errors],
+        "rms residual before": [error.rmse_before for error in errors],
+        "rms residual after": [error.rmse_after for error in errors],
     }
     return Chapter(
         "length-errors",

@@ -113,7 +113,10 @@ def fit_chapter(
         title=entry.title,
         summary=(*chapter.paragraphs, entry.note, *of_recordings),
         equations=equations,
-        values=(*chapter.values, *(dataclasses.replace(each, brief=False) for each in consistency)),
+        values=(
+            *chapter.values,
+            *(dataclasses.replace(value, brief=False) for value in consistency),
+        ),
         tables=(*symbols, parameters, *broken, correlations, _rows(fit)),
         plots=tuple(filter(None, plots)),
         notes=(*chapter.notes, *notes),
@@ -147,7 +150,7 @@ def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Tab
         text = " ".join((law.__doc__ or law.__name__).split("\n\n")[0].split())
         references: tuple[Reference, ...] = getattr(law, "references", ())
         sources = (
-            "; ".join(f"{each.authors} {each.year or ''}".strip() for each in references)
+            "; ".join(f"{symbol.authors} {symbol.year or ''}".strip() for symbol in references)
             or "none published"
         )
         note = (
@@ -171,10 +174,10 @@ def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Tab
     effects, tables = _specimen_effects(fit, validity)
     parameters = equations[0].parameters
     columns: dict[str, Any] = {
-        "symbol": [each.name for each in parameters],
-        "value": TableColumn([each.value for each in parameters], BY_ROW),
-        "unit": [each.unit for each in parameters],
-        "meaning": [each.meaning for each in parameters],
+        "symbol": [symbol.name for symbol in parameters],
+        "value": TableColumn([symbol.value for symbol in parameters], BY_ROW),
+        "unit": [symbol.unit for symbol in parameters],
+        "meaning": [symbol.meaning for symbol in parameters],
     }
     symbols = Table("equation-symbols", "Symbols of the equation", columns)
     return (*shown, *effects), (symbols, *tables)

@@ -127,7 +127,7 @@ def end_point_table(choices: Sequence[MuscleChoice]) -> Table:
         ("force", "N", ""),
     ):
         for end, points in (("long", first), ("short", last)):
-            values = [round(getattr(each, name), 9) + 0.0 for each in points]  # slack to rounding
+            values = [round(getattr(point, name), 9) + 0.0 for point in points]  # slack to rounding
             columns[f"{name}, {end}"] = TableColumn(values, unit, shown)
     columns["reserve"] = TableColumn([choice.design.reserve for choice in choices], "1", "%")
     note = (
@@ -185,29 +185,29 @@ def valve_table(choice: MuscleChoice) -> Table:
         warnings.simplefilter("ignore", AirmuscleWarning)  # the table states them
         known: list[Any] = list(map(load, list_valves()))
     times = {
-        each.name: (
-            path.time(each.valve, filling=True),
-            path.time(each.exhaust or each.valve, filling=False),
+        valve.name: (
+            path.time(valve.valve, filling=True),
+            path.time(valve.exhaust or valve.valve, filling=False),
         )
-        for each in known
+        for valve in known
     }
-    reaching = {each.name for each in known if max(times[each.name]) <= limit}
-    suitable = {each.name for each in known if each.name in reaching and not each.warning}
-    entries = sorted(known, key=lambda each: (each.name not in suitable, -times[each.name][0]))
+    reaching = {valve.name for valve in known if max(times[valve.name]) <= limit}
+    suitable = {valve.name for valve in known if valve.name in reaching and not valve.warning}
+    entries = sorted(known, key=lambda valve: (valve.name not in suitable, -times[valve.name][0]))
     columns: dict[str, Any] = {
-        "valve": [each.name for each in entries],
+        "valve": [valve.name for valve in entries],
         "conductance": TableColumn(
-            [getattr(each.valve, "conductance", None) for each in entries],
+            [getattr(valve.valve, "conductance", None) for valve in entries],
             "m3/(s Pa)",
             "dm3/(s bar)",
             3,
         ),
-        "fills in": TableColumn([times[each.name][0] for each in entries], "s", digits=3),
-        "discharges in": TableColumn([times[each.name][1] for each in entries], "s", digits=3),
+        "fills in": TableColumn([times[valve.name][0] for valve in entries], "s", digits=3),
+        "discharges in": TableColumn([times[valve.name][1] for valve in entries], "s", digits=3),
         "reaches the cycle time": TableColumn(
-            [each.name in reaching for each in entries], brief=False
+            [valve.name in reaching for valve in entries], brief=False
         ),
-        "warning": TableColumn([each.warning for each in entries], brief=False),
+        "warning": TableColumn([valve.warning for valve in entries], brief=False),
     }
     note = (
         f"One valve for each muscle, fully open, after its flow law; within {limit:.3g} s it"

@@ -314,7 +314,7 @@ def _search(
     law: Any,
     limits: ForceRange,
     bounds: tuple[float, float],
-    given: tuple[Array, Value],
+    known_values: tuple[Array, Value],
     outside: Array,
     message: Callable[[float, float], str],
     wanted: str,
@@ -322,27 +322,29 @@ def _search(
     """The contraction or pressure at which the extended force is the given one, at the points
     outside; raises SolveError."""
 
-    def response(x: Any, other: Any, _: Any) -> Any:
-        point = (other, x) if wanted == "contraction" else (x, other)
+    def response(x: Any, argument: Any, _: Any) -> Any:
+        point = (argument, x) if wanted == "contraction" else (x, argument)
         return np.maximum(extended_force(law, limits, *point), 0.0)
 
-    other, force = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
-    known = ~(np.isnan(other) | np.isnan(force))
+    argument, force = np.broadcast_arrays(
+        *(np.asarray(value, dtype=float) for value in known_values)
+    )
+    known = ~(np.isnan(argument) | np.isnan(force))
     sought = outside & known
-    found = np.full(other.shape, np.nan)
+    solved = np.full(argument.shape, np.nan)
     if sought.any():
         with formula_alone():
-            found[sought] = solve_direction(
+            solved[sought] = solve_direction(
                 response,
                 bounds,
-                (other[sought], force[sought]),
+                (argument[sought], force[sought]),
                 1,
                 message,
                 "Available force",
                 "N",
                 falling=wanted == "contraction",
             )
-    return found
+    return solved
 
 
 def _report(
