@@ -250,32 +250,39 @@ def _column_table(inspection: Inspection) -> Table:
     recording = inspection.recording
     names = list(inspection.recording)
     values = [recording[name] for name in names]
-    sensors = [inspection.sensors.get(name) for name in names]
     units = [recording.units.get(name, "") for name in names]
     least = [float(readings.min()) if readings.size else None for readings in values]
     greatest = [float(readings.max()) if readings.size else None for readings in values]
-    resolutions = [(sensor and sensor.resolution) or None for sensor in sensors]
-    noise = [(sensor and sensor.noise) or None for sensor in sensors]
-    deviations = [(sensor and sensor.std) or None for sensor in sensors]
     columns: dict[str, Any] = {
         "column": names,
         "unit in file": ["" if unit == "1" else unit for unit in units],
         "min": TableColumn(least, BY_ROW),
         "max": TableColumn(greatest, BY_ROW),
         "unit": unit_column(names),
-        "resolution": TableColumn(resolutions, BY_ROW, digits=3),
-        "noise": TableColumn(noise, BY_ROW, digits=2),
-        "deviation": TableColumn(deviations, BY_ROW, digits=2, brief=False),
-        "lower limit": _limit_column(
-            [sensor.lower_limit if sensor else None for sensor in sensors]
-        ),
-        "upper limit": _limit_column(
-            [sensor.upper_limit if sensor else None for sensor in sensors]
-        ),
+        **_sensor_columns([inspection.sensors.get(name) for name in names]),
     }
     return Table(
         "columns", "Columns", columns, "Limits: where the sensor saturates.", brief=len(names)
     )
+
+
+def _sensor_columns(sensors: Sequence[Sensor | None]) -> dict[str, TableColumn]:
+    """The properties of the sensors of the columns, as far as they were estimated."""
+
+    def estimates(name: str) -> list[float | None]:
+        return [getattr(sensor, name, None) for sensor in sensors]
+
+    return {
+        "resolution": _positive_column(estimates("resolution"), 3),
+        "noise": _positive_column(estimates("noise"), 2),
+        "deviation": dataclasses.replace(_positive_column(estimates("std"), 2), brief=False),
+        "lower limit": _limit_column(estimates("lower_limit")),
+        "upper limit": _limit_column(estimates("upper_limit")),
+    }
+
+
+def _positive_column(values: Sequence[float | None], digits: int) -> TableColumn:
+    return TableColumn([value or None for value in values], BY_ROW, digits=digits)
 
 
 def _run_table(runs: Sequence[Run]) -> Table:

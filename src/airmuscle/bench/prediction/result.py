@@ -71,6 +71,13 @@ class QuantityPrediction(ShortRepr):
         return float(np.mean(np.abs(self.errors[rows]) <= self.half_width[rows]))
 
     @property
+    def median_half_width(self) -> float | None:
+        """Median half width of the 95 % band over the compared rows [SI]; None without a band."""
+        if self.half_width is None:
+            return None
+        return float(np.median(self.half_width[self.compared]))
+
+    @property
     def share(self) -> float | None:
         """Share of the compared rows within the 95 % band; None without a band."""
         return self.share_of(self.compared)
@@ -205,10 +212,6 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
     quantities = [quantity for prediction in predictions for quantity in prediction.quantities]
     records = [prediction for prediction in predictions for _ in prediction.quantities]
     names = [quantity.name for quantity in quantities]
-    half_widths = [
-        None if q.half_width is None else float(np.median(q.half_width[q.compared]))
-        for q in quantities
-    ]
     columns: dict[str, Any] = {
         "record": [prediction.origin for prediction in records],
         "quantity": names,
@@ -216,11 +219,13 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
         "rms error": TableColumn([quantity.rms for quantity in quantities], BY_ROW),
         "maximum error": TableColumn([quantity.max_error for quantity in quantities], BY_ROW),
         "in row": TableColumn([quantity.worst_row + 1 for quantity in quantities], brief=False),
-        "half width of the 95 % band": TableColumn(half_widths, BY_ROW, short="95 % band ±"),
+        "half width of the 95 % band": TableColumn(
+            [quantity.median_half_width for quantity in quantities], BY_ROW, short="95 % band ±"
+        ),
         "unit": unit_column(names),
         **_baseline_columns(predictions),
         "rows within the band": TableColumn(
-            [q.share for q in quantities], "1", "%", digits=3, short="within"
+            [quantity.share for quantity in quantities], "1", "%", digits=3, short="within"
         ),
         "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
         "notes": TableColumn(["; ".join(prediction.notes) for prediction in records], brief=False),

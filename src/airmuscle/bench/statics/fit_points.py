@@ -55,6 +55,32 @@ _MAX_ROWS_OF_POINTS = 2000
 """Maximum number of rows of a recording that is examined for single points first (chosen)."""
 
 
+def _joined(runs: Sequence[Recording]) -> Recording:
+    """The rows of all recordings, with their resting lengths as a column where these differ.
+
+    Raises IdentificationError for an infinite value.
+    """
+    columns = {}
+    if runs:
+        columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS}
+    origins = list(dict.fromkeys(run.origin for run in runs))
+    named = origins if len(origins) <= 3 else [*origins[:2], f"{len(origins) - 2} more"]
+    origin = " + ".join(named) or "no recording"
+    for name, values in columns.items():
+        if np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values)))
+            raise IdentificationError(
+                f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for"
+                f" example with recording.rows(np.isfinite(recording['{name}']))."
+            )
+    stated = [resting_length_of(run) for run in runs]
+    lengths = {length for length in stated if length is not None}
+    if len(lengths) > 1 and None not in stated:
+        columns[RESTING_LENGTH] = np.repeat(np.array(stated, dtype=float), list(map(len, runs)))
+    constants = {RESTING_LENGTH: lengths.pop()} if len(lengths) == 1 else {}
+    return Recording(columns, origin, constants, references=tuple(cite(runs)))
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class FitPoints:
     """The points of one or several recordings, for fits of any law; the sensors are estimated once.
@@ -79,41 +105,16 @@ class FitPoints:
         value.
         """
         runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
-        columns = (
-            {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS}
-            if runs
-            else {}
-        )
-        origins = list(dict.fromkeys(run.origin for run in runs))
-        few = origins if len(origins) <= 3 else [*origins[:2], f"{len(origins) - 2} more"]
-        origin = " + ".join(few) or "no recording"
-        for name, values in columns.items():
-            if np.isinf(values).any():
-                row = int(np.argmax(np.isinf(values)))
-                raise IdentificationError(
-                    f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for"
-                    f" example with recording.rows(np.isfinite(recording['{name}']))."
-                )
-        missing = (
-            np.isnan(np.stack(list(columns.values()))).any(axis=0)
-            if columns
-            else np.zeros(0, dtype=bool)
-        )
-        stated = [resting_length_of(run) for run in runs]
-        lengths = {length for length in stated if length is not None}
-        if len(lengths) > 1 and None not in stated:
-            columns[RESTING_LENGTH] = np.repeat(
-                np.array(stated, dtype=float), [len(run) for run in runs]
-            )
-        constants = {RESTING_LENGTH: lengths.pop()} if len(lengths) == 1 else {}
-        joined = Recording(columns, origin, constants, references=tuple(cite(runs)))
+        joined = _joined(runs)
+        missing = np.zeros(len(joined), dtype=bool)
+        for name in POINT_COLUMNS if runs else ():
+            missing |= np.isnan(joined[name])
         dropped = int(np.count_nonzero(missing))
         repeated = find_repeated_rows(runs, POINT_COLUMNS)
-        starts = np.cumsum([0, *(len(run) for run in runs)])
-        for each in repeated:
-            missing[
-                starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop
-            ] = True
+        starts = np.cumsum([0, *map(len, runs)])
+        for stretch in repeated:
+            start = starts[stretch.recording]
+            missing[start + stretch.rows.start : start + stretch.rows.stop] = True
         missing |= find_lagging_rows(runs).joined
         return cls(runs, joined, missing, dropped, repeated)
 
