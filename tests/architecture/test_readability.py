@@ -45,12 +45,12 @@ BRANCHES = (
 # A change that improves a figure lowers its bound; no change raises one.
 BOUNDS = {
     "nodes in all": 1_020_000,
-    "nodes per line of code": 10.75,
-    "% of the lines of code beyond column 100": 0.06,
+    "nodes per line of code": 10.65,
+    "% of the lines of code beyond column 100": 0.05,
     "statements that the formatter leaves alone": 2,
-    "parallel assignments per 1000 statements": 1.5,
-    "names that say nothing per 1000 statements": 18.5,
-    "functions with 15 branches": 35,
+    "parallel assignments per 1000 statements": 1.3,
+    "names that say nothing per 1000 statements": 11.0,
+    "functions with 15 branches": 29,
     "functions with 14 nodes a line": 240,
 }
 
