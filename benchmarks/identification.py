@@ -108,8 +108,8 @@ def simulate_scipy(plant: am.Plant, settings: ScipySettings) -> Array:
 
 
 def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]:
-    """Time [s], sum of squares and number of evaluations from one start, given in units of the true
-    values.
+    """Time [s], sum of squares and number of evaluations from one start [SI]; SciPy searches in
+    units of the true values.
     """
     from scipy.optimize import least_squares
 
@@ -123,7 +123,7 @@ def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]
         nonlocal count
         count += 1
         numbers = [leaf.value for leaf in leaves]
-        for index, value in zip(indices, scaled * problem.scales, strict=True):
+        for index, value in zip(indices, problem.coordinates.values(scaled), strict=True):
             numbers[index] = float(value)
         return (
             (simulate_scipy(tree.unflatten(plant, numbers), settings) - measured)
@@ -131,8 +131,14 @@ def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]
         ).ravel()
 
     begin = time.perf_counter()
+    bounds = tuple(problem.coordinates.of(bound) for bound in problem.bounds)
     result = least_squares(
-        residual, start, "2-point", problem.bounds, x_scale="jac", diff_step=settings.step
+        residual,
+        problem.coordinates.of(start),
+        "2-point",
+        bounds,
+        x_scale="jac",
+        diff_step=settings.step,
     )
     return time.perf_counter() - begin, 2 * float(result.cost), count
 

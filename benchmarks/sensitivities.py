@@ -127,13 +127,12 @@ def kernel(method: am.engine.Integrator) -> Callable[[], Array]:
     return lambda: bound.run(segments, 0.0, start, times).rows
 
 
-def jacobian(method: am.engine.Integrator) -> Callable[[], tuple[Array, Array]]:
-    """A function that computes the residual (R,) and the Jacobian (R, 8) with respect to the scaled
+def jacobian(method: am.engine.Integrator) -> Callable[[], object]:
+    """A function that computes the outputs (R,) and the Jacobian (R, 8) with respect to the
     parameters.
     """
     problem = case().problem(method)
-    at = np.array([u.value for u in problem.unknowns]) / problem.scales
-    return lambda: problem.residuals(at)
+    return lambda: problem.evaluate(problem.initial_values)
 
 
 def evaluate_in_jax(code: Code, inputs: Sequence[Any]) -> list[Any]:

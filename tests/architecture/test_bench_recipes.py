@@ -68,12 +68,9 @@ import numpy as np
 from airmuscle.bench import ColumnMapping, Huber, LeastSquares, diagnose, fit, read
 from airmuscle.bench.estimation import (
     FreeParameter,
-    GroupRefits,
-    LeastSquaresProblem,
+    MeasuredProblem,
     Runs,
-    fit_statistics,
-    profile_limits,
-    resampled_values,
+    SolvedProblem,
     solve_least_squares,
     watched_searches,
 )
@@ -105,75 +102,48 @@ assert request.above_force == 2e3
 assert "above_force" in [field["name"] for field in form_fields(FitRequest)]
 
 
-# A fit: residuals alone
+# A fit: parameters and the fitted quantity alone
 @dataclasses.dataclass(frozen=True, eq=False)
-class Decay(LeastSquaresProblem):
+class Decay(MeasuredProblem):
     """y = a exp(-k t)."""
 
     time: np.ndarray
     target: np.ndarray
-    censoring: np.ndarray
-    weights: np.ndarray
-    known: tuple = ()
 
     name = "Decay"
     origin = "made"
     quantity = "level"
+    parameters = (
+        FreeParameter("a", "a", 1.0, (0.0, 10.0), "1", "amplitude", True),
+        FreeParameter("k", "k", 0.3, (0.0, 9.0), "1/s", "rate"),
+    )
 
     @property
-    def parameters(self):
-        every = (
-            FreeParameter("a", "a", 1.0, (0.0, 10.0), "1", "amplitude", True),
-            FreeParameter("k", "k", 0.3, (0.0, 9.0), "1/s", "rate"),
-        )
-        known = dict(self.known)
-        return tuple(parameter for parameter in every if parameter.name not in known)
-
-    def _values(self, values):
-        named = dict(self.known) | dict(zip(self.names, values))
-        return named["a"], named["k"]
+    def runs(self):
+        run = np.arange(self.target.size) // 20
+        return Runs(run, np.zeros(run.size, dtype=int), True)
 
     def predict(self, values):
-        a, k = self._values(values)
-        return a * np.exp(-k * self.time)
-
-    def jacobian(self, values, which=None):
-        a, k = self._values(values)
-        decay = np.exp(-k * self.time)
-        columns = {"a": decay, "k": -a * self.time * decay}
-        chosen = np.column_stack([columns[name] for name in self.names])
-        return chosen if which is None else chosen[:, list(which)]
-
-    def rows(self, selection):
-        chosen = {n: getattr(self, n)[selection] for n in ("time", "target", "censoring", "weights")}
-        return dataclasses.replace(self, **chosen)
-
-    def weighted(self, factors):
-        return dataclasses.replace(self, weights=self.weights * factors)
-
-    def with_known(self, index, value):
-        return dataclasses.replace(self, known=(*self.known, (self.names[index], value)))
+        return values[0] * np.exp(-values[1] * self.time)
 
 
 time = np.linspace(0.0, 3.0, 200)
 random = np.random.default_rng(2)
 level = 2.0 * np.exp(-1.5 * time) + 0.02 * random.standard_normal(200)
-problem = Decay(time, level, np.zeros(200), np.ones(200))
+problem = Decay(time, level)
 steps = []
 with watched_searches(lambda name, fraction: steps.append(name)):
     solution = solve_least_squares(problem, LeastSquares())
 assert "Decay" in steps
-runs = Runs(np.arange(200) // 20, np.zeros(200, dtype=int), True, None)
-found = fit_statistics(problem, solution, LeastSquares(), runs)
-for estimate, truth in zip(found["estimates"], (2.0, 1.5)):
+solved = SolvedProblem(problem, solution.values)
+for estimate, truth in zip(solved.estimates, (2.0, 1.5)):
     assert abs(estimate.value - truth) < 4.0 * estimate.stderr < 0.2
-low, high = profile_limits(problem, solution.values, 1, found["estimates"][1].stderr, 4.0 / 198.0)
+low, high = solved.profile("k")
 assert low < 1.5 < high
-group = np.arange(200) // 20
-draws = random.multinomial(10, np.full(10, 0.1), size=40).astype(float)
-drawn = resampled_values(problem, solution.values, LeastSquares(), group, draws)
+drawn = solved.bootstrap(40)
 assert drawn.shape == (40, 2)
 assert np.nanstd(drawn[:, 1]) < 0.2
+assert not solved.identifiability.undetermined
 spoilt = dataclasses.replace(problem, target=np.where(np.arange(200) % 25 == 7, 5.0, level))
 robust = solve_least_squares(spoilt, Huber(0.06)).values
 assert np.abs(robust - [2.0, 1.5]).max() < 0.1 < np.abs(solve_least_squares(spoilt, LeastSquares()).values - [2.0, 1.5]).max()
@@ -243,7 +213,7 @@ def test_what_the_recipes_add_holds_everywhere(extended: Path, tmp_path: Path):
         "`DiagnosisRule`",
         "`tests/identify/test_rules.py`",
         "`LeastSquaresProblem`",
-        "`search_trust_region`",
+        "`ProblemSearch`",
         "`COMMANDS`",
     ],
 )

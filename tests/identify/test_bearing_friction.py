@@ -12,6 +12,7 @@ from arm_episodes import known_arm, made_episodes
 
 from airmuscle.bench.estimation import SearchStage
 from airmuscle.bench.joint import descent, episodes
+from airmuscle.core import tree
 from airmuscle.physics import SpatialLink, StickSlip
 
 BEARING = "mechanism.elements[1].bearing_arms[0]"
@@ -41,8 +42,9 @@ def test_the_search_finds_the_arm_of_the_bearing_from_zero(dry):
     truth = swung_arm()
     windows = episodes.cut(made_episodes(40, joints=2, arm=truth), 0, 40)
     started = descent.with_values(truth, [BEARING, DRY], [0.0, dry])
-    search = descent.Descent(started, windows, 1, [BEARING, DRY])
-    search.run(SearchStage(40, 60, 60))
-    assert search.values == pytest.approx([0.03, 0.3], rel=0.15)
-    errors = [np.std(descent.joint_errors(each, 1, windows)) for each in (search.arm, started)]
+    problem = descent.JointProblem(started, windows, 1, (BEARING, DRY))
+    arm = problem.search([SearchStage(40, 60, 60)]).arm
+    values = {leaf.path: leaf.value for leaf in tree.leaves(arm)}
+    assert [values[BEARING], values[DRY]] == pytest.approx([0.03, 0.3], rel=0.15)
+    errors = [np.std(descent.joint_errors(each, 1, windows)) for each in (arm, started)]
     assert errors[0] < 0.5 * errors[1]

@@ -46,7 +46,7 @@ def test_the_derivatives_are_those_of_finite_differences():
     model = fit.problem.record_models[0]
     values = fit.values
     for k in model.unknown_indices:
-        step = 1e-5 * fit.problem.scales[k] * (1 if fit.unknowns[k].paths else 10)
+        step = 1e-5 * fit.unknowns[k].scale * (1 if fit.unknowns[k].paths else 10)
         ends = [
             model.evaluate(values + sign * step * np.eye(values.size)[k]).values for sign in (-1, 1)
         ]

@@ -8,14 +8,34 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from airmuscle.bench.estimation import LevenbergMarquardt, bounded_step
+from airmuscle.bench.estimation import (
+    Evaluations,
+    LevenbergMarquardt,
+    Linearisation,
+    bounded_step,
+)
 
 FREE = np.full(2, -np.inf), np.full(2, np.inf)
 
 
+class OfFunction(Evaluations):
+    """The sum of the squares of a function that returns residuals and Jacobian, or None."""
+
+    def __init__(self, function):
+        self.function = function
+
+    def cost(self, x):
+        self.last = self.function(x)
+        with np.errstate(all="ignore"):
+            return np.inf if self.last is None else float(self.last[0] @ self.last[0])
+
+    def linearise(self):
+        return Linearisation(*self.last)
+
+
 def minimise(residuals, start, low, high, evaluations):
     """Unknowns, sum of squares, and whether the search has ended."""
-    search = LevenbergMarquardt(residuals, start, low, high).run(evaluations)
+    search = LevenbergMarquardt(OfFunction(residuals), start, low, high).run(evaluations)
     return search.x, search.cost, search.finished
 
 
@@ -211,7 +231,9 @@ def test_a_step_onto_a_bound_is_the_best_within_it():
     rng = np.random.default_rng(3)
     a = rng.standard_normal((8, 3))
     normal = a.T @ a
-    gradient = a.T @ rng.standard_normal(8)
+    b = rng.standard_normal(8)
+    gradient = a.T @ b
+    orthogonal, triangle = np.linalg.qr(a)
     x = np.zeros(3)
     whole = np.linalg.solve(normal, -gradient)
     low = np.full(3, -9.0)
@@ -221,7 +243,7 @@ def test_a_step_onto_a_bound_is_the_best_within_it():
     )
     low = np.where(whole < 0, low, -9.0)
     high = np.where(whole < 0, 9.0, high)
-    found = bounded_step(normal, gradient, np.zeros(3), x, low, high)
+    found = bounded_step(triangle, orthogonal.T @ b, np.zeros(3), x, low, high)
     held = np.argmax(np.abs(whole))
     assert found[held] == pytest.approx(0.3 * whole[held])
     np.testing.assert_allclose(np.delete(gradient + normal @ found, held), 0.0, atol=1e-12)

@@ -100,7 +100,7 @@ def test_the_derivatives_by_the_coefficients_are_exact():
     start = np.linspace(-0.5, 0.5, 15)
     step = 1e-6
     differences = [
-        (problem.residuals(start + step * e) - problem.residuals(start - step * e)) / (2 * step)
+        (problem.predict(start + step * e) - problem.predict(start - step * e)) / (2 * step)
         for e in np.eye(15)
     ]
     assert problem.jacobian(start) == pytest.approx(

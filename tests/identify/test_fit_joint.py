@@ -22,6 +22,7 @@ from airmuscle.bench import RegulatorLag, estimate_angles, fit_joint, fit_regula
 from airmuscle.errors import ParameterError
 
 processes = importlib.import_module("airmuscle.engine.processes")
+module = importlib.import_module("airmuscle.bench.joint.fit")
 EPISODES = made_episodes(30)
 WITHOUT_COMMANDS = changed(EPISODES, command=lambda u: None)
 
@@ -29,7 +30,6 @@ WITHOUT_COMMANDS = changed(EPISODES, command=lambda u: None)
 @pytest.fixture(scope="module", autouse=True)
 def short_search():
     """Few iterations, because the episodes are few and made."""
-    module = importlib.import_module("airmuscle.bench.joint.fit")
     with pytest.MonkeyPatch.context() as patch:
         *trials, search = (replace(each, iterations=15, batch=60) for each in module.STAGES)
         patch.setattr(module, "STAGES", (*trials, replace(search, iterations=35, batch=80)))
@@ -58,9 +58,11 @@ class Search:
     def __init__(self, *costs):
         self.costs = list(costs)
         self.stopped = False
-        self.arm = self
 
-    def run(self, stage):
+    def search(self, stages):
+        return module.DescentEnd([self._cost() for _ in stages][-1], self)
+
+    def _cost(self):
         cost = self.costs.pop(0)
         if cost is None:
             raise KeyboardInterrupt
@@ -75,7 +77,6 @@ class Search:
 
 
 def test_the_search_that_ends_lower_is_taken_whatever_its_first_stages_say():
-    module = importlib.import_module("airmuscle.bench.joint.fit")
     ahead = Search(1.0, 1.0, 3.0)
     later = Search(2.0, 2.0, 1.0)
     assert module._best([ahead, later], None) == (1.0, later)
@@ -90,10 +91,9 @@ def test_the_last_joint_is_judged_in_the_free_run_of_all(monkeypatch):
     """An error of the other joints counts as soon as all are identified: their measured motion does
     not show it.
     """
-    module = importlib.import_module("airmuscle.bench.joint.fit")
     used = []
     monkeypatch.setattr(
-        module, "Descent", lambda arm, *_, errors: used.append(errors) or Search(1.0, 1.0, 1.0)
+        module, "JointProblem", lambda arm, *_, errors: used.append(errors) or Search(1.0, 1.0, 1.0)
     )
     windows = module.cut(made_episodes(2, joints=2), 0, 40)
     arm = module.reduced_arm(np.zeros(2))

@@ -5,7 +5,7 @@ nothing where there is none.
 from __future__ import annotations
 
 import importlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -54,17 +54,22 @@ def test_a_weight_that_is_confirmed_comes_before_one_with_a_smaller_error(monkey
     module = importlib.import_module("airmuscle.bench.joint.free_run")
     errors = {50.0: (0.75, 1.0), 5.0: (0.68, 1.09)}
 
-    class Search:
-        def __init__(self, arm, windows, joint, *_):
-            self.before = arm
-            self.joint = joint
-            self.ridge = 0.0
+    @dataclass
+    class Trial:
+        arm: object
+        windows: object
+        joint: int
+        paths: tuple
+        seed: int
+        prior: dict
+        ridge: float = 0.0
+        initial_values = np.zeros(1)
 
-        def run(self, stage):
-            lags = (self.ridge / 1e3, *self.before.lags[1:])
-            self.arm = self.before if self.joint else replace(self.before, lags=lags)
+        def descend(self, search, stage, number):
+            lags = (self.ridge / 1e3, *self.arm.lags[1:])
+            return 1.0, self.arm if self.joint else replace(self.arm, lags=lags)
 
-    monkeypatch.setattr(module, "Descent", Search)
+    monkeypatch.setattr(module, "JointProblem", Trial)
     monkeypatch.setattr(
         module,
         "run_errors",

@@ -67,11 +67,15 @@ class _ContentPickler(pickle.Pickler):
         return None
 
     def reducer_override(self, obj: Any) -> Any:
-        """Models by their fields, arrays by their values."""
+        """Models by their fields, arrays by their values, objects without what properties keep."""
         if is_model(obj):
             # A field that is no argument follows from the others.
             names = [field.name for field in dataclasses.fields(obj) if field.init]
             return _record, (type(obj), tuple(getattr(obj, name) for name in names))
+        kind: type = type(obj)
+        if _is_plain(kind):
+            state = {name: value for name, value in vars(obj).items() if not _is_cache(obj, name)}
+            return _record, (type(obj), tuple(state.items()))
         if type(obj) is np.ndarray and not obj.dtype.hasobject:
             return np.ndarray, (obj.shape, obj.dtype.str, np.ascontiguousarray(obj).tobytes())
         if isinstance(obj, MappingProxyType):
@@ -81,6 +85,24 @@ class _ContentPickler(pickle.Pickler):
 
 def _record(kind: type, values: tuple[Any, ...]) -> None:
     """The name of a model in a digest; it is never called."""
+
+
+@functools.cache
+def _is_plain(kind: type) -> bool:
+    """Whether objects of a class are pickled by their attributes, and properties keep values in
+    them."""
+    has_caches = any(
+        isinstance(value, functools.cached_property)
+        for base in kind.__mro__
+        for value in vars(base).values()
+    )
+    reduction = ("__reduce__", "__reduce_ex__", "__getstate__")
+    return has_caches and all(getattr(kind, name) is getattr(object, name) for name in reduction)
+
+
+def _is_cache(obj: Any, name: str) -> bool:
+    """Whether an attribute is a value that a property keeps."""
+    return isinstance(getattr(type(obj), name, None), functools.cached_property)
 
 
 def _named(obj: Any) -> tuple[str, str, str]:

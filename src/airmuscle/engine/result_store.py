@@ -25,6 +25,8 @@ from .stored_form import NotStorableError, decode, encode
 
 STORE_FOLDER = "tasks"
 """Folder of the stored results of a command, in that of its output."""
+CHECKPOINT = "checkpoint-"
+"""Beginning of the keys of unfinished computations."""
 _SUFFIX = ".result"
 _MAGIC = b"airmuscle result 1\n"
 _MODE = 0o700
@@ -41,13 +43,14 @@ class ResultStore:
     """The results of tasks in one folder, which is created with the first of them.
 
     `recalled` and `saved` count the results that were read and written; `resumed` is called when
-    the first one is read.
+    the first one is read. `has_checkpoints`: whether one is of an unfinished computation.
     """
 
     def __init__(self, folder: Path, resumed: Callable[[], object] = lambda: None) -> None:
         self.folder = folder
         self.recalled = 0
         self.saved = 0
+        self.has_checkpoints = any(folder.glob(f"{CHECKPOINT}*{_SUFFIX}"))
         self._resumed = resumed
         self._usable = True
         if os.path.lexists(folder):
@@ -120,6 +123,7 @@ class ResultStore:
             )
         else:
             self.saved += 1
+            self.has_checkpoints = self.has_checkpoints or key.startswith(CHECKPOINT)
 
     def remove(self) -> None:
         """Remove all results, and the folder if nothing else is in it."""

@@ -104,7 +104,7 @@ def fit_gauss_newton(recording: am.Recording, saturation: float) -> SurfaceFit:
         np.linalg.lstsq(*problem.linear_system(), rcond=None)[0], dtype=float
     )
     for _ in range(MAX_LINEARISATIONS):
-        error = -problem.residuals(coefficients)
+        error = problem.target - problem.predict(coefficients)
         jacobian = problem.jacobian(coefficients)
         step = np.asarray(np.linalg.lstsq(jacobian, error, rcond=None)[0], dtype=float)
         coefficients = coefficients + step

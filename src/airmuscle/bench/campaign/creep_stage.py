@@ -3,6 +3,7 @@ constant load.
 """
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,8 +12,16 @@ import numpy as np
 from ...core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ...physics import CreepElements, ForceLaw
 from ...recording import Recording
-from ..estimation import search_trust_region
-from ..hysteresis import MIN_RATIO, CreepFit, Hold, creep_elements, find_holds, fit_creep
+from ..estimation import Runs
+from ..hysteresis import (
+    MIN_RATIO,
+    CreepFit,
+    Hold,
+    TimeConstantProblem,
+    creep_elements,
+    find_holds,
+    fit_creep,
+)
 from ..inspection import CONTRACTION_BAND, EDGE
 from ..prediction import creep_stretches, displacement, has_path, thinned_rows
 from .record import CampaignRecord
@@ -179,11 +188,31 @@ def _common_times(holds: Sequence[HeldRows], initial: Sequence[float]) -> Array:
     )
     low = np.log([0.1, *[MIN_RATIO] * (count - 1)])
     high = np.log([2.0 * longest] * count)
-    start = np.clip(steps, low + 1e-6, high - 1e-6)
-    result = search_trust_region(
-        "creep", lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high)
-    )
-    return np.asarray(np.exp(np.cumsum(result.x)))
+    start = np.exp(np.clip(steps, low + 1e-6, high - 1e-6))
+    limits = np.exp(np.column_stack([low, high]))
+    target = np.concatenate([hold.recording["force"] for hold in holds])
+    problem = HeldForceProblem(target, tuple(start), tuple(map(tuple, limits)), tuple(holds))
+    return np.asarray(np.cumprod(problem.solve().values))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HeldForceProblem(TimeConstantProblem):
+    """The forces of several holds, with the stretches of the elements along their paths."""
+
+    holds: tuple[HeldRows, ...]
+    quantity = "force"
+
+    @property
+    def origin(self) -> str:  # type: ignore[override]
+        return " + ".join(hold.recording.origin for hold in self.holds)
+
+    @functools.cached_property
+    def runs(self) -> Runs:
+        hold = np.repeat(np.arange(len(self.holds)), [hold.held.size for hold in self.holds])
+        return Runs(hold, np.zeros(hold.size, dtype=np.intp), in_time=True)
+
+    def columns(self, times: Array) -> Array:
+        return np.vstack(_matrices(self.holds, times))
 
 
 def _matrices(holds: Sequence[HeldRows], times: Array) -> list[Array]:

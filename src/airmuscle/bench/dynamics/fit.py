@@ -18,9 +18,11 @@ from ..diagnosis import DataUse, support_of_transients
 from ..estimation import (
     EQUIVALENT,
     Estimate,
-    LevenbergMarquardt,
+    LeastSquares,
+    ProblemSearch,
     aicc,
     analyse_identifiability,
+    check_finite,
     lag_one_autocorrelation,
 )
 from .experiment import (
@@ -121,9 +123,7 @@ def fit_dynamic(
         _solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1]
     )
     if not np.isfinite(outcomes[0][1]):
-        problem.residuals(
-            problem.scaled(np.array([u.value for u in unknowns]))
-        )  # raises the cause, if there is one
+        check_finite(problem, problem.initial_values)  # raises the cause, if there is one
         raise IdentificationError(
             "the plant cannot be simulated from any initial guess. Check the bounds and the initial"
             " conditions."
@@ -182,25 +182,26 @@ def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tup
     """
     if len(guesses) == 1:
         return [problem.solve(guesses[0])]
-    every = list(range(len(problem.unknowns)))
 
-    def screened(number: int) -> LevenbergMarquardt:
+    def screened(number: int) -> ProblemSearch:
         name = f"start {number + 1} of {len(guesses)}"
-        return problem.search(guesses[number], every, name).run(SCREENING_RUNS)
+        search = ProblemSearch(problem, LeastSquares(), guesses[number], name)
+        return search.run(SCREENING_RUNS)
 
     with thread_pool(min(len(guesses), os.cpu_count() or 1)) as pool:
         searches = list(pool.map(screened, range(len(guesses))))
         lowest = min(search.cost for search in searches)
-        continued = [s for s in searches if not s.finished and s.cost <= SCREENING_RATIO * lowest]
+        continued = [
+            s for s in searches if not s.is_finished and s.cost <= SCREENING_RATIO * lowest
+        ]
         list(pool.map(lambda search: search.run(MAX_RUNS), continued))
-        return [(search.x, search.cost) for search in searches]
+        return [(search.values, search.cost) for search in searches]
 
 
 def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
     """The values of the plant, then a Latin hypercube; logarithmic where the range is positive.
-    Scaled, (P,) each.
+    SI, (P,) each.
     """
-    values = np.array([u.value for u in problem.unknowns])
     rng = np.random.default_rng(seed)
     cells = count - 1
     columns = []
@@ -208,24 +209,31 @@ def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[A
         low, high = unknown.search_range
         fraction = (rng.permutation(cells) + rng.random(cells)) / max(cells, 1)
         columns.append(low * (high / low) ** fraction if low > 0 else low + fraction * (high - low))
-    return [problem.scaled(values), *problem.scaled(np.column_stack(columns))]
+    return [problem.initial_values, *np.column_stack(columns)]
 
 
 def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> DynamicFit:
-    """The result from the scaled unknowns (S, P) and sums of squares (S,) of all searches, the
-    lowest first.
+    """The result from the values (S, P) [SI] and sums of squares (S,) of all searches, the lowest
+    first.
     """
-    scaled = searches[0]
-    residuals, jacobian = problem.residuals(scaled)
-    low, high = problem.bounds
+    values = searches[0]
+    coordinates = problem.coordinates
+    scales = coordinates.sizes
+    solution = problem.solution(values)
+    residuals = problem.residuals(solution.modelled)
+    jacobian = problem.weights[:, None] * solution.jacobian * scales
+    scaled = coordinates.of(values)
+    low, high = (coordinates.of(bound) for bound in problem.bounds)
     margin = 1e-6 * np.maximum(np.abs(scaled), 1.0)
     on_bound = (scaled - low <= margin) | (high - scaled <= margin)
     inner = np.flatnonzero(~on_bound)
     residual_std = float(np.sqrt(np.sum(residuals**2) / (residuals.size - inner.size)))
     names = [problem.unknowns[k].name for k in inner]
     # A prior is of the logarithm, so that the unknown is judged relative to its estimate.
-    magnitudes = np.where(problem.has_prior, np.abs(scaled), 1.0)[inner]
-    known = residual_std * problem.prior_residuals(scaled)[1]
+    magnitudes = np.ones(scaled.size)
+    magnitudes[problem.priors.indices] = np.abs(scaled)[problem.priors.indices]
+    magnitudes = magnitudes[inner]
+    known = residual_std * problem.priors.jacobian(values) * scales
     analysis = analyse_identifiability(
         np.concatenate([jacobian, known])[:, inner], names, magnitudes, residual_std
     )
@@ -237,20 +245,20 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
         Estimate(u.name, u.symbol, float(value), float(stderr), u.unit, u.meaning, bool(bound))
         for u, value, stderr, bound in zip(
             problem.unknowns,
-            problem.values(scaled),
-            standard_errors * problem.scales,
+            values,
+            standard_errors * scales,
             on_bound,
             strict=True,
         )
     )
     correlations = covariance / np.outer(standard_errors, standard_errors)
-    optima = distinct_optima(problem.values(searches), costs, problem.scales, problem.margins)
+    optima = distinct_optima(searches, costs, scales, problem.margins)
     airs = [
         (m.experiment.recording, getattr(m.plant, "ambient", None)) for m in problem.record_models
     ]
     notes = [
         *(str(combination) for combination in analysis.undetermined),
-        *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
+        *describe_bounds(estimates, jacobian, inverse, on_bound, scales, coordinates.origins),
         *describe_optima(optima, estimates, costs, problem.margins),
         *_describe_model_error(problem, residuals, estimates, inner.size),
         *describe_ambient(

@@ -171,14 +171,14 @@ def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
     relative to their estimates, or scales if these are zero, and for start times and initial
     values, whose zero is arbitrary, margins.
     """
-    _, jacobian = fit.problem.residuals(fit.problem.scaled(fit.values))
+    problem = fit.problem
+    jacobian = problem.weights[:, None] * problem.jacobian(fit.values)
     pairs = zip(fit.estimates, fit.unknowns, strict=True)
     magnitudes = [
         (abs(estimate.value) if unknown.paths else 0.0) or unknown.scale
         for estimate, unknown in pairs
     ]
-    factors = np.array(magnitudes) / fit.problem.scales
-    matrix = jacobian * factors / max(fit.residual_std, 1e-12)
+    matrix = jacobian * np.array(magnitudes) / max(fit.residual_std, 1e-12)
     nuisance = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]
     return _without(matrix[:, list(common)], matrix[:, nuisance]) + np.eye(len(common)) / PRIOR**2
 

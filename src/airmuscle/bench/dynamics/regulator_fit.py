@@ -25,7 +25,7 @@ from ...physics import (
 from ...recording import Recording
 from ...report import Chapter, Table, TableColumn
 from ..diagnosis import DataUse, command_response, is_exchanged, support_of_transients
-from ..estimation import MAX_RELATIVE_ERROR
+from ..estimation import MAX_RELATIVE_ERROR, SolvedProblem
 from ..inspection import EDGE, SAME_READING, analyse_sampling, distinct_readings, rounding
 from ..reported import Reported
 from .experiment import Experiment, PriorValue
@@ -95,6 +95,11 @@ class RegulatorFit(Reported):
     fit: DynamicFit
     zeros: tuple[float, ...]
     remarks: tuple[str, ...]
+
+    @property
+    def solved(self) -> SolvedProblem:
+        """The problem with the estimates: covariance by records, profiles, bootstrap."""
+        return self.fit.solved
 
     @property
     def plant(self) -> Plant:

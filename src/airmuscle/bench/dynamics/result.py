@@ -15,7 +15,7 @@ from ...recording.columns import display_scale
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.parameter_tables import estimate_table
 from ...report.shown import BRIEF_ROWS
-from ..estimation import Estimate, Identifiability
+from ..estimation import Estimate, Identifiability, SolvedProblem
 from ..reported import Reported, unit_column
 from .experiment import Unknown
 from .problem import DynamicFitProblem
@@ -119,6 +119,11 @@ class DynamicFit(Reported):
         return np.array([e.value for e in self.estimates])
 
     @property
+    def solved(self) -> SolvedProblem:
+        """The problem with the estimates: covariance by records, profiles, bootstrap."""
+        return SolvedProblem(self.problem, self.values)
+
+    @property
     def unknowns(self) -> tuple[Unknown, ...]:
         """The unknowns of the fit, in the order of the estimates."""
         return self.problem.unknowns
@@ -165,35 +170,32 @@ class DynamicFit(Reported):
         optimum outwards; all others are fitted again."""
         index = self.estimates.index(self[name])
         problem = self.problem
-        best = self.problem.scaled(self.values)
-        low, high = (bound[index] for bound in problem.bounds)
-        stderr = self.estimates[index].stderr / problem.scales[index]
+        best = self.values
+        low, high = (float(bound[index]) for bound in problem.bounds)
+        stderr = self.estimates[index].stderr
         span = high - low
         if problem.unknowns[
             index
         ].paths:  # the zero of a clock or of an initial value gives no range
-            span = min(span, 2.0 * abs(best[index]) or 1.0)
+            span = min(span, 2.0 * abs(float(best[index])) or problem.unknowns[index].scale)
         distance = min(MAX_STANDARD_ERRORS * stderr, span) if np.isfinite(stderr) else span
         rows = [(best[index], self.costs[0], best)]
         for side in (-1.0, 1.0):
-            scaled = best.copy()
+            values = best.copy()
             for step in range(1, points + 1):
                 value = best[index] + side * distance * step / points
                 if not low <= value <= high:
                     break
-                scaled = scaled.copy()
-                scaled[index] = value
-                scaled, cost = problem.solve(scaled, fixed=(index,))
-                rows.append((value, cost, scaled))
+                values = values.copy()
+                values[index] = value
+                values, cost = problem.solve(values, fixed=(index,))
+                rows.append((value, cost, values))
         rows.sort(key=lambda row: row[0])
         variance = max(self.residual_std, 1e-300) ** 2
         increase = np.array([(cost - self.costs[0]) / variance for _, cost, _ in rows])
-        values = (
-            problem.origins[index]
-            + np.array([value for value, _, _ in rows]) * problem.scales[index]
-        )
-        estimates = problem.values(np.array([scaled for _, _, scaled in rows]))
-        return DynamicProfile(name, self.estimates[index].unit, values, increase, estimates)
+        profiled = np.array([value for value, _, _ in rows])
+        estimates = np.array([values for _, _, values in rows])
+        return DynamicProfile(name, self.estimates[index].unit, profiled, increase, estimates)
 
     def plot(self, record: int = 0, *, ax: Any = None) -> Any:
         """Plot the observed quantities of one record, measured and modelled, one panel each. `ax`

@@ -8,6 +8,8 @@ from .cross_validation import default_split as default_split
 from .cross_validation import is_pressure_ramp as is_pressure_ramp
 from .cross_validation import label_folds as label_folds
 from .cross_validation import levels_of as levels_of
+from .evaluations import ProblemSearch as ProblemSearch
+from .evaluations import check_finite as check_finite
 from .group_refits import GroupRefits as GroupRefits
 from .group_refits import KnownMinima as KnownMinima
 from .group_refits import degrees_of_freedom as degrees_of_freedom
@@ -15,7 +17,11 @@ from .group_refits import leverages as leverages
 from .group_refits import t_quantile as t_quantile
 from .identifiability import analyse_identifiability as analyse_identifiability
 from .least_squares_descent import gauss_newton as gauss_newton
+from .levenberg_marquardt import EDGES as EDGES
+from .levenberg_marquardt import Accuracy as Accuracy
+from .levenberg_marquardt import Evaluations as Evaluations
 from .levenberg_marquardt import LevenbergMarquardt as LevenbergMarquardt
+from .levenberg_marquardt import Linearisation as Linearisation
 from .levenberg_marquardt import bounded_step as bounded_step
 from .model_evidence import aicc as aicc
 from .model_evidence import batch_sample_size as batch_sample_size
@@ -28,22 +34,26 @@ from .parameter_covariance import Runs as Runs
 from .pooled_covariance import EffectRows as EffectRows
 from .pooled_covariance import estimate_pooled_covariance as estimate_pooled_covariance
 from .problem import FreeParameter as FreeParameter
+from .problem import Guard as Guard
 from .problem import LeastSquaresProblem as LeastSquaresProblem
 from .problem import LeastSquaresSolution as LeastSquaresSolution
+from .problem import MeasuredProblem as MeasuredProblem
+from .problem import Modelled as Modelled
+from .problem import Prior as Prior
 from .problem import RankDeficiency as RankDeficiency
+from .problem import SimulatedProblem as SimulatedProblem
 from .profile_likelihood import profile_limits as profile_limits
 from .resampling import resampled_values as resampled_values
 from .sampled_descent import SampledDescent as SampledDescent
-from .sampled_descent import SampledParameters as SampledParameters
 from .sampled_descent import SampledProblem as SampledProblem
 from .sampled_descent import SearchStage as SearchStage
 from .search import Checkpoint as Checkpoint
 from .search import watched_searches as watched_searches
+from .solved_problem import SolvedProblem as SolvedProblem
 from .solver import solve_iteratively as solve_iteratively
 from .solver import solve_least_squares as solve_least_squares
 from .statistics import Estimate as Estimate
 from .statistics import fit_statistics as fit_statistics
-from .trust_region import search_trust_region as search_trust_region
 from .variable_projection import find_initial_values as find_initial_values
 from .variable_projection import shortened_step as shortened_step
 from .variable_projection import solve_censored_least_squares as solve_censored_least_squares
@@ -52,6 +62,7 @@ from .weighting import Censoring as Censoring
 from .weighting import Huber as Huber
 from .weighting import LeastSquares as LeastSquares
 from .weighting import Loss as Loss
+from .weighting import SoftL1 as SoftL1
 from .weighting import sensor_deviations as sensor_deviations
 
 # isort: split

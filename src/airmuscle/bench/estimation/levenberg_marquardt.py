@@ -1,68 +1,96 @@
-"""Levenberg-Marquardt method with bounds, as a search that can be interrupted and continued.
+"""Levenberg-Marquardt method with bounds: the one least-squares search of the bench, which can be
+interrupted and continued.
 
-    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the maximum norms of the columns of J so
-                               far
+    |T s + q|^2 + lambda |D s|^2 -> min,   J = Q T, q = Q^T r,   D the maximum norms of the columns
+                                           of J so far
 
 An unknown on its bound, with a gradient that points beyond it, is fixed for that step. An unknown
 that the step would move beyond a bound is set to that bound, and the step of the others is computed
 again. The same holds for the maximum change of an unknown in one step: an unknown with little
 effect so far, and thus a large step, does not shorten the steps of the others. The damping follows
-the ratio of the actual to the predicted reduction.
+the ratio of the actual to the predicted reduction. The triangle T of the Jacobian, instead of its
+normal equations, keeps the digits of unknowns that are hard to tell apart.
 
 Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes
-in Mathematics 630, Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's
-method, IMM-REP-1999-05, DTU 1999.
+in Mathematics 630, Springer 1978 (scaling by D, step from the triangle); Nielsen, H. B., Damping
+parameter in Marquardt's method, IMM-REP-1999-05, DTU 1999.
 """
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Self
+import abc
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from ...core import Array
 from .search import Checkpoint, goes_on
 
-Residuals = Callable[[Array], tuple[Array, Array] | None]
-"""Residuals (R,) and Jacobian (R, P) at unknowns (P,); None where they cannot be computed. What
-they remember of earlier calls is in their attribute `memory`, numbers that a checkpoint keeps."""
 INITIAL_DAMPING = 1e-3
 MIN_DAMPING = 1e-12
 MAX_DAMPING = 1e30
+MIN_DAMPING_OF_NORMAL = 1e-7
+"""Damping, relative to the squares of the columns, from which the normal equations have enough
+digits for a step (chosen)."""
 RELATIVE_STEP_LIMIT = 0.7
 MIN_STEP_LIMIT = 0.25
-"""Maximum change of an unknown in one step: this fraction of its value, or of its scale or bounds
-if that is larger. Chosen: far from the optimum a long step leads to plants that cannot be
-simulated, or only with tiny time steps."""
-TOLERANCE = 1e-10
-"""Predicted relative reduction below which the search ends, and relative step likewise."""
-COST_NOISE = 1e-5
-"""Relative jump of the sum of squares that is caused by the step-size control of the simulation;
-chosen. A step with a predicted reduction below a tenth of it is accepted if the sum of squares
-increases by no more than it: the Jacobian still gives the direction, the sum no longer does. Such a
-step ends the search unless its predicted reduction is less than half of the last one."""
+"""Maximum change of an unknown in one short step: this fraction of its value, or of its scale or
+bounds if that is larger. Chosen: far from the optimum a long step leads to plants that cannot be
+simulated, or only with tiny time steps, and to frictions without an effect."""
 
 
-class _NormalEquations(NamedTuple):
-    """Sum of squares, normal matrix (P, P) and half the gradient (P,)."""
+class Accuracy(NamedTuple):
+    """The digits of a sum of squares, and where its search ends."""
+
+    tolerance: float
+    """Predicted relative reduction below which the search ends, and relative step likewise."""
+    noise: float
+    """Relative jump of the sum of squares that is no change of the model. A step with a predicted
+    reduction below a tenth of it is accepted if the sum of squares increases by no more than it:
+    the Jacobian still gives the direction, the sum no longer does. Such a step ends the search
+    unless its predicted reduction is less than half of the last one."""
+    has_short_steps: bool = False
+    """Whether the change of an unknown in one step is limited."""
+
+
+EXACT = Accuracy(1e-14, 1e-13)
+"""Of a formula (chosen: above the rounding of a sum of a million squares)."""
+EDGES = Accuracy(1e-9, 1e-7, has_short_steps=True)
+"""Of a path with kinks, whose Jacobian is one of differences (chosen)."""
+SIMULATED = Accuracy(1e-10, 1e-5, has_short_steps=True)
+"""Of a simulation, whose step-size control makes the sum of squares jump (chosen)."""
+
+
+class Evaluations(abc.ABC):
+    """What a search minimises: a sum of squares, or of the loss of residuals, of P unknowns."""
+
+    memory: tuple[float, ...] = ()
+    """What the results depend on beside the unknowns, numbers that a checkpoint keeps."""
+
+    @abc.abstractmethod
+    def cost(self, x: Array) -> float:
+        """The sum at unknowns (P,); infinite or NaN where it cannot be computed."""
+
+    @abc.abstractmethod
+    def linearise(self) -> "Linearisation":
+        """The sum of squares that is tangent to the sum at the unknowns of the last `cost`."""
+
+
+class Linearisation(NamedTuple):
+    """Residuals (R,) and Jacobian (R, P) of a sum of squares; norms (P,) of the columns by which
+    steps are damped, by default those of the Jacobian."""
+
+    residuals: Array
+    jacobian: Array
+    norms: Array | None = None
+
+
+class _Tangent(NamedTuple):
+    """The sum, the triangle (P, P) and Q^T r (P,) of the sum of squares that is tangent, and the
+    norms of its columns."""
 
     cost: float
-    normal: Array
-    gradient: Array
-
-
-def _normal_equations(evaluated: tuple[Array, Array] | None, count: int) -> _NormalEquations:
-    """The normal equations; an infinite sum where residuals or Jacobian are missing, not finite, or
-    overflow when squared.
-    """
-    if evaluated is not None:
-        r, j = evaluated
-        with np.errstate(over="ignore", invalid="ignore"):
-            cost = float(r @ r)
-            normal = j.T @ j
-            gradient = j.T @ r
-        if cost < np.inf and np.isfinite(normal).all():
-            return _NormalEquations(cost, normal, gradient)
-    return _NormalEquations(np.inf, np.zeros((count, count)), np.zeros(count))
+    triangle: Array
+    projected: Array
+    norms: Array
 
 
 class SearchState(NamedTuple):
@@ -70,8 +98,8 @@ class SearchState(NamedTuple):
 
     x: Array
     cost: float
-    normal: Array
-    gradient: Array
+    triangle: Array
+    projected: Array
     scale: Array
     damping: float
     growth: float
@@ -84,86 +112,109 @@ class SearchState(NamedTuple):
 
 class LevenbergMarquardt:
     """A search from one initial guess, which can be interrupted and continued: unknowns `x` (P,),
-    sum of squares there, `cost`, and whether it is `finished`. The sum of squares is infinite where
-    the residuals cannot be computed at the initial guess. With a checkpoint it goes on from the
-    state that an earlier call has kept."""
+    the sum there, `cost`, and whether it is `finished`. The sum is infinite where it cannot be
+    computed at the initial guess. With a checkpoint it goes on from the state that an earlier call
+    has kept."""
 
     def __init__(
         self,
-        residuals: Residuals,
+        evaluations: Evaluations,
         start: Array,
         low: Array,
         high: Array,
         *,
         name: str = "search",
+        accuracy: Accuracy = SIMULATED,
         checkpoint: Checkpoint | None = None,
     ) -> None:
-        self._residuals: Any = residuals
+        self._evaluations = evaluations
         self._low = low
         self._high = high
         self._name = name
+        self._accuracy = accuracy
         self._checkpoint = checkpoint
         state = None if checkpoint is None else checkpoint.load()
         if state is not None:
             self._restore(SearchState(*state))
             return
-        self._scale = np.zeros(start.size)
+        size = start.size
+        self._scale = np.zeros(size)
         self._damping = INITIAL_DAMPING
         self._growth = 2.0
-        self._rejected_step = np.full(start.size, np.nan)
+        self._rejected_step = np.full(size, np.nan)
         self._predicted = np.inf
-        self._evaluations = 1
+        self._count = 1
         x = np.clip(start, low, high)
-        self._accept(x, _normal_equations(residuals(x), x.size))
-        self.finished = not self.cost < np.inf
+        cost = evaluations.cost(x)
+        tangent = self._tangent(cost) if cost < np.inf else None
+        nothing = _Tangent(np.inf, np.zeros((size, size)), np.zeros(size), np.zeros(size))
+        self._accept(x, tangent or nothing)
+        self.finished = tangent is None
 
     def run(self, max_evaluations: int) -> Self:
-        """Search until convergence, or until the residuals were evaluated `max_evaluations` times
-        in total.
+        """Search until convergence, or until the sum was evaluated `max_evaluations` times in
+        total.
         """
-        while not self.finished and self._evaluations < max_evaluations:
-            if not goes_on(self._name, self._evaluations / max_evaluations):
+        while not self.finished and self._count < max_evaluations:
+            if not goes_on(self._name, self._count / max_evaluations):
                 break
             self._step()
             if self._checkpoint is not None:
-                self._checkpoint.save(self._state(), last=self.finished)
+                self._checkpoint.save(self._state, last=self.finished)
         return self
 
     def _state(self) -> SearchState:
         return SearchState(
             self.x,
             self.cost,
-            self._normal,
-            self._gradient,
+            self._triangle,
+            self._projected,
             self._scale,
             self._damping,
             self._growth,
             self._rejected_step,
             self._predicted,
-            self._evaluations,
+            self._count,
             self.finished,
-            tuple(getattr(self._residuals, "memory", ())),
+            tuple(self._evaluations.memory),
         )
 
     def _restore(self, state: SearchState) -> None:
         self.x = state.x
         self.cost = state.cost
-        self._normal = state.normal
-        self._gradient = state.gradient
+        self._triangle = state.triangle
+        self._projected = state.projected
         self._scale = state.scale
         self._damping = state.damping
         self._growth = state.growth
         self._rejected_step = state.rejected_step
         self._predicted = state.predicted
-        self._evaluations = state.evaluations
+        self._count = state.evaluations
         self.finished = state.is_finished
         if state.memory:
-            self._residuals.memory = state.memory
+            self._evaluations.memory = tuple(state.memory)
 
-    def _accept(self, x: Array, equations: tuple[float, Array, Array]) -> None:
+    def _tangent(self, cost: float) -> _Tangent | None:
+        """The tangent at the unknowns that were evaluated last; None where it is not finite or
+        overflows when squared.
+        """
+        residuals, jacobian, norms = self._evaluations.linearise()
+        size = jacobian.shape[1]
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.einsum("rp,rp->p", jacobian, jacobian)
+            if not np.isfinite(squares).all():
+                return None
+        matrix = np.concatenate([jacobian, residuals[:, None]], axis=1)
+        triangle = np.asarray(np.linalg.qr(matrix, mode="r"))
+        if len(triangle) < size:
+            triangle = np.vstack([triangle, np.zeros((size - len(triangle), size + 1))])
+        norms = np.sqrt(squares) if norms is None else norms
+        return _Tangent(cost, triangle[:size, :size], triangle[:size, size], norms)
+
+    def _accept(self, x: Array, tangent: _Tangent) -> None:
         self.x = x
-        self.cost, self._normal, self._gradient = equations
-        self._scale = np.maximum(self._scale, np.sqrt(self._normal.diagonal()))
+        self.cost, self._triangle, self._projected, norms = tangent
+        self._scale = np.maximum(self._scale, norms)
 
     def _step(self) -> None:
         """Propose steps until one is no repetition, evaluate it, and accept or reject it."""
@@ -176,21 +227,23 @@ class LevenbergMarquardt:
         if converged:
             self.finished = True
             return
-        tried = _normal_equations(self._residuals(self.x + step), step.size)
-        self._evaluations = self._evaluations + 1
-        cost = tried[0]
-        small = predicted <= COST_NOISE / 10 * self.cost and self._damping < 1
-        within_noise = small and cost <= (1 + COST_NOISE) * self.cost
+        cost = self._evaluations.cost(self.x + step)
+        self._count = self._count + 1
+        noise = self._accuracy.noise
+        small = predicted <= noise / 10 * self.cost and self._damping < 1
+        within_noise = small and cost <= (1 + noise) * self.cost
         if within_noise and cost >= self.cost and predicted > self._predicted / 2:
             self.finished = True
-        elif within_noise or cost < self.cost:
-            ratio = (self.cost - cost) / predicted if cost < self.cost else 1.0
-            self._accept(self.x + step, tried)
-            self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), MIN_DAMPING)
-            self._growth = 2.0
-            self._predicted = predicted
-        else:
+            return
+        tangent = self._tangent(cost) if within_noise or cost < self.cost else None
+        if tangent is None:
             self._reject(step)
+            return
+        ratio = (self.cost - cost) / predicted if cost < self.cost else 1.0
+        self._accept(self.x + step, tangent)
+        self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), MIN_DAMPING)
+        self._growth = 2.0
+        self._predicted = predicted
 
     def _reject(self, step: Array) -> None:
         """Increase the damping, and remember the rejected step."""
@@ -199,48 +252,52 @@ class LevenbergMarquardt:
         self._rejected_step = step
 
     def _propose_step(self) -> tuple[Array, float]:
-        """A step, and the predicted reduction of the sum of squares."""
+        """A step, and the predicted reduction of the sum."""
         x = self.x
-        scale = self._scale
-        limit = np.maximum(
-            RELATIVE_STEP_LIMIT * np.abs(x),
-            MIN_STEP_LIMIT * np.minimum(self._high - self._low, 1.0),
-        )
-        low = np.maximum(self._low, x - limit)
-        high = np.minimum(self._high, x + limit)
-        damping = self._damping * np.where(scale > 0, scale, 1.0) ** 2
-        step = bounded_step(self._normal, self._gradient, damping, x, low, high)
-        return step, -float(step @ (2 * self._gradient + self._normal @ step))
+        low = self._low
+        high = self._high
+        if self._accuracy.has_short_steps:
+            least = MIN_STEP_LIMIT * np.minimum(high - low, 1.0)
+            limit = np.maximum(RELATIVE_STEP_LIMIT * np.abs(x), least)
+            low = np.maximum(low, x - limit)
+            high = np.minimum(high, x + limit)
+        damping = self._damping * np.where(self._scale > 0, self._scale, 1.0) ** 2
+        step = bounded_step(self._triangle, self._projected, damping, x, low, high)
+        moved = self._triangle @ step
+        return step, -float(moved @ (2 * self._projected + moved))
 
     def _is_converged(self, step: Array, predicted: float) -> bool:
         """Whether the step or its predicted reduction is negligible, or the damping exceeds its
         maximum.
         """
+        tolerance = self._accuracy.tolerance
         if (
-            0 <= predicted <= TOLERANCE * self.cost and self._damping < 1
+            0 <= predicted <= tolerance * self.cost and self._damping < 1
         ) or not self._damping < MAX_DAMPING:
             return True
         scaled_step = self._scale * step
         scaled_x = self._scale * self.x
-        return bool(scaled_step @ scaled_step <= TOLERANCE**2 * (scaled_x @ scaled_x))
+        return bool(scaled_step @ scaled_step <= tolerance**2 * (scaled_x @ scaled_x))
 
 
 def bounded_step(
-    normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array
+    triangle: Array, projected: Array, damping: Array, x: Array, low: Array, high: Array
 ) -> Array:
-    """The damped step (P,) from x; unknowns that it would move beyond a bound are set to it, the
-    others recomputed.
+    """The step s (P,) from x with the least |triangle s + projected|^2 + damping s^2; unknowns that
+    it would move beyond a bound are set to it, the others recomputed.
     """
+    gradient = triangle.T @ projected
     free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+    roots = np.sqrt(damping)
+    if free.all():
+        step = _damped_step(triangle, projected, roots)
+        target = x + step
+        if ((target >= low) & (target <= high)).all():
+            return step
     step = np.zeros(x.size)
-    matrix = normal + np.diag(damping)
     while free.any():
-        if free.all():
-            step[:] = np.linalg.solve(matrix, -gradient)
-        else:
-            right = gradient + normal @ np.where(free, 0.0, step)
-            indices = np.flatnonzero(free)
-            step[indices] = np.linalg.solve(matrix[indices[:, None], indices], -right[indices])
+        right = projected + triangle[:, ~free] @ step[~free]
+        step[free] = _damped_step(triangle[:, free], right, roots[free])
         target = x + step
         beyond = free & ((target < low) | (target > high))
         if not beyond.any():
@@ -248,3 +305,20 @@ def bounded_step(
         step[beyond] = (np.clip(target, low, high) - x)[beyond]
         free &= ~beyond
     return step
+
+
+def _damped_step(columns: Array, right: Array, roots: Array) -> Array:
+    """The step s (F,) with the least |columns s + right|^2 + |roots s|^2."""
+    normal = columns.T @ columns
+    norms = normal.diagonal() + roots * roots
+    if (roots * roots > MIN_DAMPING_OF_NORMAL * norms).all():
+        normal.flat[:: len(normal) + 1] = norms
+        return np.asarray(np.linalg.solve(normal, -(columns.T @ right)))
+    scales = np.sqrt(np.where(norms > 0, norms, 1.0))
+    matrix = np.concatenate([columns / scales, np.diag(roots / scales)])
+    target = np.concatenate([-right, np.zeros(roots.size)])
+    orthogonal, triangle = np.linalg.qr(matrix)
+    try:
+        return np.asarray(np.linalg.solve(triangle, orthogonal.T @ target) / scales)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, target, rcond=None)[0] / scales)

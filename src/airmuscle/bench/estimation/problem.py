@@ -3,20 +3,37 @@ what is fitted to them.
 """
 
 import abc
+import dataclasses
+import functools
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, Hint, IdentificationError
+from .levenberg_marquardt import EXACT, SIMULATED, Accuracy
+from .parameter_covariance import Runs
 
 BOUND_MARGIN = 1e-6
 """Relative distance from a bound within which a parameter is on it (chosen)."""
 MAX_NAMES = 3
 """Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
+MIN_RATIO = 1e-9
+"""Least ratio of a parameter with a prior to its prior value (chosen): a bound may be zero."""
+Mask = npt.NDArray[np.bool_]
 _RELATIVE_STEP = float(np.cbrt(np.finfo(float).eps))
 """Step of a central difference, relative to the parameter."""
+
+
+class Prior(NamedTuple):
+    """What is known of a parameter before: its value, and the standard deviation of a further
+    residual (value - known value), or of ln(value/known value), in the unit of the residuals.
+    """
+
+    value: float
+    deviation: float
+    is_logarithmic: bool = False
 
 
 class FreeParameter(NamedTuple):
@@ -32,6 +49,102 @@ class FreeParameter(NamedTuple):
     meaning: str
     is_linear: bool = False
     """Whether the fitted quantity is linear in it."""
+    size: float = 1.0
+    """Its typical size [SI], in which a search counts it."""
+    origin: float = 0.0
+    """The value [SI] from which a search counts it."""
+    is_logarithmic: bool = False
+    """Whether a search counts its logarithm instead."""
+    prior: Prior | None = None
+
+
+class PriorRows(NamedTuple):
+    """Priors (K,) of the parameters of these indices."""
+
+    indices: npt.NDArray[np.intp]
+    values: Array
+    deviations: Array
+    logarithmic: Mask
+
+    @classmethod
+    def of(cls, parameters: Sequence[FreeParameter]) -> "PriorRows":
+        """Those of the parameters that have one."""
+        known = [(i, p.prior) for i, p in enumerate(parameters) if p.prior is not None]
+        columns = np.array([tuple(prior) for _, prior in known], dtype=float).reshape(-1, 3).T
+        indices = np.array([i for i, _ in known], dtype=np.intp)
+        return cls(indices, columns[0], columns[1], columns[2] > 0)
+
+    def residuals(self, values: Array) -> Array:
+        """The residuals (K,) at parameters (P,)."""
+        chosen = values[self.indices]
+        linear = (chosen - self.values) / self.deviations
+        ratios = chosen / np.where(self.logarithmic, self.values, 1.0)
+        logarithms = np.log(np.maximum(ratios, MIN_RATIO)) / self.deviations
+        return np.where(self.logarithmic, logarithms, linear)
+
+    def jacobian(self, values: Array) -> Array:
+        """Derivatives (K, P) of the residuals."""
+        chosen = values[self.indices]
+        ratios = chosen / np.where(self.logarithmic, self.values, 1.0)
+        known = np.where(self.logarithmic, np.maximum(ratios, MIN_RATIO) * self.values, 1.0)
+        matrix = np.zeros((self.indices.size, values.size))
+        matrix[np.arange(self.indices.size), self.indices] = 1.0 / (known * self.deviations)
+        return matrix
+
+
+class Coordinates(NamedTuple):
+    """The unknowns (P,) of a search over parameters: (value - origin)/size, or ln(value/size)."""
+
+    origins: Array
+    sizes: Array
+    logarithmic: Mask
+    has_logarithms: bool
+
+    def of(self, values: Array) -> Array:
+        """The unknowns of values [SI], shape (..., P)."""
+        linear = (values - self.origins) / self.sizes
+        if not self.has_logarithms:
+            return np.asarray(linear)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.logarithmic, np.log(values / self.sizes), linear)
+
+    def values(self, x: Array) -> Array:
+        """The values [SI] of unknowns, shape (..., P)."""
+        linear = self.origins + x * self.sizes
+        if not self.has_logarithms:
+            return np.asarray(linear)
+        ratios = np.exp(np.where(self.logarithmic, x, 0.0))
+        return np.where(self.logarithmic, ratios * self.sizes, linear)
+
+    def slopes(self, values: Array) -> Array:
+        """The derivatives of the values [SI] by the unknowns, shape (..., P)."""
+        if not self.has_logarithms:
+            return self.sizes
+        return np.where(self.logarithmic, values, self.sizes)
+
+
+class Modelled(NamedTuple):
+    """The fitted quantity (N,) with its Jacobian (N, P), if the evaluation gives both at once."""
+
+    modelled: Array
+    jacobian: Array | None
+
+
+class Guard(abc.ABC):
+    """The limit of the cost of evaluations in one search, by those before."""
+
+    @property
+    @abc.abstractmethod
+    def memory(self) -> tuple[float, ...]:
+        """What it has learnt, numbers that a checkpoint keeps."""
+
+    @abc.abstractmethod
+    def restore(self, memory: tuple[float, ...]) -> None:
+        """Go on with what another one has learnt."""
+
+    @abc.abstractmethod
+    def learn(self, cost: float) -> None:
+        """Learn from the last evaluation, whose sum of squares is `cost`."""
 
 
 class LeastSquaresSolution(NamedTuple):
@@ -76,10 +189,13 @@ class RankDeficiency(NamedTuple):
 
 
 class LeastSquaresProblem(abc.ABC):
-    """N rows and P free parameters. A kind of fit brings its parameters, the fitted quantity at
-    every row with its Jacobian, and the selection of rows; solvers, covariance, intervals and
-    refits know no more of it.
+    """N rows and P free parameters. A kind of fit brings its parameters and the fitted quantity at
+    every row; its Jacobian, if differences are not enough. Search, covariance, intervals and refits
+    know no more of it.
     """
+
+    accuracy: Accuracy = EXACT
+    """The digits of its residuals, and where a search ends."""
 
     target: Array
     """Measured value, or the bound of a censored row, in the fitted quantity [SI]; shape (N,)."""
@@ -114,23 +230,38 @@ class LeastSquaresProblem(abc.ABC):
         finite.
         """
 
-    @abc.abstractmethod
     def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
         """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N,
-        P).
-        """
+        P). By default central differences."""
+        return self.central_differences(values, range(len(values)) if which is None else which)
 
-    @abc.abstractmethod
-    def rows(self, selection: npt.NDArray[Any]) -> Self:
+    def evaluate(self, values: Array, guard: Guard | None = None) -> Modelled:
+        """The fitted quantity with these parameters [SI], as `predict`; with its Jacobian where one
+        computation gives both. Within a search a `guard` may limit its cost. Raises AirmuscleError
+        where the quantity cannot be computed."""
+        return Modelled(self.predict(values), None)
+
+    def guard(self) -> Guard | None:
+        """A limit of the cost of the evaluations of one search; None where they cost the same."""
+        return None
+
+    @property
+    def runs(self) -> Runs:
+        """The groups of rows between which errors are independent; by default one."""
+        one = np.zeros(self.target.size, dtype=np.intp)
+        return Runs(one, one, in_time=True)
+
+    def rows(self, selection: npt.NDArray[Any]) -> "LeastSquaresProblem":
         """The problem of these rows, a mask or indices."""
+        return PartialProblem.of(self).rows(selection)
 
-    @abc.abstractmethod
-    def weighted(self, factors: Array) -> Self:
+    def weighted(self, factors: Array) -> "LeastSquaresProblem":
         """The problem with the weights multiplied by these factors (N,)."""
+        return PartialProblem.of(self).weighted(factors)
 
-    @abc.abstractmethod
-    def with_known(self, index: int, value: float) -> Self:
+    def with_known(self, index: int, value: float) -> "LeastSquaresProblem":
         """The problem in which the parameter of this index is not free but has a value."""
+        return PartialProblem.of(self).with_known(index, value)
 
     def describe_row(self, row: int) -> str:
         """Where a row was measured, for messages."""
@@ -163,6 +294,21 @@ class LeastSquaresProblem(abc.ABC):
         low, high = pairs.reshape(-1, 2).T
         return low, high
 
+    @functools.cached_property
+    def coordinates(self) -> Coordinates:
+        """The unknowns of a search."""
+        return Coordinates(
+            np.array([parameter.origin for parameter in self.parameters], dtype=float),
+            np.array([parameter.size for parameter in self.parameters], dtype=float),
+            np.array([parameter.is_logarithmic for parameter in self.parameters], dtype=bool),
+            any(parameter.is_logarithmic for parameter in self.parameters),
+        )
+
+    @functools.cached_property
+    def priors(self) -> PriorRows:
+        """The parameters with a prior."""
+        return PriorRows.of(self.parameters)
+
     @property
     def is_linear_parameter(self) -> npt.NDArray[np.bool_]:
         """Mask of the free parameters in which the fitted quantity is linear, shape (P,)."""
@@ -184,7 +330,7 @@ class LeastSquaresProblem(abc.ABC):
         margin = BOUND_MARGIN * np.maximum(np.abs(values), np.abs(self.initial_values))
         return values - low <= margin, high - values <= margin
 
-    def repeated(self, counts: Array) -> Self:
+    def repeated(self, counts: Array) -> "LeastSquaresProblem":
         """The problem in which each row counts this many times (N,)."""
         drawn = counts > 0
         return self.rows(drawn).weighted(np.sqrt(counts[drawn]))
@@ -204,7 +350,10 @@ class LeastSquaresProblem(abc.ABC):
 
     def solution(self, values: Array) -> LeastSquaresSolution:
         """The solution with these free parameters (P,)."""
-        return LeastSquaresSolution(values, self.predict(values), self.jacobian(values))
+        modelled, jacobian = self.evaluate(values)
+        if jacobian is None:
+            jacobian = self.jacobian(values)
+        return LeastSquaresSolution(values, modelled, jacobian)
 
     def design_matrix(self) -> tuple[Array, Array]:
         """Design matrix (N, P) and constant part (N,) of a problem that is linear in its free
@@ -219,10 +368,10 @@ class LeastSquaresProblem(abc.ABC):
         bounds.
         """
         low, high = self.bounds
-        initial = self.initial_values
-        columns = []
+        sizes = [abs(parameter.initial) or parameter.size for parameter in self.parameters]
+        columns = [np.zeros((self.target.size, 0))]
         for i in which:
-            step = _RELATIVE_STEP * max(abs(values[i]), abs(initial[i]), 1e-8)
+            step = _RELATIVE_STEP * max(abs(values[i]), sizes[i])
             above = values.copy()
             below = values.copy()
             above[i] = min(values[i] + step, high[i])
@@ -230,3 +379,126 @@ class LeastSquaresProblem(abc.ABC):
             difference = self.predict(above) - self.predict(below)
             columns.append(difference / (above[i] - below[i]))
         return np.column_stack(columns)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PartialProblem(LeastSquaresProblem):
+    """Some rows of a problem, with other weights and some parameters known."""
+
+    whole: LeastSquaresProblem
+    selection: npt.NDArray[np.intp]
+    """Indices of the rows, shape (N,)."""
+    weights: Array
+    known: tuple[tuple[int, float], ...] = ()
+    """Indices of the known parameters of the whole problem, with their values."""
+
+    @classmethod
+    def of(cls, problem: LeastSquaresProblem) -> "PartialProblem":
+        """All rows and parameters of a problem."""
+        return cls(problem, np.arange(problem.target.size), problem.weights)
+
+    @property
+    def name(self) -> str:
+        return self.whole.name
+
+    @property
+    def origin(self) -> str:
+        return self.whole.origin
+
+    @property
+    def quantity(self) -> str:
+        return self.whole.quantity
+
+    @functools.cached_property
+    def free(self) -> list[int]:
+        """Indices of the free parameters in the whole problem."""
+        known = {index for index, _ in self.known}
+        return [i for i in range(len(self.whole.parameters)) if i not in known]
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        every = self.whole.parameters
+        return tuple(every[i] for i in self.free)
+
+    @functools.cached_property
+    def target(self) -> Array:  # type: ignore[override]
+        return np.asarray(self.whole.target[self.selection])
+
+    @functools.cached_property
+    def censoring(self) -> Array:  # type: ignore[override]
+        return np.asarray(self.whole.censoring[self.selection])
+
+    @property
+    def accuracy(self) -> Accuracy:  # type: ignore[override]
+        return self.whole.accuracy
+
+    @property
+    def runs(self) -> Runs:
+        return self.whole.runs.rows(self.selection)
+
+    def guard(self) -> Guard | None:
+        return self.whole.guard()
+
+    def describe_row(self, row: int) -> str:
+        return self.whole.describe_row(int(self.selection[row]))
+
+    def every_value(self, values: Array) -> Array:
+        """The parameters of the whole problem, with these of the free ones."""
+        whole = np.empty(len(self.whole.parameters))
+        whole[self.free] = values
+        for index, value in self.known:
+            whole[index] = value
+        return whole
+
+    def predict(self, values: Array) -> Array:
+        return np.asarray(self.whole.predict(self.every_value(values))[self.selection])
+
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        chosen = self.free if which is None else [self.free[i] for i in which]
+        return np.asarray(self.whole.jacobian(self.every_value(values), chosen)[self.selection])
+
+    def evaluate(self, values: Array, guard: Guard | None = None) -> Modelled:
+        modelled, jacobian = self.whole.evaluate(self.every_value(values), guard)
+        columns = None if jacobian is None else jacobian[self.selection][:, self.free]
+        return Modelled(modelled[self.selection], columns)
+
+    def rows(self, selection: npt.NDArray[Any]) -> "PartialProblem":
+        return dataclasses.replace(
+            self, selection=self.selection[selection], weights=self.weights[selection]
+        )
+
+    def weighted(self, factors: Array) -> "PartialProblem":
+        return dataclasses.replace(self, weights=self.weights * factors)
+
+    def with_known(self, index: int, value: float) -> "PartialProblem":
+        return dataclasses.replace(self, known=(*self.known, (self.free[index], value)))
+
+
+class MeasuredProblem(LeastSquaresProblem):
+    """A problem whose rows are all measured values of the same weight."""
+
+    @functools.cached_property
+    def censoring(self) -> Array:  # type: ignore[override]
+        return np.zeros(self.target.size)
+
+    @functools.cached_property
+    def weights(self) -> Array:  # type: ignore[override]
+        return np.ones(self.target.size)
+
+
+class SimulatedProblem(MeasuredProblem):
+    """A problem whose fitted quantity comes from a simulation, with its Jacobian."""
+
+    accuracy = SIMULATED
+
+    @abc.abstractmethod
+    def evaluate(self, values: Array, guard: Guard | None = None) -> Modelled:
+        """The fitted quantity with its Jacobian."""
+
+    def predict(self, values: Array) -> Array:
+        return self.evaluate(values).modelled
+
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        jacobian = self.evaluate(values).jacobian
+        assert jacobian is not None
+        return jacobian if which is None else jacobian[:, list(which)]

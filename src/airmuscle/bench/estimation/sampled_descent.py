@@ -7,13 +7,15 @@ Normal matrix and gradient are running averages over the iterations. The result 
 
 import abc
 import dataclasses
+import functools
 import json
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
+from .problem import SimulatedProblem
 from .search import Checkpoint, goes_on
 
 MEMORY = 0.9
@@ -39,28 +41,11 @@ class SearchStage:
     batch: int
 
 
-class SampledParameters(NamedTuple):
-    """Typical sizes and bounds of P parameters, and their prior values with the weights of these, 0
-    where there is none; (P,) each.
-    """
-
-    sizes: Array
-    low: Array
-    high: Array
-    prior: Array
-    prior_weights: Array
-
-
-class SampledProblem(abc.ABC):
-    """Residuals of groups of rows, of which a part can be evaluated."""
+class SampledProblem(SimulatedProblem):
+    """A problem whose rows are in groups, of which a part can be evaluated."""
 
     clip: ClassVar[float]
     """Residual from which a row counts less."""
-
-    @property
-    @abc.abstractmethod
-    def parameters(self) -> SampledParameters:
-        """What is known of the parameters."""
 
     @property
     @abc.abstractmethod
@@ -105,14 +90,13 @@ class SampledDescent:
         self._random = np.random.default_rng(seed)
         self._spread = 0.1
 
-    def run(self, problem: SampledProblem, stage: SearchStage, name: str, content: Any) -> float:
+    def run(self, problem: SampledProblem, stage: SearchStage, name: str) -> float:
         """Descend, and return the cost of the best mean of `CHECKED` iterates, at which `values`
         are then; a search that has lost its way goes on from that mean with half the step.
 
-        name     of the search, for its progress
-        content  what determines the problem, for the checkpoint of the stage
+        name  of the search, for its progress
         """
-        checkpoint = Checkpoint(__name__, (content, stage, self.values, self._spread, self._drawn))
+        checkpoint = Checkpoint(__name__, (problem, stage, self.values, self._spread, self._drawn))
         stored = checkpoint.load()
         if stored is None:
             state = self._start(problem, stage)
@@ -123,8 +107,8 @@ class SampledDescent:
             state = self._iterate(problem, stage, state)
             if state.step % CHECKED == 0:
                 state = self._check(problem, stage.rows, state)
-                kept = state._replace(random=self._drawn)
-                checkpoint.save(kept, last=kept.step == stage.iterations)
+                reached = functools.partial(state._replace, random=self._drawn)
+                checkpoint.save(reached, last=state.step == stage.iterations)
         self.values = state.best
         self._spread = state.spread
         return state.cost
@@ -167,7 +151,7 @@ class SampledDescent:
         late = step / stage.iterations
         damping = DAMPING if late <= 0.5 else LATE_DAMPING
         rate = 0.4 * state.rate if late > 0.7 else state.rate
-        values = _moved(problem.parameters, state.values, normal, slope, rate, damping)
+        values = _moved(problem, state.values, normal, slope, rate, damping)
         return state._replace(
             step=step,
             values=values,
@@ -189,7 +173,7 @@ class SampledDescent:
 
 
 def _moved(
-    known: SampledParameters,
+    problem: SampledProblem,
     values: Array,
     normal: Array,
     slope: Array,
@@ -197,13 +181,15 @@ def _moved(
     damping: float,
 ) -> Array:
     """The values after a damped step within the bounds, with the pull of the prior."""
-    pull = known.prior_weights / known.sizes**2
-    slope = slope + pull * (values - known.prior)
-    normal = normal + np.diag(pull)
+    sizes = problem.coordinates.sizes
+    priors = problem.priors
+    pull = priors.jacobian(values)
+    slope = slope + pull.T @ priors.residuals(values)
+    normal = normal + pull.T @ pull
     scale = np.sqrt(np.diag(normal))
-    scale = scale + 1e-6 * np.max(scale * known.sizes) / known.sizes
+    scale = scale + 1e-6 * np.max(scale * sizes) / sizes
     damped = normal / np.outer(scale, scale) + damping * np.eye(len(slope))
     change = -np.linalg.solve(damped, slope / scale) / scale
-    limit = MAX_CHANGE * np.maximum(np.abs(values), known.sizes)
+    limit = MAX_CHANGE * np.maximum(np.abs(values), sizes)
     moved = values + np.clip(rate * change, -limit, limit)
-    return np.asarray(np.clip(moved, known.low, known.high))
+    return np.asarray(np.clip(moved, *problem.bounds))

@@ -9,6 +9,7 @@ that goes on from one ends at the same values, to the last bit, as one that was 
 
 import contextlib
 import dataclasses
+import functools
 import math
 import time
 import warnings
@@ -18,7 +19,7 @@ from typing import Any
 
 from ...core import AirmuscleWarning, ParameterError, abridged
 from ...engine.processes import check_running
-from ...engine.result_store import TaskKeys, current_store
+from ...engine.result_store import CHECKPOINT, TaskKeys, current_store
 
 CHECKPOINT_INTERVAL = 5.0
 """Minimum time between two checkpoints of a search [s] (chosen: a checkpoint takes about 1 ms)."""
@@ -107,23 +108,35 @@ class Checkpoint:
     def __init__(self, name: str, content: Any) -> None:
         """`name` begins with the module of the search, `content` determines its result."""
         self._store = current_store()
-        self._key: str | None = None
+        self._name = name
+        self._content = content
         self._last = time.monotonic()
-        if self._store is not None:
-            (self._key,) = TaskKeys(f"{name}:checkpoint", None).of([content])
+        self._is_kept = False
+
+    @functools.cached_property
+    def _key(self) -> str | None:
+        (digest,) = TaskKeys(f"{self._name}:checkpoint", None).of([self._content])
+        return None if digest is None else f"{CHECKPOINT}{digest}"
 
     def load(self) -> Any:
         """The state that was kept; None where there is none."""
-        if self._store is None or self._key is None:
+        store = self._store
+        if store is None or not store.has_checkpoints or self._key is None:
             return None
-        stored = self._store.load(self._key)
+        stored = store.load(self._key)
+        self._is_kept = stored is not None
         return None if stored is None else stored.value
 
-    def save(self, state: Any, *, last: bool = False) -> None:
-        """Keep a state, if the last one was kept long ago, or if it is the `last` of the search."""
-        if self._store is None or self._key is None:
+    def save(self, state: Callable[[], Any], *, last: bool = False) -> None:
+        """Keep a state, if the last one was kept long ago; also the `last` of a search of which
+        one was kept.
+        """
+        if self._store is None:
             return
-        now = time.monotonic()
-        if last or now - self._last >= CHECKPOINT_INTERVAL:
-            self._store.save(self._key, state)
-            self._last = now
+        is_due = time.monotonic() - self._last >= CHECKPOINT_INTERVAL
+        if not is_due and not (last and self._is_kept):
+            return
+        if self._key is not None:
+            self._store.save(self._key, state())
+            self._is_kept = True
+            self._last = time.monotonic()

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
+from .levenberg_marquardt import Accuracy, Evaluations, LevenbergMarquardt, Linearisation
 from .problem import LeastSquaresProblem
-from .trust_region import search_trust_region
 
 RANK_TOLERANCE = 1e-10
 """Relative tolerance below which a singular value of the scaled design matrix counts as zero
@@ -118,6 +118,11 @@ follows.
 """
 
 
+_MAX_EVALUATIONS = 60
+_ACCURACY = Accuracy(1e-8, 1e-10)
+"""Maximum evaluations and accuracy of a search for initial values (chosen)."""
+
+
 def find_initial_values(problem: LeastSquaresProblem, multi_start: bool = True) -> Array:
     """The best free parameters by variable projection, shape (P,); the given ones where none are
     better. Without `multi_start` there is one search, from the given parameters."""
@@ -155,8 +160,8 @@ def find_initial_values(problem: LeastSquaresProblem, multi_start: bool = True) 
     return values if after < before else problem.initial_values
 
 
-class _Projection:
-    """The residuals of a problem as a function of its nonlinear parameters alone."""
+class _Projection(Evaluations):
+    """The sum of squares of a problem as a function of its nonlinear parameters alone."""
 
     def __init__(self, problem: LeastSquaresProblem, linear: npt.NDArray[np.bool_]) -> None:
         self._problem = problem
@@ -167,6 +172,7 @@ class _Projection:
         self._scale = np.where(initial != 0, np.abs(initial), 1.0)
         self._last: tuple[bytes, tuple[Array, Array, Array]] | None = None
         self._active: npt.NDArray[np.bool_] | None = None
+        self._x = initial
 
     def solve(self, nonlinear: Array) -> tuple[Array, Array, Array]:
         """All free parameters (P,), the fitted quantity (N,) and the columns of the linear
@@ -202,6 +208,8 @@ class _Projection:
         slopes = row_weights * self._problem.jacobian(
             values, np.flatnonzero(~self._linear).tolist()
         )
+        if not np.isfinite(slopes).all():
+            return slopes
         norms = np.linalg.norm(columns, axis=0)
         linear = row_weights * (columns / np.where(norms > 0, norms, 1.0))
         return np.asarray(slopes - linear @ np.linalg.lstsq(linear, slopes, rcond=None)[0])
@@ -210,25 +218,22 @@ class _Projection:
         """Sum of the squared residuals; infinite where one is not finite."""
         return _sum_of_squares(self.residuals(nonlinear))
 
+    def cost(self, x: Array) -> float:
+        self._x = x * self._scale
+        return self.sum_of_squares(self._x)
+
+    def linearise(self) -> Linearisation:
+        return Linearisation(self.residuals(self._x), self.jacobian(self._x) * self._scale)
+
     def search(self, start: Array) -> Array:
-        """The minimum found from one initial guess, or the guess itself where the search fails."""
-        if not np.isfinite(self.sum_of_squares(start)):
-            return start
+        """The minimum found from one initial guess, or the guess itself where the law is not
+        finite.
+        """
         low, high = (bound / self._scale for bound in self._bounds)
-        inside = np.clip(start / self._scale, low + 1e-9, high - 1e-9)
-        try:
-            result = search_trust_region(
-                "initial values",
-                lambda x: self.residuals(x * self._scale),
-                inside,
-                bounds=(low, high),
-                x_scale="jac",
-                max_nfev=60,
-                jac=lambda x: self.jacobian(x * self._scale) * self._scale,
-            )
-        except (ValueError, np.linalg.LinAlgError):  # the law is not finite at a trial point
-            return start
-        return np.asarray(result.x * self._scale)
+        search = LevenbergMarquardt(
+            self, start / self._scale, low, high, name="initial values", accuracy=_ACCURACY
+        )
+        return np.asarray(search.run(_MAX_EVALUATIONS).x * self._scale)
 
 
 def _sum_of_squares(residuals: Array) -> float:

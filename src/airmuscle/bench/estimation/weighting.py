@@ -80,6 +80,19 @@ class Huber(Loss):
 
 
 @dataclasses.dataclass(frozen=True)
+class SoftL1(Loss):
+    """rho = 2 (sqrt(1 + z) - 1): squares of small residuals, magnitudes of those beyond `scale`
+    [SI].
+    """
+
+    scale: float
+
+    def rho(self, z: Array) -> Array:
+        root = np.sqrt(1.0 + z)
+        return np.stack([2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3])
+
+
+@dataclasses.dataclass(frozen=True)
 class Censoring:
     """The range of force [N] within which a row is a measured value; at its limits and beyond it is
     a bound.

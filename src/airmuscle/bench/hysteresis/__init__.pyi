@@ -38,6 +38,7 @@ from .search import search_parameters as search_parameters
 # isort: split
 # For the other rooms, not in __all__
 from .creep import MIN_RATIO as MIN_RATIO
+from .creep import TimeConstantProblem as TimeConstantProblem
 from .hysteresis_chapter import joint_friction_chapter as joint_friction_chapter
 from .loop_result import describe_run as describe_run
 from .loops import rows_of as rows_of

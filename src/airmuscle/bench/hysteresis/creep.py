@@ -9,16 +9,27 @@ relaxation times belong to the zeros of D. Reference: Tschoegl, N. W., The Pheno
 of Linear Viscoelastic Behavior, Springer, 1989.
 """
 
+import abc
 import dataclasses
+import functools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import Array, IdentificationError, ParameterError, model, one_line, parameter
 from ...physics.muscle import CreepElements
 from ...recording import Recording
-from ..estimation import effective_sample_size, f_test_p_value, search_trust_region
+from ..estimation import (
+    Accuracy,
+    FreeParameter,
+    LeastSquares,
+    MeasuredProblem,
+    SolvedProblem,
+    effective_sample_size,
+    f_test_p_value,
+    solve_iteratively,
+)
 from ..inspection import (
     RELATIVE_BAND,
     SAME_READING,
@@ -154,6 +165,8 @@ class CreepFit:
     """Length of the hold [s]."""
     unit: str = ""
     """Unit of the creeping quantity; empty for a contraction."""
+    solved: SolvedProblem | None = None
+    """The problem with the time constants: covariance, profiles, bootstrap; None without creep."""
 
     @property
     def verdict(self) -> str:
@@ -202,12 +215,12 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
         )
     time = time - time[0]
     fits = [
-        Creep(float(np.mean(values))),
+        _Elements(Creep(float(np.mean(values))), None),
         _fit_elements(time, values, 1),
         _fit_elements(time, values, 2),
     ]
-    squares = [float(np.mean((creep.value_at(time) - values) ** 2)) for creep in fits]
-    sample_size = effective_sample_size(fits[-1].value_at(time) - values)
+    squares = [float(np.mean((fit.creep.value_at(time) - values) ** 2)) for fit in fits]
+    sample_size = effective_sample_size(fits[-1].creep.value_at(time) - values)
     p_values = tuple(
         f_test_p_value(squares[i], squares[i + 1], sample_size, 3 + 2 * i, 2) for i in (0, 1)
     )
@@ -216,18 +229,27 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
         count += 1
     rmse_by_order = tuple(float(np.sqrt(square)) for square in squares)
     unit = "N" if quantity == "force" else ""
+    creep, solved = fits[count]
     return CreepFit(
-        fits[count], rmse_by_order[count], rmse_by_order, p_values, float(time[-1]), unit
+        creep, rmse_by_order[count], rmse_by_order, p_values, float(time[-1]), unit, solved
     )
 
 
-def _fit_elements(time: Array, values: Array, count: int) -> Creep:
+class _Elements(NamedTuple):
+    """Creep, and the problem with its time constants if it has any."""
+
+    creep: Creep
+    solved: SolvedProblem | None
+
+
+def _fit_elements(time: Array, values: Array, count: int) -> _Elements:
     """Nonlinear least squares in the time constants from the best grid point; the other parameters
     are linear.
     """
     low = np.log(np.median(np.diff(time)))
     high = np.log(2.0 * time[-1])
     min_step = np.log(MIN_RATIO)
+    problem = HoldProblem(values, (1.0,), (), time)
     grid = np.linspace(low, high, GRID_SIZE)[1:-1]
     steps = grid - low + 1.01 * min_step
     starts: list[tuple[float, ...]]
@@ -237,29 +259,76 @@ def _fit_elements(time: Array, values: Array, count: int) -> Creep:
         starts = [(a, b) for a in grid for b in steps[::3] if a + b < high]
 
     def sum_of_squares(start: tuple[float, ...]) -> float:
-        return float(np.sum(_residuals(np.array(start), time, values) ** 2))
+        return float(np.sum((problem.predict(np.exp(start)) - values) ** 2))
 
     best = min(starts, key=sum_of_squares)
     greatest_step = max(high - low, 2.0 * min_step)
-    bounds = ([low, min_step][:count], [high, greatest_step][:count])
-    solution = search_trust_region("creep", _residuals, best, bounds=bounds, args=(time, values))
-    logarithms = np.cumsum(solution.x)
-    coefficients = np.linalg.lstsq(_design_matrix(logarithms, time), values, rcond=None)[0]
-    return Creep(float(coefficients[0]), tuple(coefficients[1:]), tuple(np.exp(logarithms)))
+    limits = np.exp([(low, high), (min_step, greatest_step)][:count])
+    problem = HoldProblem(values, tuple(np.exp(best)), tuple(map(tuple, limits)), time)
+    solved = problem.solve()
+    times = np.asarray(np.cumprod(solved.values))
+    coefficients = problem.linear_part(times)
+    creep = Creep(float(coefficients[0]), tuple(coefficients[1:]), tuple(times))
+    return _Elements(creep, solved)
 
 
-def _design_matrix(logarithms: Array, time: Array) -> Array:
-    return np.column_stack(
-        [np.ones_like(time), *(1.0 - np.exp(-time / np.exp(log)) for log in logarithms)]
-    )
-
-
-def _residuals(steps: Array, time: Array, values: Array) -> Array:
-    """Residuals for the logarithm of the first time constant and its difference to that of the
-    second.
+@dataclasses.dataclass(frozen=True, eq=False)
+class TimeConstantProblem(MeasuredProblem):
+    """Measured values, and the time constants of a sum of exponentials: the first [s], and the
+    ratio of each further one to the one before. What is linear is solved for at every evaluation.
     """
-    matrix = _design_matrix(np.cumsum(steps), time)
-    return np.asarray(matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0] - values)
+
+    target: Array
+    initial: tuple[float, ...]
+    limits: tuple[tuple[float, float], ...]
+    name = "creep"
+    origin = "hold"
+    accuracy = Accuracy(1e-9, 1e-12)
+
+    @abc.abstractmethod
+    def columns(self, times: Array) -> Array:
+        """The columns (N, C) in whose coefficients the values are linear, of time constants
+        [s].
+        """
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        parameters = []
+        for i, value in enumerate(self.initial):
+            name = f"tau_{i + 1}/tau_{i}" if i else "tau_1"
+            unit = "1" if i else "s"
+            meaning = "ratio of time constants" if i else "first time constant"
+            limits = self.limits[i]
+            parameters.append(
+                FreeParameter(name, name, value, limits, unit, meaning, is_logarithmic=True)
+            )
+        return tuple(parameters)
+
+    def linear_part(self, times: Array) -> Array:
+        """The coefficients (C,) of the columns."""
+        return np.asarray(np.linalg.lstsq(self.columns(times), self.target, rcond=None)[0])
+
+    def predict(self, values: Array) -> Array:
+        matrix = self.columns(np.asarray(np.cumprod(values)))
+        return np.asarray(matrix @ np.linalg.lstsq(matrix, self.target, rcond=None)[0])
+
+    def solve(self) -> SolvedProblem:
+        """The problem with the parameters of least squares."""
+        solution = solve_iteratively(self, LeastSquares(), self.initial_values)
+        return SolvedProblem(self, solution.values)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class HoldProblem(TimeConstantProblem):
+    """The values of one hold at times [s] from its start."""
+
+    time: Array
+    quantity = "value"
+
+    def columns(self, times: Array) -> Array:
+        return np.column_stack(
+            [np.ones_like(self.time), *(1.0 - np.exp(-self.time / tau) for tau in times)]
+        )
 
 
 def creep_elements(

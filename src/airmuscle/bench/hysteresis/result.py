@@ -20,10 +20,16 @@ from ...core import (
 )
 from ...physics.muscle.friction import Friction
 from ...report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
-from ..estimation import UndeterminedCombination, model_evidence
+from ..estimation import SolvedProblem, UndeterminedCombination, model_evidence
 from ..reported import Reported
 from .loop_data import DataLimits, limit_reservations, undetermined_parameters
-from .search import LoopSeries, branch_gap, free_parameters, repeat_difference
+from .search import (
+    LoopSeries,
+    branch_gap,
+    free_parameters,
+    repeat_difference,
+    solved_friction,
+)
 
 SIGNIFICANCE_LEVEL = 0.01
 """p-value below which an F test is significant (chosen)."""
@@ -219,6 +225,11 @@ class HysteresisFit(FrictionFit):
     residual_gap: float
     repeatability: float
     series: LoopSeries
+
+    @property
+    def solved(self) -> SolvedProblem:
+        """The problem with the fitted law: covariance, profiles, bootstrap."""
+        return solved_friction(self.friction, [self.series])
 
     @property
     def limits(self) -> DataLimits:

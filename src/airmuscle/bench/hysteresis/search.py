@@ -5,7 +5,7 @@ of several.
 import dataclasses
 import functools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +13,17 @@ from ...core import Array, IdentificationError, Leaf, tree
 from ...physics.muscle.friction import Friction, PressureScaledFriction
 from ...recording import Recording
 from ..estimation import (
+    EDGES,
+    FreeParameter,
+    LeastSquares,
+    MeasuredProblem,
+    Prior,
+    Runs,
+    SolvedProblem,
     UndeterminedCombination,
     analyse_identifiability,
     effective_sample_size,
-    search_trust_region,
+    solve_iteratively,
 )
 from ..inspection import EDGE, Mask, estimate_noise, motion_direction
 from . import loop_data as data
@@ -303,59 +310,98 @@ def _residuals(friction: Friction, runs: Sequence[LoopSeries]) -> Array:
     return np.concatenate([run.fitted_residuals(friction) for run in runs])
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class FrictionProblem(MeasuredProblem):
+    """The forces at the fitted rows of all runs, and the free parameters of a friction law; the
+    static curve of each run is solved for at every evaluation.
+    """
+
+    friction: Friction
+    """The law with its initial parameters."""
+    series: tuple[LoopSeries, ...]
+    # The forces have kinks.
+    accuracy = EDGES
+
+    @property
+    def name(self) -> str:
+        return type(self.friction).__name__
+
+    @property
+    def origin(self) -> str:
+        return " + ".join(run.origin for run in self.series)
+
+    quantity = "force"
+
+    @functools.cached_property
+    def _leaves(self) -> list[Leaf]:
+        return list(tree.leaves(self.friction))
+
+    @functools.cached_property
+    def _free(self) -> list[int]:
+        return [i for i, leaf in enumerate(self._leaves) if leaf.declared.fitted]
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        limits = combine_limits(tuple(run.limits for run in self.series))
+        deviation = PRIOR / _noise(self.series)
+        return tuple(_parameter(self._leaves[i], limits, deviation) for i in self._free)
+
+    @functools.cached_property
+    def target(self) -> Array:  # type: ignore[override]
+        return np.concatenate([run.target[run.fitted_rows] for run in self.series])
+
+    @functools.cached_property
+    def runs(self) -> Runs:
+        counts = [int(np.count_nonzero(run.fitted_rows)) for run in self.series]
+        run = np.repeat(np.arange(len(counts)), counts)
+        return Runs(run, np.zeros(run.size, dtype=np.intp), in_time=True)
+
+    def describe_row(self, row: int) -> str:
+        every = [(run, i) for run in self.series for i in np.flatnonzero(run.fitted_rows)]
+        run, place = every[row]
+        return f"{run.origin}, row {place + 1}"
+
+    def law(self, values: Array) -> Friction:
+        """The law with these parameters, not validated."""
+        every = [leaf.value for leaf in self._leaves]
+        for i, value in zip(self._free, values.tolist(), strict=True):
+            every[i] = value
+        return tree.unflatten(self.friction, every)
+
+    def predict(self, values: Array) -> Array:
+        return self.target - _residuals(self.law(values), self.series)
+
+
+def solved_friction(friction: Friction, runs: Sequence[LoopSeries]) -> SolvedProblem:
+    """The problem of a fitted friction law: covariance by runs, profiles, bootstrap."""
+    problem = FrictionProblem(friction, tuple(runs))
+    return SolvedProblem(problem, problem.initial_values)
+
+
 def _fit_iteratively(
     friction: Friction, runs: Sequence[LoopSeries]
 ) -> tuple[Friction, tuple[UndeterminedCombination, ...]]:
-    """Nonlinear least squares over the free parameters; the static curve is solved for at every
-    evaluation.
-    """
-    limits = combine_limits(tuple(run.limits for run in runs))
-    all_leaves = list(tree.leaves(friction))
-    free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
-    coordinates = [_search_coordinate(all_leaves[i], limits) for i in free]
-    start = [coordinate.start for coordinate in coordinates]
-    low = [coordinate.low for coordinate in coordinates]
-    high = [coordinate.high for coordinate in coordinates]
-
-    def law(x: Sequence[float]) -> Friction:
-        values = [leaf.value for leaf in all_leaves]
-        for i, coordinate, value in zip(free, coordinates, map(float, x), strict=True):
-            size = coordinate.size
-            values[i] = value * size if size else float(np.exp(value))
-        return tree.unflatten(friction, values)
-
-    weight = _prior_weight(runs) / PRIOR
-
-    def residuals(x: Array) -> Array:
-        return np.concatenate([_residuals(law(x.tolist()), runs), weight * (x - start)])
-
-    # Central differences, because the forces have kinks, where one-sided ones differ by rounding.
-    result = search_trust_region(
-        type(friction).__name__,
-        residuals,
-        start,
-        jac="3-point",
-        bounds=(low, high),
-        x_scale=1.0,
-        max_nfev=MAX_EVALUATIONS,
-    )
-    fitted = tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
-    names = [all_leaves[i].path for i in free]
+    """Nonlinear least squares over the free parameters."""
+    problem = FrictionProblem(friction, tuple(runs))
+    solution = solve_iteratively(problem, LeastSquares(), problem.initial_values, MAX_EVALUATIONS)
+    law = problem.law(solution.values)
+    fitted = tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law)])
+    names = problem.names
     if any("[" in name for name in names):
         return fitted, ()
-    remaining = result.fun[: len(result.fun) - len(names)]
+    residuals = problem.residuals(solution.modelled)
     freedom = max(
-        effective_sample_size(remaining) - len(names), 1.0
+        effective_sample_size(residuals) - len(names), 1.0
     )  # correlated residuals count as fewer rows
-    spread = float(np.sqrt(np.sum(remaining**2) / freedom)) or 1e-12
-    jacobian = result.jac[: len(remaining)]
+    spread = float(np.sqrt(np.sum(residuals**2) / freedom)) or 1e-12
+    jacobian = solution.jacobian * problem.coordinates.slopes(solution.values)
     analysis = analyse_identifiability(
         jacobian, names, np.ones(len(names)), spread, JACOBIAN_TOLERANCE
     )
     return fitted, analysis.undetermined
 
 
-def _prior_weight(runs: Sequence[LoopSeries]) -> float:
+def _noise(runs: Sequence[LoopSeries]) -> float:
     """The noise of the forces [N], at least a thousandth of the hysteresis: a row with that error
     states as much as the prior knowledge of a parameter."""
     noises = [estimate_noise(run.target[run.fitted_rows]) for run in runs]
@@ -367,23 +413,25 @@ def _residuals_without(runs: Sequence[LoopSeries]) -> Array:
     return np.concatenate([run.fitted_residuals(None) for run in runs])
 
 
-class _SearchCoordinate(NamedTuple):
-    """Start and bounds of a parameter in the search, relative to its size; of one with a positive
-    lower bound those of its logarithm, and a size of 0.
+def _parameter(leaf: Leaf, limits: DataLimits, deviation: float) -> FreeParameter:
+    """A parameter within the limits of the data; the logarithm of one with a positive lower bound
+    is searched. `deviation` is that of its prior, relative to its size.
     """
-
-    start: float
-    low: float
-    high: float
-    size: float
-
-
-def _search_coordinate(leaf: Leaf, limits: DataLimits) -> _SearchCoordinate:
-    """The coordinate of a parameter in the search, within the limits of the data."""
     low, high = limits.bounds(leaf)
     value = min(max(leaf.value, low), high)
-    if low > 0:
-        return _SearchCoordinate(float(np.log(value)), float(np.log(low)), float(np.log(high)), 0.0)
-    narrowed = high < leaf.declared.bounds[1]
+    declared = leaf.declared
+    is_logarithmic = low > 0
+    narrowed = high < declared.bounds[1]
     size = abs(value) or (0.1 * high if narrowed else 1.0)
-    return _SearchCoordinate(value / size, low / size, high / size, size)
+    prior = Prior(value, deviation if is_logarithmic else size * deviation, is_logarithmic)
+    return FreeParameter(
+        leaf.path,
+        declared.symbol,
+        value,
+        (low, high),
+        declared.unit,
+        declared.meaning,
+        size=size,
+        is_logarithmic=is_logarithmic,
+        prior=prior,
+    )

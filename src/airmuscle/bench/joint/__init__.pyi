@@ -2,6 +2,7 @@ from .angle_estimate import AngleEstimate as AngleEstimate
 from .angle_estimate import estimate_angles as estimate_angles
 from .arm_prediction import ArmPrediction as ArmPrediction
 from .arm_prediction import predict_episodes as predict_episodes
+from .descent import JointProblem as JointProblem
 from .episode_files import Channels as Channels
 from .episode_files import EpisodeMapping as EpisodeMapping
 from .episode_files import read_episode_mapping as read_episode_mapping
@@ -12,13 +13,19 @@ from .episode_inspection import PressureAction as PressureAction
 from .episode_inspection import inspect_episodes as inspect_episodes
 from .episodes import Episode as Episode
 from .episodes import Episodes as Episodes
+from .episodes import Windows as Windows
+from .episodes import cut as cut
 from .fit import fit_joint as fit_joint
 from .free_run import RegulatorLag as RegulatorLag
+from .free_run import RegulatorLagProblem as RegulatorLagProblem
+from .free_run import RegulatorLimits as RegulatorLimits
 from .free_run import ResidualGain as ResidualGain
 from .free_run import fit_regulator_lags as fit_regulator_lags
 from .free_run import fit_residual as fit_residual
 from .identified import IdentifiedArm as IdentifiedArm
 from .identified import identified_arm as identified_arm
+from .known_joint import FreeRunProblem as FreeRunProblem
+from .known_joint import ReadPressures as ReadPressures
 from .known_joint import fit_known_joint as fit_known_joint
 from .later_episodes import UnfitEpisode as UnfitEpisode
 from .result import ArmFit as ArmFit

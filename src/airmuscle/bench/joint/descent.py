@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, TypeVar, cast
+from typing import ClassVar, NamedTuple, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,18 @@ import numpy.typing as npt
 from ...core import Array, StateVariable, System, Value, Values, model, tree
 from ...engine import RungeKutta4, WithSensitivities, sensitivity, simulate_batch
 from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
-from ..estimation import SampledDescent, SampledParameters, SampledProblem, SearchStage
+from ..estimation import (
+    FreeParameter,
+    Guard,
+    Modelled,
+    Prior,
+    Runs,
+    SampledDescent,
+    SampledProblem,
+    SearchStage,
+    SoftL1,
+    SolvedProblem,
+)
 from .episodes import HISTORY, Windows, WindowSignal, start_of
 
 Arm = TypeVar("Arm", bound=System)
@@ -67,16 +78,23 @@ def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     return _run_of_joint(arm, joint, (), windows)[0]
 
 
-@dataclasses.dataclass(eq=False)
-class Descent(SampledProblem):
-    """Search for the parameters of an arm, by their paths in it, on which the motion of one joint
-    depends; its groups of rows are the windows.
+class DescentEnd(NamedTuple):
+    """The end of a search: its cost [rad^2] and its arm."""
+
+    cost: float
+    arm: PressureDriven
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class JointProblem(SampledProblem):
+    """The angles of one joint, and the parameters of an arm, by their paths in it, on which its
+    motion depends; the groups of rows are the windows.
     """
 
     arm: PressureDriven
     windows: Windows
     joint: int
-    names: Sequence[str]
+    paths: tuple[str, ...]
     seed: int = 0
     prior: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Values towards which parameters are drawn that the record hardly determines, by path; with
@@ -89,51 +107,86 @@ class Descent(SampledProblem):
     """
     clip: ClassVar[float] = CLIP
 
-    def __post_init__(self) -> None:
+    @property
+    def name(self) -> str:
+        return f"joint {self.joint + 1}"
+
+    origin = "episodes"
+    quantity = "angle"
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
-        bounds = [leaves[path].declared.bounds for path in self.names]
-        least = [LOW.get(_field(path), -np.inf) for path in self.names]
-        self._sizes = np.array([typical_size(path, leaves) for path in self.names])
-        self._low = np.maximum([low for low, _ in bounds], least)
-        self._high = np.array([high for _, high in bounds])
-        values = np.array([float(leaves[path].value) for path in self.names])
-        self._search = SampledDescent(values, self.seed)
-        self._stages = 0
+        return tuple(self._parameter(path, leaves) for path in self.paths)
 
-    @property
-    def values(self) -> Array:
-        """The parameters reached, shape (P,)."""
-        return self._search.values
-
-    @property
-    def parameters(self) -> SampledParameters:
-        prior = np.array([self.prior.get(path, 0.0) for path in self.names])
-        weights = np.array([self.ridge * (path in self.prior) for path in self.names])
-        return SampledParameters(self._sizes, self._low, self._high, prior, weights)
+    def _parameter(self, path: str, leaves: Mapping[str, tree.Leaf]) -> FreeParameter:
+        declared = leaves[path].declared
+        low, high = declared.bounds
+        size = typical_size(path, leaves)
+        prior = None
+        if path in self.prior:
+            prior = Prior(self.prior[path], size / float(np.sqrt(self.ridge)))
+        return FreeParameter(
+            path,
+            path,
+            float(leaves[path].value),
+            (max(low, LOW.get(_field(path), -np.inf)), high),
+            declared.unit,
+            declared.meaning,
+            size=size,
+            prior=prior,
+        )
 
     @property
     def group_count(self) -> int:
         return len(self.windows)
 
-    def run(self, schedule: SearchStage) -> float:
-        """Descend; afterwards `arm` has the parameters with the smallest cost [rad^2], which is
-        returned.
-        """
-        stage = dataclasses.replace(schedule, rows=min(schedule.rows, self.windows.rows))
-        self._stages = self._stages + 1
-        name = f"joint {self.joint + 1}, stage {self._stages}"
-        cost = self._search.run(self, stage, name, self)
-        self.arm = with_values(self.arm, self.names, self.values)
-        return cost
+    @functools.cached_property
+    def target(self) -> Array:  # type: ignore[override]
+        return np.zeros(self.windows.counts[:, HISTORY + 1 :].size)
+
+    @functools.cached_property
+    def runs(self) -> Runs:
+        """The window of each angle."""
+        count, rows = self.windows.counts[:, HISTORY + 1 :].shape
+        window = np.repeat(np.arange(count), rows)
+        return Runs(window, np.zeros(window.size, dtype=np.intp), in_time=True)
+
+    def describe_row(self, row: int) -> str:
+        window, place = divmod(row, self.windows.rows)
+        return f"row {place + 1} of window {window + 1}"
+
+    def evaluate(self, values: Array, guard: Guard | None = None) -> Modelled:
+        """Errors [rad] of the free run in all windows, and their derivatives."""
+        every = np.arange(self.group_count)
+        errors, gradient = self.linearise(values, every, self.windows.rows)
+        return Modelled(errors.ravel(), gradient.reshape(-1, len(self.paths)))
+
+    @property
+    def solved(self) -> SolvedProblem:
+        """The problem with the parameters of its arm."""
+        return SolvedProblem(self, self.initial_values, SoftL1(CLIP))
+
+    def search(self, stages: Sequence[SearchStage]) -> DescentEnd:
+        """The arm with the smallest cost [rad^2] after these stages of a descent."""
+        search = SampledDescent(self.initial_values, self.seed)
+        ends = [self.descend(search, stage, i) for i, stage in enumerate(stages, 1)]
+        return ends[-1]
+
+    def descend(self, search: SampledDescent, stage: SearchStage, number: int) -> DescentEnd:
+        """The end of one stage of a descent, from its last values on."""
+        limited = dataclasses.replace(stage, rows=min(stage.rows, self.windows.rows))
+        cost = search.run(self, limited, f"{self.name}, stage {number}")
+        return DescentEnd(cost, with_values(self.arm, self.paths, search.values))
 
     def linearise(
         self, values: Array, groups: npt.NDArray[np.intp], rows: int
     ) -> tuple[Array, Array]:
-        arm = with_values(self.arm, self.names, values)
-        return gradients(arm, self.joint, self.names, self.windows.part(groups.tolist(), rows))
+        arm = with_values(self.arm, self.paths, values)
+        return gradients(arm, self.joint, self.paths, self.windows.part(groups.tolist(), rows))
 
     def cost(self, values: Array, rows: int) -> float:
-        arm = with_values(self.arm, self.names, values)
+        arm = with_values(self.arm, self.paths, values)
         sampled = self.windows.sample(SAMPLE, rows)
         errors = self.errors(arm, self.joint, sampled)
         limited = np.clip(np.abs(errors), 0.0, OUTLIER)

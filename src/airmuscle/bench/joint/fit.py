@@ -25,7 +25,15 @@ from ...physics import (
 )
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from ..estimation import SearchStage
-from .descent import CLIP, Descent, gradients, joint_errors, typical_size, with_values
+from .descent import (
+    CLIP,
+    DescentEnd,
+    JointProblem,
+    gradients,
+    joint_errors,
+    typical_size,
+    with_values,
+)
 from .episode_inspection import checked_inspection, faults_of_judge, without_saturated
 from .episodes import ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
 from .free_run import (
@@ -107,6 +115,11 @@ def fit_joint(
     with thread_pool(len(STRENGTHS)) if workers == 1 else process_pool(workers) as executor:
         arm, paths = _search(fitted, train, tuple(axes), seed, progress, executor)
     of_joints = [separate(arm, joint, joint_paths, train) for joint, joint_paths in paths.items()]
+    sampled = train.sample(WINDOWS)
+    solved = tuple(
+        JointProblem(arm, sampled, joint, tuple(joint_paths)).solved
+        for joint, joint_paths in paths.items()
+    )
     gain = None
     remarks = [*short, *inspection.remarks, *faults_of_judge(episodes[split:]), *clipped, SCALE]
     for of_joint in of_joints:
@@ -140,6 +153,7 @@ def fit_joint(
         None if commanded is None else run_errors(arm, commanded),
         block_diag(*(of_joint.covariance for of_joint in of_joints)),
         gain,
+        solved=solved,
     )
 
 
@@ -177,7 +191,7 @@ def _search(
         )  # all others are identified
         starts = [stronger(arm, joint, factor) for factor in STRENGTHS]
         searches = [
-            Descent(start, windows, joint, paths[joint], seed, prior, errors=judge)
+            JointProblem(start, windows, joint, tuple(paths[joint]), seed, prior, errors=judge)
             for start in starts
         ]
         cost, arm = _best(searches, executor)
@@ -187,22 +201,14 @@ def _search(
     return arm, dict(sorted(paths.items()))
 
 
-class SearchEnd(NamedTuple):
-    """The end of a search: its cost [rad^2] and its arm."""
-
-    cost: float
-    arm: PressureDriven
-
-
-def _best(searches: Sequence[Descent], executor: Executor | None) -> SearchEnd:
+def _best(searches: Sequence[JointProblem], executor: Executor | None) -> DescentEnd:
     """The end with the smallest cost of searches that the executor runs in parallel."""
-    ends: list[SearchEnd] = DistributedCalls(executor, _search_to_end, None).results(searches)
+    ends: list[DescentEnd] = DistributedCalls(executor, _search_to_end, None).results(searches)
     return min(ends, key=lambda end: end.cost)
 
 
-def _search_to_end(_: None, search: Descent) -> SearchEnd:
-    costs = [search.run(stage) for stage in STAGES]
-    return SearchEnd(costs[-1], search.arm)
+def _search_to_end(_: None, search: JointProblem) -> DescentEnd:
+    return search.search(STAGES)
 
 
 def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: int) -> list[str]:

@@ -2,16 +2,26 @@
 residual that physics leaves in it."""
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from ...core import Array, ShortRepr, tree
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
-from ..estimation import SearchStage, search_trust_region
+from ..estimation import (
+    Accuracy,
+    FreeParameter,
+    MeasuredProblem,
+    ProblemSearch,
+    Runs,
+    SampledDescent,
+    SearchStage,
+    SoftL1,
+)
 from ..prediction import ARX, DEPTH, PERSISTENCE, fit_arx
-from .descent import Descent, with_slopes
+from .descent import JointProblem, with_slopes
 from .episode_inspection import without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of
 
@@ -93,6 +103,9 @@ SAMPLE = 400
 """Unit of the pressures in the search and a high one [Pa], errors that count less, number of its
 windows (chosen).
 """
+STEP = 1.5e-8
+"""Relative step of the derivatives by the values: the root of the rounding."""
+VALUES = ("K", "a_1", "a_2", "k_c", "k_x", "c_min", "c_max", "c_0")
 TRIED = 20
 REFINED = 40
 """Evaluations for each delay and kind of the commands, and for the best of them (chosen)."""
@@ -120,7 +133,7 @@ class RegulatorLag:
         """
         gain, first, second, to_level, to_pilot, low, high, zero = self.values
         modelled = pressure / UNIT
-        step = gain * command
+        step = (gain * command.T).T
         level = modelled[:, 0]
         pilot = modelled[:, 0]
         p = modelled[:, 0]
@@ -137,6 +150,80 @@ class RegulatorLag:
             else:
                 modelled[:, k] = p
         return modelled * UNIT
+
+
+class RegulatorLimits(NamedTuple):
+    """Bounds of the values of a regulator."""
+
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RegulatorLagProblem(MeasuredProblem):
+    """The pressures of windows (N, R) after their start, and the values of the regulator that gives
+    them.
+    """
+
+    model: RegulatorLag
+    pressure: Array
+    command: Array
+    limits: RegulatorLimits
+    name = "regulator"
+    origin = "episodes"
+    quantity = "pressure"
+    accuracy = Accuracy(1e-8, 1e-10)
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        rows = zip(VALUES, self.model.values, self.limits.low, self.limits.high, strict=True)
+        return tuple(
+            FreeParameter(name, name, value, (low, high), "", "", size=max(abs(value), 0.1))
+            for name, value, low, high in rows
+        )
+
+    @functools.cached_property
+    def target(self) -> Array:  # type: ignore[override]
+        return self.pressure[:, HISTORY + 1 :].ravel() / UNIT
+
+    @functools.cached_property
+    def runs(self) -> Runs:
+        """The window of each reading."""
+        count, rows = self.pressure.shape
+        window = np.repeat(np.arange(count), rows - HISTORY - 1)
+        return Runs(window, np.zeros(window.size, dtype=np.intp), in_time=True)
+
+    def describe_row(self, row: int) -> str:
+        window, place = divmod(row, self.pressure.shape[1] - HISTORY - 1)
+        return f"row {place + 1} of window {window + 1}"
+
+    def regulator(self, values: Array) -> RegulatorLag:
+        """The regulator with these values."""
+        return dataclasses.replace(self.model, values=tuple(values.tolist()))
+
+    def predict(self, values: Array) -> Array:
+        return self._pressures(self.regulator(values), self.pressure, self.command).ravel()
+
+    @staticmethod
+    def _pressures(model: RegulatorLag, pressure: Array, command: Array) -> Array:
+        return model.pressures(pressure, command)[:, HISTORY + 1 :] / UNIT
+
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        """Differences of all values in one run: as many regulators side by side."""
+        chosen = range(len(values)) if which is None else which
+        trials = [values]
+        steps = []
+        for i in chosen:
+            step = STEP * max(abs(float(values[i])), 0.1)
+            step = -step if values[i] + step > self.limits.high[i] else step
+            trials.append(np.where(np.arange(len(values)) == i, values + step, values))
+            steps.append(step)
+        count = len(self.pressure)
+        side_by_side = np.repeat(np.array(trials), count, axis=0).T
+        model = dataclasses.replace(self.model, values=tuple(side_by_side))
+        repeated = [np.tile(column, (len(trials), 1)) for column in (self.pressure, self.command)]
+        modelled = self._pressures(model, *repeated).reshape(len(trials), -1)
+        return np.asarray(((modelled[1:] - modelled[0]) / np.array(steps)[:, None]).T)
 
 
 def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorLag, ...]:
@@ -164,25 +251,16 @@ def _fit(p: Array, u: Array) -> RegulatorLag:
     low, high = np.quantile(p, (0.01, 0.99)) / UNIT
     spread = high - low + 1e-6
 
-    def search(model: RegulatorLag, evaluations: int) -> tuple[float, RegulatorLag]:
-        def errors(values: Array) -> Array:
-            modelled = dataclasses.replace(model, values=tuple(values.tolist())).pressures(p, u)
-            return (modelled - p)[:, HISTORY + 1 :].ravel() / UNIT
+    limits = RegulatorLimits(
+        (-np.inf, *LOW, low - spread, high - spread / 2, -np.inf),
+        (np.inf, *HIGH, low + spread / 2, high + spread, np.inf),
+    )
 
-        fit = search_trust_region(
-            "regulator",
-            errors,
-            model.values,
-            loss="soft_l1",
-            f_scale=ROBUST,
-            max_nfev=evaluations,
-            bounds=(
-                [-np.inf, *LOW, low - spread, high - spread / 2, -np.inf],
-                [np.inf, *HIGH, low + spread / 2, high + spread, np.inf],
-            ),
-            x_scale=np.maximum(np.abs(model.values), 0.1),
-        )
-        return float(fit.cost), dataclasses.replace(model, values=tuple(fit.x.tolist()))
+    def search(model: RegulatorLag, evaluations: int) -> tuple[float, RegulatorLag]:
+        problem = RegulatorLagProblem(model, p, u, limits)
+        start = ProblemSearch(problem, SoftL1(ROBUST), problem.initial_values)
+        found = start.check_start().run(evaluations)
+        return found.cost, problem.regulator(found.values)
 
     gains = np.array([np.std(np.diff(p)), np.std(p)]) / UNIT / max(float(np.std(u)), 1e-12)
     first = [
@@ -339,14 +417,14 @@ def fit_residual(
         paths = [f"mechanism.residual.energies[{k}]" for k in range(count)]
         paths += [f"mechanism.residual.friction_logs[{joint * count + k}]" for k in range(count)]
         values = {leaf.path: float(leaf.value) for leaf in tree.leaves(accepted_arm)}
-        descent = Descent(
-            accepted_arm, train, joint, paths, seed, {path: values[path] for path in paths}
-        )
-        for ridge in RIDGES:
-            descent.ridge = ridge
-            descent.run(SEARCH_OF_RESIDUAL)
-            gain = ResidualGain(before, run_errors(descent.arm, held_back), far)
-            trials.append((float(rms(gain.hybrid)[joint]), descent.arm, gain))
+        prior = {path: values[path] for path in paths}
+        problem = JointProblem(accepted_arm, train, joint, tuple(paths), seed, prior)
+        search = SampledDescent(problem.initial_values, seed)
+        for number, ridge in enumerate(RIDGES, 1):
+            problem = dataclasses.replace(problem, ridge=ridge)
+            _, ended_arm = problem.descend(search, SEARCH_OF_RESIDUAL, number)
+            gain = ResidualGain(before, run_errors(ended_arm, held_back), far)
+            trials.append((float(rms(gain.hybrid)[joint]), ended_arm, gain))
             progress(f"residual of joint {joint + 1}, ridge of {ridge:g}: {gain}")
         _, hybrid, gain = min(trials, key=lambda trial: (not trial[2].accepts(joint), trial[0]))
         if gain.accepts(joint):

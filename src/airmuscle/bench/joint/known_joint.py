@@ -2,6 +2,8 @@
 episodes.
 """
 
+import dataclasses
+import functools
 from collections.abc import Callable, Sequence
 from typing import ClassVar
 
@@ -21,7 +23,17 @@ from ...core import (
 )
 from ...engine.distribution import stored_result
 from ...physics import PressureDriven
-from ..estimation import search_trust_region
+from ..estimation import (
+    Accuracy,
+    FreeParameter,
+    Guard,
+    Modelled,
+    ProblemSearch,
+    Runs,
+    SimulatedProblem,
+    SoftL1,
+    SolvedProblem,
+)
 from .descent import CLIP, OUTLIER, with_slopes, with_values
 from .episode_inspection import checked_inspection, faults_of_judge, without_saturated
 from .episodes import (
@@ -44,7 +56,7 @@ FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")
 READINGS = {"zeros": " Pa", "gains": ""}
 """Names that stand for the zeros and the gains of all pressures, with the units of their values."""
 SAMPLE = 300
-EVALUATIONS = 40
+EVALUATIONS = 150
 """Windows and evaluations of the search (chosen)."""
 FAR = 10.0
 """Ratio of an estimate to its first value, or of what must be positive its inverse, that is doubted
@@ -145,14 +157,14 @@ def fit_known_joint(
     )
     train, clipped = without_saturated(fit_windows, episodes[:split])
     sample = train.part(range(0, len(train), -(-len(train) // SAMPLE)))
-    search = KnownSearch(system, paths, sample)
-    system = stored_result(f"{__name__}:search", (system, paths, sample), search.run)
+    problem = FreeRunProblem(system, tuple(paths), sample)
+    system = stored_result(f"{__name__}:search", problem, problem.solve)
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
     progress(
         f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes"
         " left out"
     )
-    estimates, covariance, remarks = search.separate(system)
+    estimates, covariance, remarks = problem.separate(system)
     of_arm = [i for i, path in enumerate(paths) if path.startswith("arm.")]
     return ArmFit(
         system.arm,
@@ -169,6 +181,7 @@ def fit_known_joint(
         columns=tuple(range(1, count + 1)),
         gains=system.gains,
         zeros=system.zeros,
+        solved=(problem.solved(system),),
     )
 
 
@@ -234,51 +247,72 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
     return error, slopes
 
 
-class KnownSearch:
-    """Robust least squares of the free run over windows, in parameters that are scaled by their
-    sizes.
+@dataclasses.dataclass(frozen=True, eq=False)
+class FreeRunProblem(SimulatedProblem):
+    """Errors of the angles [rad] in the free run over windows, and the parameters of these paths;
+    an error that is lost, or beyond OUTLIER, counts as OUTLIER.
     """
 
-    def __init__(self, system: ReadPressures, paths: Sequence[str], windows: Windows) -> None:
-        leaves = {leaf.path: leaf for leaf in tree.leaves(system)}
-        self.system = system
-        self.paths = list(paths)
-        self.windows = windows
-        self.start = np.array([float(leaves[path].value) for path in paths])
-        sizes = []
-        for path, value in zip(paths, np.abs(self.start), strict=True):
+    system: ReadPressures
+    paths: tuple[str, ...]
+    windows: Windows
+    name = "joint"
+    origin = "episodes"
+    quantity = "angle"
+    # The steps of the integrator are fixed.
+    accuracy = Accuracy(1e-8, 1e-10)
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        leaves = {leaf.path: leaf for leaf in tree.leaves(self.system)}
+        parameters = []
+        for path in self.paths:
+            leaf = leaves[path]
+            value = float(leaf.value)
             field = path.rsplit(".", 1)[-1].split("[")[0]
-            sizes.append(max(value, SIZES.get(field, value or 1.0)))
-        self.sizes = np.array(sizes)
-        bounds = [leaves[path].declared.bounds for path in paths]
-        self.low = np.array([low for low, _ in bounds])
-        self.high = np.array([high for _, high in bounds])
-        self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros(0))
+            size = max(abs(value), SIZES.get(field, abs(value) or 1.0))
+            declared = leaf.declared
+            name = path.removeprefix("arm.")
+            parameters.append(
+                FreeParameter(
+                    name, name, value, declared.bounds, declared.unit, declared.meaning, size=size
+                )
+            )
+        return tuple(parameters)
 
-    def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
-        if self._last[0] != scaled.tobytes():
-            system = with_values(self.system, self.paths, scaled * self.sizes)
-            error, slope = _run(system, self.paths, self.windows)
-            is_finite = np.isfinite(error) & np.isfinite(slope).all(axis=-1)
-            lost = ~is_finite | (np.abs(error) > OUTLIER)
-            error = np.where(lost, OUTLIER, error)
-            slope = np.where(lost[..., None], 0.0, slope)
-            self._last = scaled.tobytes(), error, slope * self.sizes
-        return self._last[1:]
+    @functools.cached_property
+    def target(self) -> Array:  # type: ignore[override]
+        rows = self.windows.angle[:, HISTORY + 1 :]
+        return np.zeros(rows.size)
 
-    def run(self) -> ReadPressures:
+    @functools.cached_property
+    def runs(self) -> Runs:
+        """The window of each angle."""
+        windows, rows, joints = self.windows.angle[:, HISTORY + 1 :].shape
+        window = np.repeat(np.arange(windows), rows * joints)
+        return Runs(window, np.zeros(window.size, dtype=np.intp), in_time=True)
+
+    def at(self, values: Array) -> ReadPressures:
+        """The system with these parameters."""
+        return with_values(self.system, self.paths, values)
+
+    def evaluate(self, values: Array, guard: Guard | None = None) -> Modelled:
+        error, slope = _run(self.at(values), self.paths, self.windows)
+        is_finite = np.isfinite(error) & np.isfinite(slope).all(axis=-1)
+        lost = ~is_finite | (np.abs(error) > OUTLIER)
+        error = np.where(lost, OUTLIER, error)
+        slope = np.where(lost[..., None], 0.0, slope)
+        return Modelled(error.ravel(), slope.reshape(-1, len(self.paths)))
+
+    def solve(self) -> ReadPressures:
         """The system with the estimates."""
-        solution = search_trust_region(
-            "joint",
-            lambda x: self._evaluate(x)[0].ravel(),
-            np.clip(self.start, self.low, self.high) / self.sizes,
-            jac=lambda x: self._evaluate(x)[1].reshape(-1, len(self.paths)),
-            loss="soft_l1",
-            f_scale=CLIP,
-            bounds=(self.low / self.sizes, self.high / self.sizes),
-            max_nfev=EVALUATIONS,
-        )
-        return with_values(self.system, self.paths, solution.x * self.sizes)
+        search = ProblemSearch(self, SoftL1(CLIP), self.initial_values)
+        return self.at(search.check_start().run(EVALUATIONS).values)
+
+    def solved(self, system: ReadPressures) -> SolvedProblem:
+        """The problem with the parameters of a system."""
+        fitted = dataclasses.replace(self, system=system)
+        return SolvedProblem(fitted, fitted.initial_values, SoftL1(CLIP))
 
     def separate(self, system: ReadPressures) -> SeparatedEstimates:
         """Estimates, their covariance along what the record separates, and remarks; a window is one
@@ -286,11 +320,13 @@ class KnownSearch:
         """
         leaves = {leaf.path: float(leaf.value) for leaf in tree.leaves(system)}
         values = np.array([leaves[path] for path in self.paths])
-        error, slope = self._evaluate(values / self.sizes)
-        flat = slope.reshape(-1, len(self.paths))
-        names = [path.removeprefix("arm.") for path in self.paths]
+        error, jacobian = self.evaluate(values)
+        assert jacobian is not None
+        sizes = self.coordinates.sizes
+        flat = jacobian * sizes
+        names = self.names
         information = flat.T @ flat / (np.mean(error**2) * self.windows.rows)
-        estimates, covariance, shares = separated(information, names, values, self.sizes)
+        estimates, covariance, shares = separated(information, names, values, sizes)
         remarks = []
         for estimate in estimates:
             field, _, number = estimate.path.partition("[")
@@ -301,7 +337,7 @@ class KnownSearch:
                     f" {standard_error:g}{READINGS[field]}"
                 )
         far = []  # estimates that no such joint has
-        starts = zip(names, values, self.start, self.low, self.high, strict=True)
+        starts = zip(names, values, self.initial_values, *self.bounds, strict=True)
         for name, value, first_value, low, high in starts:
             is_greater = abs(value) > FAR * abs(first_value) > 0.0
             is_smaller = low > 0.0 and value < first_value / FAR

@@ -12,6 +12,7 @@ import numpy as np
 from ...core import Array, plotting, tree
 from ...physics import Plant, PressureDriven, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...report import Chapter, NamedValue, Plot, Table, TableColumn
+from ..estimation import SolvedProblem
 from ..prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
@@ -57,6 +58,8 @@ class ArmFit(Reported):
     columns      of the pressures, from 1, that the muscles of `arm` have; by default those of
                  `pairs` in turn
     gains        of these readings, by default 1, and their zeros [Pa]: p = gain (reading - zero)
+    solved       the problems with the estimates, one for each search: covariance by windows,
+                 profiles, bootstrap
     """
 
     arm: PressureDriven
@@ -76,6 +79,7 @@ class ArmFit(Reported):
     columns: tuple[int, ...] = ()
     gains: tuple[float, ...] = ()
     zeros: tuple[float, ...] = ()
+    solved: tuple[SolvedProblem, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.arm.muscle)

@@ -8,6 +8,7 @@ return the coefficients in bar and newton.
 
 import dataclasses
 import functools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,18 @@ from ...core import Array, IdentificationError, bar
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.borzikova import BorzikovaExponential
 from ...recording import Recording
-from ..estimation import CorrelationIndex, correlation_index, search_trust_region
+from ..estimation import (
+    CorrelationIndex,
+    FreeParameter,
+    LeastSquares,
+    MeasuredProblem,
+    SolvedProblem,
+    correlation_index,
+    solve_iteratively,
+)
 from ..inspection import distinct_readings, rounding
+
+UNBOUNDED = (-np.inf, np.inf)
 
 
 class LoadRange(NamedTuple):
@@ -178,6 +189,8 @@ class SurfaceFit:
     """Maximum absolute error in contraction [1]."""
     correlation_index: CorrelationIndex
     conditioning: Conditioning
+    solved: SolvedProblem
+    """The problem with the Chebyshev coefficients of v: covariance, profiles, bootstrap."""
 
     def __str__(self) -> str:
         dropped = (
@@ -191,16 +204,35 @@ class SurfaceFit:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class SurfaceProblem:
-    """Validated data, degrees and k_max of a surface fit, and the design matrix of v."""
+class SurfaceProblem(MeasuredProblem):
+    """Validated data, degrees and k_max of a surface fit, and the design matrix of v; the
+    parameters are the Chebyshev coefficients of v.
+    """
 
     recording: Recording
     saturation: float
     pressure_degree: int
     force_degree: int
     basis: Chebyshev
-    design_matrix: Array
-    contraction: Array
+    terms: Array
+    """Design matrix of v at the points, shape (N, coefficients)."""
+    target: Array
+    """Measured contraction [1], shape (N,)."""
+    name = "exponential surface"
+    quantity = "contraction"
+
+    @property
+    def origin(self) -> str:
+        return self.recording.origin
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        initial = np.linalg.lstsq(*self.linear_system(), rcond=None)[0].tolist()
+        names = [f"v[{i}]" for i in range(len(initial))]
+        return tuple(
+            FreeParameter(name, name, value, UNBOUNDED, "1", "coefficient of v")
+            for name, value in zip(names, initial, strict=True)
+        )
 
     @classmethod
     def from_recording(
@@ -267,30 +299,21 @@ class SurfaceProblem:
                 " pressures, or choose a lower degree."
             )
 
-    def residuals(self, coefficients: Array) -> Array:
-        """Modelled minus measured contraction [1] at the points, from the Chebyshev coefficients of
-        v, shape (N,).
-        """
-        return np.asarray(
-            self.saturation * (1.0 - np.exp(self.design_matrix @ coefficients)) - self.contraction
-        )
+    def predict(self, values: Array) -> Array:
+        """Modelled contraction [1] at the points, shape (N,)."""
+        return np.asarray(self.saturation * (1.0 - np.exp(self.terms @ values)))
 
-    def jacobian(self, coefficients: Array) -> Array:
-        """Exact derivatives of `residuals` with respect to the coefficients, shape (N,
-        coefficients).
-        """
-        return np.asarray(
-            -self.saturation
-            * np.exp(self.design_matrix @ coefficients)[:, None]
-            * self.design_matrix
-        )
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        """Exact derivatives of `predict`, shape (N, coefficients)."""
+        every = -self.saturation * np.exp(self.terms @ values)[:, None] * self.terms
+        return np.asarray(every if which is None else every[:, list(which)])
 
     def linear_system(self) -> tuple[Array, Array]:
         """Matrix and right side of a linear fit of v that approximates a fit of k; 1 - k/k_max is
         limited to 0.01.
         """
-        weights = np.maximum(1.0 - self.contraction / self.saturation, 0.01)
-        return weights[:, None] * self.design_matrix, weights * np.log(weights)
+        weights = np.maximum(1.0 - self.target / self.saturation, 0.01)
+        return weights[:, None] * self.terms, weights * np.log(weights)
 
     def build_fit(self, coefficients: Array, procedure: str, dropped: int = 0) -> SurfaceFit:
         """The fit with these Chebyshev coefficients of v."""
@@ -300,13 +323,21 @@ class SurfaceProblem:
             tuple(plain), *self.basis.validity_range, *degrees, saturation=self.saturation
         )
         modelled = np.asarray(law.contraction(self.recording["pressure"], self.recording["force"]))
-        residuals = modelled - self.contraction
+        residuals = modelled - self.target
         rmse = float(np.sqrt(np.mean(residuals**2)))
         max_error = float(np.abs(residuals).max())
-        index = correlation_index(self.contraction, modelled)
-        conditioning = Conditioning.from_design_matrix(self.design_matrix)
+        index = correlation_index(self.target, modelled)
+        conditioning = Conditioning.from_design_matrix(self.terms)
         return SurfaceFit(
-            law, procedure, len(self.recording), dropped, rmse, max_error, index, conditioning
+            law,
+            procedure,
+            len(self.recording),
+            dropped,
+            rmse,
+            max_error,
+            index,
+            conditioning,
+            SolvedProblem(self, coefficients),
         )
 
 
@@ -317,10 +348,10 @@ def fit_linearised(
     [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. Points with k >= k_max have no
     logarithm; they are omitted, and the result states their number. Raises IdentificationError."""
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
-    usable = problem.contraction < saturation
-    problem.check_determined(problem.design_matrix[usable])
-    targets = np.log(1.0 - problem.contraction[usable] / saturation)
-    coefficients = np.linalg.lstsq(problem.design_matrix[usable], targets, rcond=None)[0]
+    usable = problem.target < saturation
+    problem.check_determined(problem.terms[usable])
+    targets = np.log(1.0 - problem.target[usable] / saturation)
+    coefficients = np.linalg.lstsq(problem.terms[usable], targets, rcond=None)[0]
     return problem.build_fit(
         np.asarray(coefficients, dtype=float), "linearised least squares", int((~usable).sum())
     )
@@ -333,14 +364,5 @@ def fit_nonlinear(
     derivatives. The arguments are those of `fit_linearised`. All points are used, also those with k
     >= k_max. Raises IdentificationError."""
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
-    start = np.linalg.lstsq(*problem.linear_system(), rcond=None)[0]
-    limits = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
-    result = search_trust_region(
-        "surface", problem.residuals, start, jac=problem.jacobian, method="lm", **limits
-    )
-    if not result.success:
-        raise IdentificationError(
-            f"{recording.origin}: nonlinear least squares did not converge ({result.message})."
-            " Choose a lower degree, or use fit_linearised."
-        )
-    return problem.build_fit(np.asarray(result.x), "nonlinear least squares")
+    solution = solve_iteratively(problem, LeastSquares(), problem.initial_values)
+    return problem.build_fit(solution.values, "nonlinear least squares")

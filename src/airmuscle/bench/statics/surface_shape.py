@@ -117,12 +117,12 @@ def fit_monotone(
     coefficients = solve_constrained_least_squares(*problem.linear_system(), constraints, MIN_SLOPE)
 
     def sum_of_squares(c: Array) -> float:
-        residuals = problem.residuals(c)
+        residuals = problem.predict(c) - problem.target
         return float(residuals @ residuals)
 
     for _ in range(200):
         jacobian = problem.jacobian(coefficients)
-        right = jacobian @ coefficients - problem.residuals(coefficients)
+        right = jacobian @ coefficients - (problem.predict(coefficients) - problem.target)
         step = (
             solve_constrained_least_squares(jacobian, right, constraints, MIN_SLOPE) - coefficients
         )

@@ -8,6 +8,7 @@ without the mass of air determines only the ratio of volume and valve conductanc
 """
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -22,7 +23,15 @@ from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.parameter_tables import parameter_table
-from ..estimation import EQUIVALENT, aicc
+from ..estimation import (
+    EQUIVALENT,
+    FreeParameter,
+    LeastSquares,
+    MeasuredProblem,
+    SolvedProblem,
+    aicc,
+    solve_least_squares,
+)
 from ..inspection import level_intervals
 from ..reported import Reported
 from .energy_defect_values import defect_values
@@ -69,6 +78,11 @@ class VolumeFit(Reported):
     aicc: dict[str, float]
     covariance: Array
     """Covariance of the linear coefficients, shape (P, P)."""
+
+    @property
+    def solved(self) -> SolvedProblem:
+        """The problem of the linear coefficients: covariance, profiles, bootstrap."""
+        return _solve(_design(self.geometry, self.points.contraction), self.points)
 
     def standard_deviation(self, contraction: Array) -> Array:
         """Standard deviation of the fitted volume [m3] at contractions (N,)."""
@@ -224,9 +238,7 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
     ends = (float(points.contraction.min()), float(points.contraction.max()))
     laws: dict[str, Geometry] = {} if braid is None else {"Braid": braid}
     for n in degrees:
-        terms = np.linalg.lstsq(
-            _chebyshev_terms(points.contraction, *ends, n), points.volume, rcond=None
-        )[0]
+        terms = _solve(_chebyshev_terms(points.contraction, *ends, n), points).values
         laws[f"polynomial of degree {n}"] = ChebyshevGeometry(
             tuple(terms.tolist()), *ends, resting_length
         )
@@ -257,7 +269,7 @@ def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
     """The braid of least squares, V = A s - B s^3 with s = 1 - eps; None if no braid has these
     coefficients.
     """
-    a, b = np.linalg.lstsq(_braid_terms(points.contraction), points.volume, rcond=None)[0]
+    a, b = _solve(_braid_terms(points.contraction), points).values.tolist()
     cosine_squared = float(b / a)
     if not a > 0.0 or not 0.0 < cosine_squared < 1.0:
         return None
@@ -266,6 +278,39 @@ def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
         return Braid(radius, float(np.arccos(np.sqrt(cosine_squared))), resting_length)
     except ParameterError:
         return None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class VolumeProblem(MeasuredProblem):
+    """Measured volumes (N,) [m3] that are linear in coefficients (P,)."""
+
+    terms: Array
+    """Columns (N, P) of the coefficients."""
+    target: Array
+    name = "volume"
+    origin = "volume fit"
+    quantity = "volume"
+
+    @functools.cached_property
+    def parameters(self) -> tuple[FreeParameter, ...]:
+        names = [f"coefficients[{i}]" for i in range(self.terms.shape[1])]
+        bounds = (-np.inf, np.inf)
+        return tuple(
+            FreeParameter(name, name, 0.0, bounds, "m3", "coefficient", is_linear=True)
+            for name in names
+        )
+
+    def predict(self, values: Array) -> Array:
+        return np.asarray(self.terms @ values)
+
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        return self.terms if which is None else self.terms[:, list(which)]
+
+
+def _solve(terms: Array, points: VolumePoints) -> SolvedProblem:
+    """The volumes by least squares in the coefficients of these terms (N, P)."""
+    problem = VolumeProblem(terms, points.volume)
+    return SolvedProblem(problem, solve_least_squares(problem, LeastSquares()).values)
 
 
 def _design(law: Geometry, contraction: Array) -> Array:
