@@ -25,144 +25,112 @@ from .terminal import echo, warned
 
 
 class CommandRow(NamedTuple):
-    """A command: its module in this package and its function there, imported on use; its summary
-    for --help.
+    """A command: its summary for --help, its module in this package and its function there, both
+    imported on use and named as the command where they are empty; whether it has --allow-code.
     """
 
     name: str
-    module: str
-    function: str
     summary: str
+    module: str = ""
+    function: str = ""
+    runs_code: bool = False
+
+    @property
+    def own_name(self) -> str:
+        """The name of the command as that of a module or a function."""
+        return self.name.replace("-", "_")
+
+    @property
+    def module_name(self) -> str:
+        """The module of the command in this package."""
+        return self.module or self.own_name
+
+    def load(self) -> Any:
+        """The function of the command."""
+        module = importlib.import_module(f".{self.module_name}", __package__)
+        return getattr(module, self.function or self.own_name)
 
 
 COMMANDS = (
-    CommandRow(
-        "reproduce",
-        "reproduce",
-        "reproduce",
-        "Reproduce three papers and test each of their claims.",
-    ),
+    CommandRow("reproduce", "Reproduce three papers and test each of their claims."),
     CommandRow(
         "list",
-        "listing",
-        "list_entries",
         "List muscles, laws, valves, plants, products and data sets.",
+        module="listing",
+        function="list_entries",
     ),
     CommandRow(
-        "show", "library", "show", "Show parameters, sources and checks of a library entry."
+        "show",
+        "Show parameters, sources and checks of a library entry.",
+        module="library",
+        runs_code=True,
     ),
-    CommandRow("diff", "difference", "diff", "Compare two muscles or laws: parameters and forces."),
-    CommandRow("cite", "library", "cite", "Print the references of a library entry."),
+    CommandRow("diff", "Compare two muscles or laws: parameters and forces.", module="difference"),
+    CommandRow("cite", "Print the references of a library entry.", module="library"),
     CommandRow(
-        "evaluate",
-        "evaluate",
-        "evaluate",
-        "Evaluate a law for two of pressure, contraction and force.",
+        "evaluate", "Evaluate a law for two of pressure, contraction and force.", runs_code=True
     ),
+    CommandRow("inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
+    CommandRow("check", "Check whether records are usable, right after a measurement."),
+    CommandRow("audit", "Examine a muscle law, an orifice or constants of others.", runs_code=True),
+    CommandRow("recipe", "Predict a muscle made by hand from tube, braid and length."),
     CommandRow(
-        "inspect",
-        "inspect",
-        "inspect",
-        "Inspect measurement files: columns, runs, sampling, outliers.",
+        "fit", "Fit a characteristic to measured points, or compare several.", runs_code=True
     ),
-    CommandRow(
-        "check", "check", "check", "Check whether records are usable, right after a measurement."
-    ),
-    CommandRow("audit", "audit", "audit", "Examine a law, an orifice or constants of others."),
-    CommandRow(
-        "recipe", "recipe", "recipe", "Predict a muscle made by hand from tube, braid and length."
-    ),
-    CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
-    CommandRow(
-        "approximate", "approximate", "approximate", "Approximate one characteristic by another."
-    ),
-    CommandRow("convert", "convert", "convert", "Write measurement files as CSV, Parquet or HDF5."),
-    CommandRow(
-        "hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."
-    ),
-    CommandRow(
-        "fit-dynamic",
-        "fit_dynamic",
-        "fit_dynamic",
-        "Identify plant parameters from transient records.",
-    ),
+    CommandRow("approximate", "Approximate one characteristic by another.", runs_code=True),
+    CommandRow("convert", "Write measurement files as CSV, Parquet or HDF5."),
+    CommandRow("hysteresis", "Fit friction models to hysteresis loops.", runs_code=True),
+    CommandRow("fit-dynamic", "Identify plant parameters from transient records."),
     CommandRow(
         "fit-regulator",
-        "fit_dynamic",
-        "fit_regulator_command",
         "Identify a pressure regulator from its response.",
+        module="fit_dynamic",
+        function="fit_regulator_command",
     ),
     CommandRow(
-        "fit-joint",
-        "fit_joint",
-        "fit_joint_command",
-        "Identify a joint or an arm from its episodes.",
+        "fit-joint", "Identify a joint or an arm from its episodes.", function="fit_joint_command"
     ),
+    CommandRow("campaign", "Identify a muscle from all files of a test rig."),
     CommandRow(
-        "campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."
-    ),
-    CommandRow(
-        "predict", "predict", "predict", "Predict further records by an identified muscle or plant."
+        "predict", "Predict further records by an identified muscle, plant or arm.", runs_code=True
     ),
     CommandRow(
         "fit-volume",
-        "fit_volume",
-        "fit_volume_command",
         "Fit the volume of a muscle over its contraction.",
+        function="fit_volume_command",
     ),
-    CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
-    CommandRow("play", "play", "play_signals", "Play planned signals on a test rig."),
-    CommandRow("watch", "watch", "watch", "Identify the new files of a folder as they come."),
+    CommandRow("plan", "Design the most informative experiments.", runs_code=True),
     CommandRow(
-        "fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."
+        "play", "Play planned signals on a test rig and record them.", function="play_signals"
     ),
-    CommandRow(
-        "size", "size", "size", "Size muscles of the catalogue for a lift, a joint or a gripper."
-    ),
-    CommandRow("body", "body", "body", "Study the routes of muscles on a robot's body."),
+    CommandRow("watch", "Read, check and identify the new files of a folder as they come."),
+    CommandRow("fit-live", "Fit a surface while rows arrive; name the next point."),
+    CommandRow("size", "Size muscles of the catalogue for a lift, a joint or a gripper."),
+    CommandRow("body", "Study the routes of muscles on a robot's body."),
     CommandRow(
         "fit-out",
-        "fit_out",
-        "fit_out_command",
         "Choose the muscles of a robot's body for its routes.",
+        function="fit_out_command",
     ),
+    CommandRow("route", "Move points of routes so that they meet torques over angles."),
+    CommandRow("cam", "Design a cam on which a muscle gives a torque over the angle."),
+    CommandRow("simulate", "Simulate the plant of a scenario file.", runs_code=True),
+    CommandRow("study", "Run a parameter study of a scenario.", runs_code=True),
+    CommandRow("tune", "Tune the controller of a scenario for a family of plants.", runs_code=True),
+    CommandRow("compare", "Compare the controllers of scenarios on one plant.", runs_code=True),
     CommandRow(
-        "route", "route", "route", "Move points of routes so that they meet torques over angles."
+        "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.", runs_code=True
     ),
+    CommandRow("studio", "Show muscles and plants in the browser."),
     CommandRow(
-        "cam", "cam", "cam", "Design a cam on which a muscle gives a torque over the angle."
-    ),
-    CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
-    CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
-    CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
-    CommandRow(
-        "compare", "compare", "compare", "Compare the controllers of scenarios on one plant."
-    ),
-    CommandRow(
-        "export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."
-    ),
-    CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
-    CommandRow(
-        "schema", "simulate", "schema", "Print the JSON schema of scenario or muscle files."
+        "schema",
+        "Print the JSON schema of scenario or muscle files.",
+        module="simulate",
+        runs_code=True,
     ),
 )
 """All commands, in the order of use."""
-RUN_CODE = (
-    "show",
-    "evaluate",
-    "audit",
-    "fit",
-    "approximate",
-    "hysteresis",
-    "predict",
-    "plan",
-    "simulate",
-    "study",
-    "tune",
-    "compare",
-    "export",
-    "schema",
-)
+RUN_CODE = tuple(row.name for row in COMMANDS if row.runs_code)
 """Commands with --allow-code."""
 _ROWS = {row.name: row for row in COMMANDS}
 _UsageError: Any = click.BadParameter.__base__
@@ -178,10 +146,10 @@ class LazyCommands(click.Group):
         row = _ROWS.get(cmd_name)
         if row is None:
             return None
-        function = getattr(importlib.import_module(f".{row.module}", __package__), row.function)
+        function = row.load()
         check_interrupted()
         command = command_of(function, row.name)
-        if row.name in RUN_CODE:
+        if row.runs_code:
             command.params.append(parameter_of("allow_code", AllowCode, False))
         return command
 

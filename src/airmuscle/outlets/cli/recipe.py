@@ -16,7 +16,7 @@ POINTS_FILE = "points.csv"
 
 @with_requests
 def recipe(request: RecipeRequest, out: OptionalFolder = None, json: Json = False) -> None:
-    """Predict a muscle that is made by hand from tube, braid and length.
+    """Predict a muscle made by hand from tube, braid and length.
 
     \b
     Free contraction, force and dead zone with the spread that the tolerances of a caliper and of
