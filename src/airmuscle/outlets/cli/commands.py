@@ -103,7 +103,7 @@ COMMANDS = (
     CommandRow(
         "play", "Play planned signals on a test rig and record them.", function="play_signals"
     ),
-    CommandRow("watch", "Read, check and identify the new files of a folder as they come."),
+    CommandRow("watch", "Read, check and fit the new files of a folder as they come."),
     CommandRow("fit-live", "Fit a surface while rows arrive; name the next point."),
     CommandRow("size", "Size muscles of the catalogue for a lift, a joint or a gripper."),
     CommandRow("body", "Study the routes of muscles on a robot's body."),

@@ -150,7 +150,7 @@ def watch(
     reading: ReadingRequest,
     out: Folder = Path("watched"),
 ) -> None:
-    """Read, check and identify the new files of a folder as they come.
+    """Read, check and fit the new files of a folder as they come.
 
     \b
     A file is read when it has not changed for --settle. It is checked as by airmuscle check; if
