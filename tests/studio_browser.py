@@ -56,8 +56,10 @@ def browser():
 
 
 @contextlib.contextmanager
-def opened(browser, address, *, width=1280, height=900, scheme="light", offline=False):
-    """The page; it must report no error and request nothing from elsewhere."""
+def opened(browser, address, *, width=1280, height=900, scheme="light", offline=False, origin=None):
+    """The page; it must report no error and request nothing from elsewhere than `origin`, by
+    default its address.
+    """
     context = browser.new_context(
         viewport={"width": width, "height": height}, color_scheme=scheme, offline=offline
     )
@@ -72,7 +74,7 @@ def opened(browser, address, *, width=1280, height=900, scheme="light", offline=
         ),
     )
     page.on("pageerror", lambda e: errors.append(str(e)))
-    origin = address.partition("?")[0]
+    origin = origin or address.partition("?")[0]
     page.on(
         "request",
         lambda r: None if r.url.startswith((origin, "data:", "blob:")) else errors.append(r.url),

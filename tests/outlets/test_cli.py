@@ -110,6 +110,7 @@ NAMES = (
     "compare",
     "export",
     "studio",
+    "site",
     "schema",
 )
 

@@ -45,7 +45,7 @@ FURTHER = {
 CLUSTER = "tcp://head-node:8786"
 SLOW = re.compile(
     r"reproduce|--cluster|campaign bench|fit-regulator|--to (?:fmu|ssp)|--build"
-    r"|--starts 20|--workers|--rules|valve_study|--known|--separate|muscles/\*"
+    r"|--starts 20|--workers|--rules|valve_study|--known|--separate|muscles/\*|site page"
 )
 QUICK = (
     "airmuscle reproduce saga hosovsky --out report",

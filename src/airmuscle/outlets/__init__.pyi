@@ -51,3 +51,4 @@ from .rig import signal_files as signal_files
 from .rig import unframed as unframed
 from .studio import export_page as export_page
 from .studio import serve as serve
+from .studio import write_site as write_site

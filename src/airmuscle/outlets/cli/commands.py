@@ -122,6 +122,7 @@ COMMANDS = (
         "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.", runs_code=True
     ),
     CommandRow("studio", "Show muscles and plants in the browser."),
+    CommandRow("site", "Write a page with the whole library, without a server."),
     CommandRow(
         "schema",
         "Print the JSON schema of scenario or muscle files.",

@@ -26,6 +26,10 @@ from .server import bound_socket as bound_socket
 from .server import reachable_host as reachable_host
 from .server import serve as serve
 from .server import warning_of as warning_of
+from .site import Model as Model
+from .site import WrittenSite as WrittenSite
+from .site import site_files as site_files
+from .site import write_site as write_site
 from .tasks import MAX_TEXT as MAX_TEXT
 from .tasks import read_request as read_request
 from .tasks import read_text_tables as read_text_tables

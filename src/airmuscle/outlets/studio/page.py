@@ -28,7 +28,7 @@ SCRIPTS = ("vendor/uPlot.iife.min.js", *(f"scripts/{name}.js" for name in _NAMES
 """Scripts in the order in which the page runs them."""
 STYLES = ("vendor/uPlot.min.css", "style.css", "fit.css")
 SERVER_ONLY = ("scripts/fit-", "fit.css")
-"""Beginnings of the names of files that need a server, which a self-contained page does not
+"""Beginnings of the names of files that need a server, which a page without one does not
 contain.
 """
 LICENCE = "vendor/uPlot.LICENSE"
@@ -40,6 +40,11 @@ def web_file(name: str) -> str:
     return (
         resources.files(__package__).joinpath("web", *name.split("/")).read_text(encoding="utf-8")
     )
+
+
+def names_without_server(names: Sequence[str]) -> list[str]:
+    """The names of the files that a page without a server needs."""
+    return [name for name in names if not name.startswith(SERVER_ONLY)]
 
 
 def web_files() -> dict[str, tuple[str, str]]:
@@ -54,7 +59,7 @@ def server_page() -> str:
     """The page as the server sends it: scripts and styles are separate files."""
     head = "\n".join(f'<link rel="stylesheet" href="web/{name}">' for name in STYLES)
     scripts = "\n".join(f'<script src="web/{name}" defer></script>' for name in SCRIPTS)
-    return _filled("", f"{head}\n{scripts}", "")
+    return page_of("", f"{head}\n{scripts}", "")
 
 
 def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str, Any]) -> str:
@@ -67,12 +72,12 @@ def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str,
     embedded = (
         json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     )
-    scripts = [web_file(name) for name in SCRIPTS[:-1] if not name.startswith(SERVER_ONLY)]
-    scripts += [sheet["script"] for sheet in sheets] + [web_file(SCRIPTS[-1])]
+    *scripts, last = map(web_file, names_without_server(SCRIPTS))
+    scripts += [*(sheet["script"] for sheet in sheets), last]
     scripts = [
         text.replace("</", "<\\/").replace("<!--", "<\\!--") for text in scripts
     ]  # no text ends its element
-    styles = [web_file(name) for name in STYLES if not name.startswith(SERVER_ONLY)]
+    styles = list(map(web_file, names_without_server(STYLES)))
     policy = (
         f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; style-src"
         f" {' '.join(map(_digest, styles))}; img-src data: blob:; base-uri 'none'; form-action"
@@ -83,14 +88,15 @@ def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str,
     licence = web_file(LICENCE).replace("--", "- -")
     comment = f"<!--\nuPlot, in the first script, is used under this licence:\n\n{licence}\n-->"
     body = f'<script type="application/json" id="embedded">{embedded}</script>\n'
-    return _filled(comment, head, body + "\n".join(f"<script>{text}</script>" for text in scripts))
+    return page_of(comment, head, body + "\n".join(f"<script>{text}</script>" for text in scripts))
 
 
 def _digest(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-def _filled(comment: str, head: str, end: str) -> str:
+def page_of(comment: str, head: str, end: str) -> str:
+    """The page with a comment before it, with the elements of its head, and those at its end."""
     page = web_file("index.html").replace("@version@", metadata.version("airmuscle"))
     return (
         page.replace("<!--comment-->", comment)

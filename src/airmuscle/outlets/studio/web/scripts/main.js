@@ -109,7 +109,7 @@
       navigator.clipboard.writeText(address).then(() => say("The address was copied."), () => say("The browser does not allow copying; copy the address of the page."));
     });
     const save = document.getElementById("save-page");
-    save.hidden = Boolean(source.embedded);
+    save.hidden = !source.hasServer;
     save.addEventListener("click", () => savePage().catch((error) => say(error.message)));
     document.querySelector(".skip").addEventListener("click", (event) => { event.preventDefault(); main.focus(); });
     const state = readState();

@@ -43,7 +43,7 @@
       this.parameterCard = card("Parameters", this.resetButton, parameterHost);
       this.host.append(element("div.columns", {},
         element("div.stack", {},
-          card("Muscle", element("div.row", {}, element("div.grow", {}, this.select), this.compare), this.list, this.message, element("details", {}, element("summary", {}, "Own muscle file"), this.own)),
+          card("Muscle", element("div.row", {}, element("div.grow", {}, this.select), this.compare), this.list, this.message, element("details", { hidden: !source.hasServer }, element("summary", {}, "Own muscle file"), this.own)),
           card("Working point", pointHost), this.parameterCard),
         element("div.stack.second", {},
           card("Force over contraction", chartHost, element("div.row.small", {}, element("span.soft", {}, "Isobars [bar]"), this.pressureField, exports), this.pressureMessage),

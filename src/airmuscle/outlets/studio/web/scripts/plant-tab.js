@@ -38,7 +38,7 @@
       const exports = element("div.row", {}, element("span.small.soft", {}, "Download"), button("CSV", () => download(`${this.sheet.name}.csv`, this.csv(), "text/csv")), button("TOML", () => download(`${this.sheet.name}.toml`, this.toml(), "application/toml")));
       this.host.append(element("div.columns", {},
         element("div.stack", {},
-          card("Plant", "", element("div.row", {}, element("div.grow", {}, this.select)), this.message, element("details", {}, element("summary", {}, "Own scenario"), this.own)),
+          card("Plant", "", element("div.row", {}, element("div.grow", {}, this.select)), this.message, element("details", { hidden: !source.hasServer }, element("summary", {}, "Own scenario"), this.own)),
           card("Valves", ".early", element("div.row", {}, this.scheduleButton, this.liveButton), this.inputs), card("Parameters", "", this.resetButton, parameterHost)),
         element("div.stack.second", {},
           card("Plant in motion", ".first", element("div.row", {}, this.playButton, this.speedSelect, exports), element("div.bar", {}, element("span.small.soft", {}, "Time"), this.scrub, this.clock), element("div.motion", {}, drawingHost, traceHost), this.facts),

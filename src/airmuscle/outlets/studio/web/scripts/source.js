@@ -1,9 +1,10 @@
-/* Source of sheets: the server, or what is embedded in a self-contained page. */
+/* Source of sheets: the server, what is embedded in a self-contained page, or a folder of static files. */
 "use strict";
 
 (() => {
   const place = document.getElementById("embedded");
   const embedded = place ? JSON.parse(place.textContent) : null;
+  const site = typeof airmuscleSite === "undefined" ? null : airmuscleSite;
 
   /* "law", "plant", or the tab to which a sheet belongs */
   const kindOf = (sheet) => sheet.tab ?? (sheet.plant ? "plant" : "law");
@@ -20,46 +21,77 @@
   const OWN = { "X-Airmuscle": "1" };  // what a page of another origin cannot send
   const post = (address, body) => request(address, { method: "POST", headers: { ...OWN, "Content-Type": "text/plain; charset=utf-8" }, body });
 
-  /* The program of a sheet enters the table of programs as a script of this server. */
-  function loadProgram(sheet) {
-    if (airmusclePrograms[sheet.id]) return Promise.resolve(sheet);
+  /* A script beside the page, which enters the table of programs. */
+  function loadScript(address, message) {
     return new Promise((resolve, reject) => {
-      const script = airmuscle.element("script", { src: `program/${sheet.id}.js` });
-      script.addEventListener("load", () => resolve(sheet));
-      script.addEventListener("error", () => reject(new Error("The program of this model could not be loaded; reload the page.")));
+      const script = airmuscle.element("script", { src: address });
+      script.addEventListener("load", resolve);
+      script.addEventListener("error", () => reject(new Error(message)));
       document.head.append(script);
     });
   }
 
-  const source = {
-    embedded,
+  const refuseText = () => Promise.reject(new Error("This page has no server that could read a file; start airmuscle studio, or name the file: airmuscle site DIR FILE.toml."));
 
-    async library() {
-      if (!embedded) return (await request("api/library")).json();
-      const rows = (kind) => embedded.sheets.filter((s) => kindOf(s) === kind).map((s) => ({ name: s.name, title: s.title, provenance: s.provenance }));
-      return { laws: rows("law"), plants: rows("plant"), joints: rows("joint"), opened: [], forms: { size: embedded.sheets.find((s) => s.tab === "size")?.form } };
-    },
+  /* The server of airmuscle studio */
+  const server = {
+    embedded: null, hasServer: true,
 
-    async named(kind, name) {
-      if (!embedded) return loadProgram(await (await request(`api/${kind}/${encodeURIComponent(name)}`, { headers: OWN })).json());
-      const sheet = embedded.sheets.find((s) => s.name === name && kindOf(s) === kind);
-      if (!sheet) throw new Error(`This page does not contain ${name}.`);
+    async library() { return (await request("api/library")).json(); },
+
+    async named(kind, name) { return server.loadProgram(await (await request(`api/${kind}/${encodeURIComponent(name)}`, { headers: OWN })).json()); },
+
+    async ownText(kind, text) { return server.loadProgram(await (await post(`api/${kind}`, text)).json()); },
+
+    async loadProgram(sheet) {
+      if (!airmusclePrograms[sheet.id]) await loadScript(`program/${sheet.id}.js`, "The program of this model could not be loaded; reload the page.");
       return sheet;
     },
-
-    async ownText(kind, text) {
-      if (!embedded) return loadProgram(await (await post(`api/${kind}`, text)).json());
-      const sheet = embedded.sheets.find((s) => s.own_text === text && kindOf(s) === kind);
-      if (!sheet) throw new Error("A saved page has no server that could read a file; start airmuscle studio.");
-      return sheet;
-    },
-
-    loadProgram,
 
     async sizing(text) { return (await post("api/size", text)).json(); },
 
     async page(sheets, state) { return (await post("api/page", JSON.stringify({ sheets, state }))).blob(); },
   };
+
+  /* A saved page, which contains its sheets */
+  const saved = {
+    embedded, hasServer: false,
+
+    async library() {
+      const rows = (kind) => embedded.sheets.filter((s) => kindOf(s) === kind).map((s) => ({ name: s.name, title: s.title, provenance: s.provenance }));
+      return { laws: rows("law"), plants: rows("plant"), joints: rows("joint"), opened: [], forms: { size: embedded.sheets.find((s) => s.tab === "size")?.form } };
+    },
+
+    async named(kind, name) {
+      const sheet = embedded.sheets.find((s) => s.name === name && kindOf(s) === kind);
+      if (!sheet) throw new Error(`This page does not contain ${name}.`);
+      return sheet;
+    },
+
+    async ownText(kind, text) { return embedded.sheets.find((s) => s.own_text === text && kindOf(s) === kind) ?? refuseText(); },
+
+    async loadProgram(sheet) { return sheet; },
+  };
+
+  /* A folder of static files: each sheet is a script, because a page opened from disk may not read other files */
+  const folder = {
+    embedded: null, hasServer: false,
+
+    async library() { return { ...site.library, opened: [], forms: {} }; },
+
+    async named(kind, name) {
+      const row = site.library[`${kind}s`].find((entry) => entry.name === name);
+      if (!row) throw new Error(`This page does not contain ${name}.`);
+      if (!site.sheets[row.file]) await loadScript(row.file, `The file ${row.file} is missing beside this page; copy the whole folder.`);
+      return site.sheets[row.file];
+    },
+
+    ownText: refuseText,
+
+    async loadProgram(sheet) { return sheet; },
+  };
+
+  const source = embedded ? saved : site ? folder : server;
 
   /* State of the page in its address, as base64url of JSON. */
   const link = {
