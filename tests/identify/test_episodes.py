@@ -392,7 +392,7 @@ def test_errors_of_a_mapping_file(tmp_path, mapping, text, message):
         ({"p1": np.full(95, np.nan)}, "row 1 of p1, p2 .column 1. is not a finite number"),
         ({"q1": np.zeros(90)}, "pressures have 95 rows, angles 90; they must have as many"),
         ({"q1": np.zeros(0)}, "q1 has no row"),
-        ({"t": np.r_[0:40, 60:115] * STEP}, "the times of column 't' have gaps or do not rise"),
+        ({"t": np.r_[0:40, 20:75] * STEP}, "the times of column 't' do not rise from row to row"),
     ],
 )
 def test_errors_of_an_episode(tmp_path, mapping, change, message):
@@ -400,6 +400,91 @@ def test_errors_of_an_episode(tmp_path, mapping, change, message):
     np.savez(tmp_path / "0.npz", **table)
     with pytest.raises(ColumnError, match=message):
         read_episodes(tmp_path / "0.npz", mapping(COLUMNS))
+
+
+def written(tmp_path, table, text, mapping):
+    """The episodes of a table of columns, read by a mapping."""
+    np.savez(tmp_path / "0.npz", **table)
+    return read_episodes(tmp_path / "0.npz", mapping(text))
+
+
+def test_rows_at_uneven_times_are_interpolated_and_said(tmp_path, mapping):
+    """Of a clock that jitters by 30 % the even rows are those of the motion."""
+    rng = np.random.default_rng(0)
+    even = STEP * np.arange(200)
+    time = even + 0.3 * STEP * rng.uniform(-1.0, 1.0, 200)
+    pressure = 1e5 + 5e4 * np.cos(3.0 * time)
+    table = {"t": time, "q1": np.sin(3.0 * time), "p1": pressure, "p2": pressure}
+    read = written(tmp_path, table, 'sample_time = "10 ms"\n' + COLUMNS, mapping)
+    (run,) = read.runs
+    at = time[0] + STEP * np.arange(len(run))
+    assert read.sample_time == STEP
+    np.testing.assert_allclose(run.angle[:, 0], np.sin(3.0 * at), atol=2e-4)
+    np.testing.assert_allclose(run.pressure[:, 0], 1e5 + 5e4 * np.cos(3.0 * at), atol=10.0)
+    assert any("rows are interpolated to it" in note for note in read.notes)
+
+
+def test_a_record_is_cut_at_the_gaps_of_its_times(tmp_path, mapping):
+    table = by_columns(MADE.runs[0]) | {"t": np.r_[0:40, 60:115] * STEP}
+    read = written(tmp_path, table, COLUMNS, mapping)
+    assert [len(run) for run in read.runs] == [40, 55]
+    np.testing.assert_array_equal(read.runs[1].angle[:, 0], MADE.runs[0].angle[40:, 0])
+    assert any("cut at 1 gap of more than 5 sample times" in note for note in read.notes)
+
+
+RESTS = 'sample_time = "10 ms"\nrests = "0.2 s"\n[angles]\ncolumns = ["q"]\n'
+RESTS += '[pressures]\ncolumns = ["p"]\n'
+
+
+def resting_record():
+    """Five motions of 60 rows, with rests of 40 rows between them."""
+    motion = np.concatenate([0.3 * np.sin(np.linspace(0, 2 * np.pi, 60)), np.zeros(40)])
+    angle = np.tile(motion, 5)[:-40]
+    return {"q": angle[:, None], "p": 1e5 + 1e4 * np.random.default_rng(0).normal(size=(460, 2))}
+
+
+def test_one_long_record_is_cut_in_the_middle_of_its_rests(tmp_path, mapping):
+    read = written(tmp_path, resting_record(), RESTS, mapping)
+    assert len(read) == 5
+    assert all(abs(len(run) - 92) <= 12 for run in read.runs)
+    assert sum(map(len, read.runs)) == 460
+    assert all(np.abs(run.angle[0]).max() < 0.02 for run in read.runs)
+    assert any("cut at 4 rests" in note for note in read.notes)
+
+
+def test_a_record_without_a_rest_says_what_to_state(tmp_path, mapping):
+    table = resting_record() | {"q": np.sin(0.1 * np.arange(460))[:, None]}
+    with pytest.raises(ColumnError, match=r"no rest of 0\.2 s, .* state shorter rests"):
+        written(tmp_path, table, RESTS, mapping)
+
+
+def test_commands_alone_stand_for_pressures(tmp_path, mapping):
+    text = COLUMNS.replace("[pressures]", "[commands]")
+    read = written(tmp_path, by_columns(MADE.runs[0]), text, mapping)
+    np.testing.assert_array_equal(read.runs[0].pressure, MADE.runs[0].pressure)
+    assert read.runs[0].command is None
+    assert any("commands stand for pressures" in note for note in read.notes)
+
+
+def test_a_position_is_no_angle_and_its_scale_makes_it_one(tmp_path, mapping):
+    unit = COLUMNS.replace('columns = ["q1"]', 'columns = ["q1"]\nunit = "mm"')
+    with pytest.raises(FileError, match=r"a position is no angle.*scale = 0\.02 millimetres"):
+        written(tmp_path, by_columns(MADE.runs[0]), unit, mapping)
+    scaled = COLUMNS.replace('columns = ["q1"]', 'columns = ["q1"]\nscale = 0.02')
+    position = by_columns(MADE.runs[0]) | {"q1": 50.0 * MADE.runs[0].angle[:, 0]}
+    read = written(tmp_path, position, scaled, mapping)
+    np.testing.assert_allclose(read.runs[0].angle, MADE.runs[0].angle, rtol=1e-12)
+
+
+def test_episodes_of_mat_are_those_that_were_written(tmp_path, mapping):
+    scipy = pytest.importorskip("scipy.io")
+    for number, run in enumerate(MADE.runs):
+        table = {name: column[:, None] for name, column in by_columns(run).items()}
+        scipy.savemat(tmp_path / f"{number}.mat", table)
+    read = read_episodes(tmp_path, mapping(COLUMNS))
+    assert len(read) == 3
+    np.testing.assert_allclose(read.rows("angle"), MADE.rows("angle"), rtol=1e-12)
+    np.testing.assert_allclose(read.rows("pressure"), MADE.rows("pressure"), rtol=1e-12)
 
 
 def test_a_folder_without_episodes_and_a_foreign_format_are_refused(tmp_path, mapping):

@@ -3,14 +3,14 @@ from .angle_estimate import estimate_angles as estimate_angles
 from .arm_prediction import ArmPrediction as ArmPrediction
 from .arm_prediction import predict_episodes as predict_episodes
 from .descent import JointProblem as JointProblem
-from .episode_files import Channels as Channels
-from .episode_files import EpisodeMapping as EpisodeMapping
 from .episode_files import read_episode_mapping as read_episode_mapping
 from .episode_files import read_episodes as read_episodes
 from .episode_formats import propose_mapping as propose_mapping
 from .episode_inspection import EpisodeInspection as EpisodeInspection
 from .episode_inspection import PressureAction as PressureAction
 from .episode_inspection import inspect_episodes as inspect_episodes
+from .episode_mapping import Channels as Channels
+from .episode_mapping import EpisodeMapping as EpisodeMapping
 from .episodes import Episode as Episode
 from .episodes import Episodes as Episodes
 from .episodes import Windows as Windows

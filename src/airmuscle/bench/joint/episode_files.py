@@ -26,74 +26,39 @@ axes = ["z", "-y"]
 """
 
 import dataclasses
-import itertools
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError, FileError, alternatives, check_known, counted, quantity
+from ...core import ColumnError, FileError, alternatives, counted, quantity
 from ..readers import Arrays, read_toml
 from .episode_formats import find_episode_files, read_arrays
+from .episode_mapping import Channels, EpisodeMapping, array_of, columns_of
+from .episode_pieces import pieces_of
 from .episode_units import QUESTION, UNITS
 from .episodes import Episode, Episodes, join, speed_of
 
 TABLES = ("angles", "speeds", "pressures", "commands", "arm")
-KEYS = ("sample_time", "time", "starts", *TABLES)
+KEYS = ("sample_time", "time", "starts", "rests", *TABLES)
 TABLE_KEYS = ("columns", "unit", "scale", "divisors")
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 AXES |= {f"+{name}": axis for name, axis in AXES.items()} | {
     f"-{n}": (-x, -y, -z) for n, (x, y, z) in AXES.items()
 }
+COMMANDED = (
+    "commands stand for pressures, which were not recorded: the lag of each muscle contains that of"
+    " its regulator, and commands must be levels of the pressures and no increments"
+)
+LENGTHS = ("m", "cm", "mm", "um", "in")
+"""Units of positions, which are no angles."""
 TIMES = ("t", "time", "stamp", "timestamp")
 """Names of columns of times, in seconds or a thousandth, millionth or billionth of them."""
 SAME_TIME = 0.02
 """Difference of the decimal logarithms of two sample times, over 3, up to which they are the same
 (chosen).
 """
-
-
-@dataclasses.dataclass(frozen=True)
-class Channels:
-    """Columns of one quantity, or the name of one array with all of them; value = number * scale /
-    divisors.
-    """
-
-    columns: tuple[str, ...]
-    scale: float = 1.0
-    divisors: str | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class EpisodeMapping:
-    """Contents of a file of episodes, as its mapping file states them.
-
-    sample_time  [s], or None if `time` names a column [s]; starts: array with the first row of
-                 every episode, where a
-    file holds all of them; angles, speeds, pressures, commands: Channels; pairs: for each joint the
-    numbers, from 1, of the muscle that raises its angle and of its antagonist; axes of the joints
-    in the frames of their links.
-    """
-
-    angles: Channels
-    pressures: Channels
-    speeds: Channels | None = None
-    commands: Channels | None = None
-    sample_time: float | None = None
-    time: str | None = None
-    starts: str | None = None
-    pairs: tuple[tuple[int, int], ...] = ()
-    axes: tuple[tuple[int, int, int], ...] = ()
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Names of all columns and arrays that are used."""
-        quantities = (self.angles, self.pressures, self.speeds, self.commands)
-        named = [
-            name for channels in quantities if channels is not None for name in channels.columns
-        ]
-        return (*named, *(name for name in (self.time, self.starts) if name is not None))
 
 
 def read_episode_mapping(path: str | Path) -> EpisodeMapping:
@@ -106,15 +71,19 @@ def mapping_of(tables: Mapping[str, Any], path: object) -> EpisodeMapping:
     """The mapping in the tables of a mapping file; messages name its `path`. Raises FileError."""
     _check_keys(path, "", tables, KEYS)
     for name in ("angles", "pressures"):
-        if name not in tables:
+        if name not in tables and not (name == "pressures" and "commands" in tables):
             raise FileError(
                 f"{path}: no table [{name}]; name its columns: [{name}] columns = [...]."
+                " Where pressures were not recorded, [commands] alone stand for them."
             )
-    if ("sample_time" in tables) == ("time" in tables):
+    if "sample_time" not in tables and "time" not in tables:
         raise FileError(
             f'{path}: state either sample_time = "10 ms" or time = "name of the column of times'
-            ' [s]".'
+            ' [s]", or both, to interpolate the rows to the sample time.'
         )
+    rests = tables.get("rests")
+    if rests is not None and "starts" in tables:
+        raise FileError(f"{path}: starts and rests exclude each other; leave one of them out.")
     arm = tables.get("arm", {})
     step = tables.get("sample_time")
     _check_keys(path, "arm.", arm, ("pairs", "axes"))
@@ -122,8 +91,14 @@ def mapping_of(tables: Mapping[str, Any], path: object) -> EpisodeMapping:
     for name in axes:
         if not isinstance(name, str) or name not in AXES:
             raise FileError(f"{path}: arm.axes holds '{name}'; allowed: {', '.join(AXES)}.")
+    channels = {name: _channels(path, name, tables[name]) for name in TABLES[:4] if name in tables}
+    from_commands = "pressures" not in channels
+    if from_commands:
+        channels["pressures"] = channels.pop("commands")
     return EpisodeMapping(
-        **{name: _channels(path, name, tables[name]) for name in TABLES[:4] if name in tables},
+        **channels,
+        from_commands=from_commands,
+        rests=None if rests is None else quantity(rests, "s", where=f"{path}: rests"),
         sample_time=None if step is None else quantity(step, "s", where=f"{path}: sample_time"),
         time=tables.get("time"),
         starts=tables.get("starts"),
@@ -136,15 +111,16 @@ def mapping_tables(mapping: EpisodeMapping) -> dict[str, Any]:
     """The tables of a mapping file, of which `mapping_of` makes this mapping; without the arm."""
     single = {
         name: getattr(mapping, name)
-        for name in ("sample_time", "time", "starts")
+        for name in ("sample_time", "time", "starts", "rests")
         if getattr(mapping, name) is not None
     }
     quantities = {}
     for name in TABLES[:4]:
         channels: Channels | None = getattr(mapping, name)
         if channels is not None:
+            stands = mapping.from_commands and name == "pressures"
             divisors = {} if channels.divisors is None else {"divisors": channels.divisors}
-            quantities[name] = {
+            quantities["commands" if stands else name] = {
                 "columns": list(channels.columns),
                 "scale": channels.scale,
                 **divisors,
@@ -179,6 +155,12 @@ def _channels(path: object, name: str, table: Any) -> Channels:
         raise FileError(
             f"{path}: the unit of the {name} is open. Write it in place of the question mark, one"
             f" of {', '.join(allowed)}; the comment beside it says which are possible."
+        )
+    if name == "angles" and table.get("unit") in LENGTHS:
+        raise FileError(
+            f"{path}: angles.unit is '{table['unit']}': a position is no angle. Divide it by the"
+            " lever arm about the joint: without unit, scale = 20 reads metres at an arm of 50 mm"
+            " as rad, scale = 0.02 millimetres."
         )
     if "unit" in table and table["unit"] not in tuple(allowed):
         raise FileError(
@@ -229,114 +211,68 @@ def read_episodes(source: str | Path, mapping: str | Path | EpisodeMapping) -> E
         f"{counted(len(episodes), 'episode')} from {counted(len(files), 'file')}"
         f" ({', '.join(kinds)})"
     )
-    return dataclasses.replace(episodes, notes=(count, *episodes.notes))
+    stands = [COMMANDED] if rules.from_commands else []
+    return dataclasses.replace(episodes, notes=(count, *stands, *episodes.notes))
 
 
 def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
     tables, notes = read_arrays(path, mapping.sample_time, mapping.columns)
     runs = []
     times = []
+    said = list(notes)
     for number, arrays in enumerate(tables):
         name = path.name if len(tables) == 1 else f"{path.name}, episode {number + 1}"
-        record, step = _episode(name, arrays, mapping)
-        times.append(step)
-        runs += _split(record, arrays, mapping, step)
+        pieces, remarks = pieces_of(name, arrays, mapping)
+        said += remarks
+        for piece_name, piece in pieces:
+            run, step = _episode(piece_name, piece, mapping)
+            runs.append(run)
+            times.append(step)
     known = (
         mapping.speeds is not None
         or mapping.time is not None
         or all(_times(arrays) for arrays in tables)
     )
-    return Episodes(tuple(runs), float(np.median(times)), notes, known)
-
-
-def _split(record: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float) -> list[Episode]:
-    if mapping.starts is None:
-        return [record]
-    marks = _array(record.name, arrays, mapping.starts).ravel()
-    flags = len(marks) == len(record) and bool(np.isin(marks, (0, 1)).all())
-    starts = np.flatnonzero(marks) if flags else marks
-    if (
-        not len(starts)
-        or np.any(starts != starts.astype(int))
-        or np.any(np.diff([*starts, len(record) + 0.5]) <= 0.0)
-    ):
-        raise ColumnError(
-            f"{record.name}: starts, column '{mapping.starts}', must be the first rows of the"
-            f" episodes, from 0, whole and rising below {len(record)} rows, or 1 in these rows and"
-            " 0 elsewhere."
-        )
-    edges = [*(int(row) for row in starts if row < len(record)), len(record)]
-    runs = []
-    for number, (a, b) in enumerate(itertools.pairwise(edges), start=1):
-        angle = record.angle[a:b]
-        command = None if record.command is None else record.command[a:b]
-        speed = record.speed[a:b] if mapping.speeds else speed_of(angle, step)
-        runs.append(
-            Episode(angle, speed, record.pressure[a:b], command, f"{record.name}, episode {number}")
-        )
-    return runs
+    return Episodes(tuple(runs), float(np.median(times)), tuple(said), known)
 
 
 def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episode, float]:
     """The rows of a table, and its sample time [s]."""
-    angle = _columns(name, arrays, mapping.angles)
-    pressure = _columns(name, arrays, mapping.pressures)
-    if mapping.time is not None:
-        time = _array(name, arrays, mapping.time).ravel()
-        step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-        if not step > 0.0 or np.max(np.abs(np.diff(time) - step)) > 0.5 * step:
-            raise ColumnError(
-                f"{name}: the times of column '{mapping.time}' have gaps or do not rise; they must"
-                " be uniform to half a row. Split the episode at its gaps, or state sample_time in"
-                " the mapping file."
-            )
-    else:
-        step = mapping.sample_time or 0.0
-        for column in _times(arrays):  # in whatever unit it is
-            ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
-            if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
-                raise ColumnError(
-                    f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the"
-                    " mapping file states a "
-                    f"sample time of {1e3 * step:.4g} ms. Correct sample_time, or state time ="
-                    f' "{column}" [s] in its '
-                    "place."
-                )
-    speed = _columns(name, arrays, mapping.speeds) if mapping.speeds else speed_of(angle, step)
-    command = _columns(name, arrays, mapping.commands) if mapping.commands else None
+    angle = columns_of(name, arrays, mapping.angles)
+    pressure = columns_of(name, arrays, mapping.pressures)
+    step = _step(name, arrays, mapping)
+    speed = command = None
+    if mapping.speeds is not None:
+        speed = columns_of(name, arrays, mapping.speeds)
+    if mapping.commands is not None:
+        command = columns_of(name, arrays, mapping.commands)
     for what, readings in (("pressures", pressure), ("speeds", speed), ("commands", command)):
         if readings is not None and len(readings) != len(angle):
             raise ColumnError(
                 f"{name}: {what} have {len(readings)} rows, angles {len(angle)}; they must have as"
                 " many."
             )
+    if speed is None:
+        speed = speed_of(angle, step)
     return Episode(angle, speed, pressure, command, name), step
+
+
+def _step(name: str, arrays: Arrays, mapping: EpisodeMapping) -> float:
+    """The sample time [s] of a table with even rows."""
+    if mapping.time is not None:
+        times = array_of(name, arrays, mapping.time).ravel()
+        return mapping.sample_time or float(np.median(np.diff(times)))
+    step = mapping.sample_time or 0.0
+    for column in _times(arrays):  # in whatever unit it is
+        ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
+        if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
+            raise ColumnError(
+                f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the mapping"
+                f" file states a sample time of {1e3 * step:.4g} ms. Correct sample_time, or state"
+                f' time = "{column}" [s] beside it: rows are then interpolated to it.'
+            )
+    return step
 
 
 def _times(arrays: Arrays) -> list[str]:
     return [name for name in arrays if name.lower() in TIMES and arrays[name].size > 1]
-
-
-def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:
-    parts = [_array(name, arrays, column) for column in channels.columns]
-    if not all(part.ndim and part.size for part in parts):
-        raise ColumnError(
-            f"{name}: {', '.join(channels.columns)} has no row; leave the episode out."
-        )
-    stacked = (
-        np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1) * channels.scale
-    )
-    if channels.divisors is not None:
-        stacked = stacked / _array(name, arrays, channels.divisors).ravel()
-    if not np.isfinite(stacked).all():
-        row, column = np.argwhere(~np.isfinite(stacked))[0]
-        raise ColumnError(
-            f"{name}: row {row + 1} of {', '.join(channels.columns)} (column {column + 1}) is not a"
-            " finite number; leave the episode out, or split it there."
-        )
-    return np.asarray(stacked, dtype=float)
-
-
-def _array(name: str, arrays: Arrays, column: str) -> Array:
-    check_known(f"{name}: no column", column, arrays, error=ColumnError)
-    return arrays[column]

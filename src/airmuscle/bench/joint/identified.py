@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import Array, ShortRepr
 from ...physics import PressureDriven
-from .episode_files import EpisodeMapping
+from .episode_mapping import EpisodeMapping
 from .episodes import Episodes, in_order
 from .free_run import RegulatorLag
 from .result import ArmFit
