@@ -21,7 +21,8 @@ try:
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 except ImportError as error:
     print(
-        f"no learning: {error}. Install the packages: pip install airmuscle[sim] stable-baselines3"
+        f"no learning: {error}. Install the packages: "
+        'pip install "airmuscle[sim]" stable-baselines3'
     )
     sys.exit()
 

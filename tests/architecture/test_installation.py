@@ -59,11 +59,13 @@ def test_every_requirement_is_pinned_and_hashed(lock: str):
 
 
 @pytest.mark.parametrize(
-    ("lock", "extra"), [("requirements.lock", "build"), ("requirements-dev.lock", "dev")]
+    ("lock", "extras"),
+    [("requirements.lock", ["build", "sim"]), ("requirements-dev.lock", ["dev", "build", "sim"])],
 )
-def test_the_lock_contains_all_dependencies_of_the_project(lock: str, extra: str):
+def test_the_lock_contains_all_dependencies_of_the_project(lock: str, extras: list[str]):
     project = PROJECT["project"]
-    required = project["dependencies"] + project["optional-dependencies"][extra]
+    added = [line for extra in extras for line in project["optional-dependencies"][extra]]
+    required = project["dependencies"] + added
     locked = {entry.split("==")[0] for entry in requirements(LOCKS[lock])}
     assert {re.split(r"[^\w.-]", line)[0].lower() for line in required} <= locked
 
@@ -89,6 +91,18 @@ def pins(lock: str) -> list[tuple[str, str]]:
     return [(f"{match[1]}{match[3].rstrip()}", match[2]) for match in found if match]
 
 
+def test_the_engine_is_an_extra_that_the_checks_and_the_first_line_of_the_readme_install():
+    project = PROJECT["project"]
+    extras = project["optional-dependencies"]
+    assert {"numba", "llvmlite"} <= {line.partition(">=")[0] for line in extras["sim"]}
+    assert not set(extras["sim"]) & set(project["dependencies"])
+    assert set(extras["sim"]) <= set(extras["dev"])
+    lines = re.findall(
+        r"^pip install (\S+)", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert lines == ['"airmuscle[sim]"']
+
+
 def test_all_files_of_a_release_state_the_same_version():
     version = PROJECT["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
@@ -112,7 +126,8 @@ def test_the_conda_recipe_has_the_dependencies_of_the_package():
         for line in recipe()["requirements"]["run"]
     }
     project = PROJECT["project"]
-    assert stated == {f"python{project['requires-python']}", *project["dependencies"]}
+    engine = project["optional-dependencies"]["sim"]
+    assert stated == {f"python{project['requires-python']}", *project["dependencies"], *engine}
     assert recipe()["about"]["license"] == project["license"]
     assert recipe()["about"]["license_file"] == project["license-files"]
     assert {"source", "build", "requirements", "test", "about", "extra"} < set(recipe())

@@ -22,7 +22,7 @@ def test_without_mujoco_the_message_says_how_to_install_it(tmp_path, monkeypatch
     monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
     result = airmuscle("body", written(tmp_path, arm()))
     assert result.exit_code == 1
-    assert "pip install 'airmuscle[mujoco]'" in result.stderr
+    assert 'pip install "airmuscle[mujoco]"' in result.stderr
 
 
 def test_a_dangerous_file_is_refused_before_mujoco_is_needed(tmp_path, monkeypatch):

@@ -179,7 +179,7 @@ def test_a_damaged_file_and_a_missing_package_are_one_error_each(
     assert f"broken{ending}: cannot be read as" in refusal(FileError, path)
     assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
     monkeypatch.setitem(sys.modules, package, None)
-    assert f"needs the package {package}. Install it: pip install airmuscle[lab]" in refusal(
+    assert f'needs the package {package}. Install it: pip install "airmuscle[lab]"' in refusal(
         FileError, path
     )
 

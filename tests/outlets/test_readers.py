@@ -464,7 +464,7 @@ def test_a_missing_package_is_an_error_with_the_install_command(
 ):
     monkeypatch.setitem(sys.modules, package, None)
     said = refusal(FileError, tmp_path / f"run{ending}")
-    assert said.endswith(f"needs the package {package}. Install it: pip install airmuscle[lab]")
+    assert said.endswith(f'needs the package {package}. Install it: pip install "airmuscle[lab]"')
     assert "\n" not in said
 
 

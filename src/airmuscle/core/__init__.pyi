@@ -85,6 +85,7 @@ from .errors import FolderInUseError as FolderInUseError
 from .errors import GeometryLimitError as GeometryLimitError
 from .errors import IdentificationError as IdentificationError
 from .errors import InputError as InputError
+from .errors import MissingPackageError as MissingPackageError
 from .errors import ParameterError as ParameterError
 from .errors import PhysicsError as PhysicsError
 from .errors import RigError as RigError
@@ -95,6 +96,7 @@ from .errors import UnitError as UnitError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import alternatives as alternatives
 from .errors import check_known as check_known
+from .errors import install_command as install_command
 from .errors import listed as listed
 from .errors import quotable as quotable
 from .errors import suggestion as suggestion

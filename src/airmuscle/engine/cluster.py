@@ -16,7 +16,14 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..core import AirmuscleError, FileError, InputError, SimulationError, program_fingerprint
+from ..core import (
+    AirmuscleError,
+    FileError,
+    InputError,
+    SimulationError,
+    install_command,
+    program_fingerprint,
+)
 
 CONNECT_TIMEOUT = 10.0
 """Time limit for the first response of a scheduler [s] (chosen)."""
@@ -109,8 +116,8 @@ def _import_distributed() -> Any:
         return importlib.import_module("distributed")
     except ImportError:
         raise InputError(
-            "a Dask cluster requires the packages dask and distributed. Install them: pip install"
-            " airmuscle[cluster]"
+            "a Dask cluster requires the packages dask and distributed. Install them:"
+            f" {install_command('cluster')}"
         ) from None
 
 

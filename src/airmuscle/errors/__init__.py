@@ -10,6 +10,7 @@ kind of the cause:
         PhysicsError                  the model has no solution
             SolveError, GeometryLimitError, RatingError, EquilibriumError
         RigError                      a test rig does not answer, or refuses a command
+        MissingPackageError           a package of an extra is not installed
         TraceError                    a model cannot be compiled
         IdentificationError           the data cannot determine the requested quantities
         SimulationError               a simulation ended early; `.solution` contains the partial

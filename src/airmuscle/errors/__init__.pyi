@@ -7,6 +7,7 @@ from ..core.errors import FolderInUseError as FolderInUseError
 from ..core.errors import GeometryLimitError as GeometryLimitError
 from ..core.errors import IdentificationError as IdentificationError
 from ..core.errors import InputError as InputError
+from ..core.errors import MissingPackageError as MissingPackageError
 from ..core.errors import ParameterError as ParameterError
 from ..core.errors import PhysicsError as PhysicsError
 from ..core.errors import RatingError as RatingError

@@ -17,6 +17,7 @@ from ..core.errors import (
     HintedText,
     ParameterError,
     alternatives,
+    install_command,
     listed,
 )
 from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
@@ -216,7 +217,7 @@ class Recording(NotebookDisplay):
             import pandas as pd
         except ImportError:
             raise AirmuscleError(
-                "to_pandas needs the package pandas. Install it: pip install airmuscle[lab]"
+                f"to_pandas needs the package pandas. Install it: {install_command('lab')}"
             ) from None
 
         return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import AirmuscleError, Array, Node, Operation, ParameterError, nodes
+from ...core import AirmuscleError, Array, Node, Operation, ParameterError, install_command, nodes
 from ...physics.analysis import held, linearise
 from .lqg_and_adrc import regulator
 
@@ -57,8 +57,8 @@ def _casadi() -> Any:
         return importlib.import_module("casadi")
     except ImportError:
         raise AirmuscleError(
-            "NonlinearModelPredictive needs Ipopt in the package casadi; pip install"
-            " airmuscle[predictive]. LinearModelPredictive needs no further package."
+            "NonlinearModelPredictive needs Ipopt in the package casadi;"
+            f" {install_command('predictive')}. LinearModelPredictive needs no further package."
         ) from None
 
 

@@ -3,11 +3,11 @@
 import re
 from typing import Any
 
-from ...core import ParameterError
+from ...core import ParameterError, install_command
 
 OLDEST = (3, 17)
 """First version of MuJoCo whose model contains the sparse structure of the tendon Jacobian."""
-REMEDY = "install it with: pip install 'airmuscle[mujoco]'"
+REMEDY = f"install it with: {install_command('mujoco')}"
 
 
 def load_simulator() -> Any:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import AirmuscleError, ParameterError, System, ops, tree
+from ...core import AirmuscleError, ParameterError, System, install_command, ops, tree
 from ..loop import COMMAND, ControlLaw, ControlLoop, Measurement
 from .problem import Problem
 from .sampled_loop import SampledLoop, prepare_loop
@@ -45,7 +45,7 @@ def loop_in_jax(
         import jax
     except ImportError:
         raise AirmuscleError(
-            "loop_in_jax needs the package 'jax'; pip install airmuscle[jax]."
+            f"loop_in_jax needs the package 'jax'; {install_command('jax')}."
         ) from None
     if jax.numpy.zeros(0).dtype != float:
         raise AirmuscleError(

@@ -29,7 +29,7 @@ def body(
     greatest length with the poses, moment arms with their sign, the torque of gravity, of a motion
     or of a table, and the tensions that give it. Named are routes whose stroke no muscle serves,
     that pull against their name or twin, change their sign, pass through the body, or cannot hold
-    gravity. MuJoCo computes the geometry (pip install 'airmuscle[mujoco]').
+    gravity. MuJoCo computes the geometry (pip install "airmuscle[mujoco]").
 
     \b
     Examples:

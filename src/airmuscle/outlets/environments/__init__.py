@@ -7,7 +7,7 @@ identifier "airmuscle.environments:airmuscle/Joint-v0". Each name is imported wh
 
 import importlib.util
 
-from ...core import InputError, attach_stub
+from ...core import InputError, attach_stub, install_command
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
 __all__ += ["register_environments"]
@@ -24,8 +24,8 @@ def register_environments() -> None:
     """
     if importlib.util.find_spec("gymnasium") is None:
         raise InputError(
-            "learning environments need the package gymnasium. Install it: pip install"
-            " airmuscle[sim]"
+            "learning environments need the package gymnasium. Install it:"
+            f" {install_command('sim')}"
         )
     from gymnasium.envs import registration
 

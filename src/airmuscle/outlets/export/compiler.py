@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...core import FileError, ParameterError, check_known, temporary_folder
+from ...core import FileError, ParameterError, check_known, install_command, temporary_folder
 from .identifiers import template
 
 COMPILERS = ("gcc", "clang", "cc")
@@ -248,7 +248,7 @@ def find_cross_compiler() -> list[str]:
     if importlib.util.find_spec(PACKAGE) is None:
         raise ParameterError(
             f"binaries for chosen platforms need the package {PACKAGE}, a cross compiler. Install"
-            " it: pip install airmuscle[fmu]; or leave the platforms out: the binary is then that"
+            f" it: {install_command('fmu')}; or leave the platforms out: the binary is then that"
             " of this machine."
         )
     return [sys.executable, "-P", "-m", PACKAGE, "cc"]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import AirmuscleError, Leaf
+from ...core import AirmuscleError, Leaf, install_command
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.instructions import instructions
 from ...engine.compile.onnx_graph import GraphBody
@@ -80,7 +80,7 @@ def onnx_files(
         import onnx
     except ImportError:
         raise AirmuscleError(
-            "an ONNX graph needs the package 'onnx'; pip install airmuscle[learning]."
+            f"an ONNX graph needs the package 'onnx'; {install_command('learning')}."
         ) from None
     single = precision == Single()
     files = dict[str, str | bytes]()

@@ -16,6 +16,7 @@ from ...core import (
     AirmuscleError,
     Array,
     ParameterError,
+    install_command,
     legend_below,
     new_figure,
 )
@@ -186,7 +187,7 @@ def imported_control() -> Any:
         import control
     except ImportError:
         raise AirmuscleError(
-            "to_control needs python-control; pip install airmuscle[control], or use to_scipy()."
+            f"to_control needs python-control; {install_command('control')}, or use to_scipy()."
         ) from None
     return control
 

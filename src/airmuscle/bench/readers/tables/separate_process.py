@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ....core import AirmuscleError, FileError, ParameterError, abridged
+from ....core import AirmuscleError, FileError, ParameterError, abridged, install_command
 from ....engine.processes import Worker, WorkerError
 from .file_kind import check_regular_file
 
@@ -38,8 +38,8 @@ def import_lab_package(name: str, path: Path) -> Any:
 def _missing_package(name: str, path: Path) -> FileError:
     extra = "ros" if name.startswith("rosbags") else "lab"
     return FileError(
-        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip"
-        f" install airmuscle[{extra}]"
+        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it:"
+        f" {install_command(extra)}"
     )
 
 

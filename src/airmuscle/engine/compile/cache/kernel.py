@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from ..llvm.engine_packages import numba_module
 from ..llvm.jit import build, engine_of, slot_count
 from . import store
 
@@ -105,8 +106,9 @@ class Kernel:
     @property
     def numba(self) -> Any:
         """The Python function of the kernel, which numba compiles for the types of its
-        arguments.
+        arguments. Raises MissingPackageError without numba.
         """
+        numba_module()
         return getattr(importlib.import_module(f"...kernels.{self.module}", __name__), self.name)
 
     def entry(self, kinds: tuple[str, ...]) -> Any:

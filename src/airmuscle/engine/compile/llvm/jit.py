@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from .emit import DECLARED
+from .engine_packages import llvm_binding, numba_module
 from .processor import processor
 
 LEVEL = 2
@@ -27,8 +28,7 @@ def object_code(text: str) -> bytes:
 
 def optimised(text: str) -> Any:
     """The module of LLVM text, optimised for this processor."""
-    import llvmlite.binding as llvm
-
+    llvm = llvm_binding()
     module = llvm.parse_assembly(DECLARED + text)
     machine = native(LEVEL)
     _optimise(module, machine)
@@ -39,8 +39,7 @@ def _optimise(module: Any, machine: Any) -> None:
     """Optimise a module: with the standard pipeline if it has functions to inline, else each
     function by itself.
     """
-    import llvmlite.binding as llvm
-
+    llvm = llvm_binding()
     options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
     options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
@@ -59,8 +58,7 @@ def engine_of(code: bytes) -> Any:
     """An engine with the code of an object file; it must stay alive as long as its addresses are
     used.
     """
-    import llvmlite.binding as llvm
-
+    llvm = llvm_binding()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), native(LEVEL))
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -69,8 +67,7 @@ def engine_of(code: bytes) -> Any:
 
 @functools.cache
 def _target() -> Any:
-    import llvmlite.binding as llvm
-
+    llvm = llvm_binding()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     return llvm.Target.from_default_triple()
@@ -105,17 +102,15 @@ def standalone(kernel: Any, kinds: Sequence[str]) -> Any:
     neither LLVM nor the C library provides; or with a version of numba that passes arrays in
     another way than `entry_point` knows.
     """
-    import llvmlite.binding as llvm
-    import numba
-    from numba.core.errors import NumbaError
-
+    numba = numba_module()
+    llvm = llvm_binding()
     options = {name: value for name, value in kernel.targetoptions.items() if name != "nopython"}
     compiled = numba.njit(**options, **_STANDALONE)(kernel.py_func)
     signature = tuple(_numba_type(kind) for kind in kinds)
     try:
         with shallow_scope_copies():
             compiled.compile(signature)
-    except NumbaError:
+    except numba.core.errors.NumbaError:
         return None
     text = compiled.inspect_llvm(signature)
     returned = {s.return_type for s in compiled.nopython_signatures}
@@ -144,8 +139,7 @@ def standalone(kernel: Any, kinds: Sequence[str]) -> Any:
 
 
 def _numba_type(kind: str) -> Any:
-    import numba
-
+    numba = numba_module()
     item = {"q": numba.int64, "d": numba.float64, "f": numba.float32}[kind[0]]
     return numba.types.Array(item, int(kind[1:]), "C") if len(kind) > 1 else item
 
@@ -155,8 +149,7 @@ def shallow_scope_copies() -> Iterator[None]:
     """Within the context a copied scope of numba shares its variables, unless this numba has scopes
     of another form.
     """
-    from numba.core import ir
-
+    ir = numba_module().core.ir
     scope = ir.Scope
     if hasattr(scope, "__deepcopy__") or set(vars(scope(None, ir.unknown_loc))) != _FIELDS:
         yield

@@ -10,6 +10,7 @@ import os
 from collections.abc import Mapping
 
 from ....core import ParameterError
+from .engine_packages import llvm_binding
 
 VARIABLE = "AIRMUSCLE_PROCESSOR"
 """The environment variable that names a level."""
@@ -71,15 +72,12 @@ def register_width(features: Mapping[str, bool]) -> int:
 
 @functools.cache
 def _this_processor() -> TargetProcessor:
-    import llvmlite.binding as llvm
-
+    llvm = llvm_binding()
     features = llvm.get_host_cpu_features()
     return TargetProcessor(llvm.get_host_cpu_name(), features.flatten(), register_width(features))
 
 
 @functools.cache
 def _features() -> Mapping[str, bool]:
-    import llvmlite.binding as llvm
-
-    features: Mapping[str, bool] = llvm.get_host_cpu_features()
+    features: Mapping[str, bool] = llvm_binding().get_host_cpu_features()
     return features
