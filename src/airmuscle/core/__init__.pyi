@@ -85,7 +85,6 @@ from .errors import FolderInUseError as FolderInUseError
 from .errors import GeometryLimitError as GeometryLimitError
 from .errors import IdentificationError as IdentificationError
 from .errors import InputError as InputError
-from .errors import MissingPackageError as MissingPackageError
 from .errors import ParameterError as ParameterError
 from .errors import PhysicsError as PhysicsError
 from .errors import RigError as RigError
@@ -96,11 +95,12 @@ from .errors import UnitError as UnitError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import alternatives as alternatives
 from .errors import check_known as check_known
-from .errors import install_command as install_command
 from .errors import listed as listed
 from .errors import quotable as quotable
 from .errors import suggestion as suggestion
 from .evaluation import Recorded as Recorded
+from .extras import MissingPackageError as MissingPackageError
+from .extras import install_command as install_command
 from .nodes import Node as Node
 from .operations import CONDITIONS as CONDITIONS
 from .operations import Operation as Operation

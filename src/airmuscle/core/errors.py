@@ -249,17 +249,6 @@ class RigError(AirmuscleError):
     """A test rig does not answer, or refuses a command."""
 
 
-class MissingPackageError(AirmuscleError):
-    """A package of an extra is not installed; the message states the line that installs it."""
-
-
-def install_command(extra: str) -> str:
-    """The command that installs an extra. Its double quotes are those of every shell: cmd.exe
-    knows no others, and zsh takes bare brackets for a pattern.
-    """
-    return f'pip install "airmuscle[{extra}]"'
-
-
 class TraceError(AirmuscleError):
     """A model cannot be traced into a compiled program."""
 

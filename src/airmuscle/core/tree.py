@@ -289,13 +289,6 @@ def program_fingerprint(excluded: tuple[str, ...] = EXCLUDED_ROOMS) -> str:
         (p.relative_to(PACKAGE_ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest())
         for p in files
     ]
-    versions = [(name, _installed_version(name)) for name in NUMERICAL_PACKAGES]
+    found = [item for name in NUMERICAL_PACKAGES for item in metadata.distributions(name=name)]
+    versions = [(package.name, package.version) for package in found]
     return fingerprint(metadata.version("airmuscle"), contents, versions)
-
-
-def _installed_version(package: str) -> str:
-    """The version of a package; empty where it is not installed, as those of the engine may be."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return ""

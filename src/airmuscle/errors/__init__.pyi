@@ -7,7 +7,6 @@ from ..core.errors import FolderInUseError as FolderInUseError
 from ..core.errors import GeometryLimitError as GeometryLimitError
 from ..core.errors import IdentificationError as IdentificationError
 from ..core.errors import InputError as InputError
-from ..core.errors import MissingPackageError as MissingPackageError
 from ..core.errors import ParameterError as ParameterError
 from ..core.errors import PhysicsError as PhysicsError
 from ..core.errors import RatingError as RatingError
@@ -17,3 +16,4 @@ from ..core.errors import SolveError as SolveError
 from ..core.errors import TraceError as TraceError
 from ..core.errors import UnitError as UnitError
 from ..core.errors import UnknownNameError as UnknownNameError
+from ..core.extras import MissingPackageError as MissingPackageError

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import recording as room
-from ..core import Array, Reference, check_field_types, conversion, one_line
+from ..core import Array, Reference, check_field_types, conversion, install_command, one_line
 from ..core.errors import (
     AirmuscleError,
     ColumnError,
     HintedText,
     ParameterError,
     alternatives,
-    install_command,
     listed,
 )
 from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit

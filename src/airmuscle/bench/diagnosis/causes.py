@@ -118,8 +118,7 @@ def misfit_causes(
     causes.append(steps)
     if steps.share > MIN_SHARE:
         forms = [form for form in forms if form.name not in SMOOTHING]
-    while forms:
-        forms = _without_single_runs(forms, unexplained)
+    while forms := _without_single_runs(forms, unexplained):
         best = max(forms, key=unexplained.taken_up)
         taken_up = unexplained.taken_up(best)
         if taken_up < MIN_SHARE * total:
