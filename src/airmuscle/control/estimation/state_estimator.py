@@ -4,6 +4,8 @@ filters.
 
 import abc
 import dataclasses
+import functools
+import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from types import SimpleNamespace
@@ -180,7 +182,7 @@ class StateEstimator(ShortRepr, abc.ABC):
             covariance=np.zeros((n, n)),
             inputs=np.zeros(self._compiled.sizes.inputs),
             values=np.zeros(p),
-            variances=self.variances,
+            variances=self.variances.copy(),
             difference=np.zeros(p),
             slopes=np.zeros((p, n)),
             difference_covariance=np.zeros((p, p)),
@@ -221,10 +223,12 @@ class StateEstimator(ShortRepr, abc.ABC):
             [self.process_noise.get(name, 0.0) ** 2 * self.sample_time for name in self.states]
         )
 
-    @property
+    @functools.cached_property
     def variances(self) -> Array:
-        """Variances (p,) of the measured columns."""
-        return np.array([self.measurement_noise[name] ** 2 for name in self.measured])
+        """Variances (p,) of the measured columns; not to be changed."""
+        variances = np.array([self.measurement_noise[name] ** 2 for name in self.measured])
+        variances.flags.writeable = False
+        return variances
 
     @property
     def magnitudes(self) -> Array:
@@ -289,6 +293,21 @@ class StateEstimator(ShortRepr, abc.ABC):
     ) -> tuple[StateEstimate, Innovation]:
         """The result of `correct` without its gate."""
         check_count(type(self).__name__, "measured values", values, self.measured)
+        if not all(map(math.isfinite, values)):
+            return self._corrected_by_some(estimate, values, inputs)
+        bound = self._filled(estimate, inputs)
+        bound.values[:] = values
+        bound.variances[:] = self.variances
+        status = bound.correct()
+        innovation = Innovation(bound.difference.copy(), bound.difference_covariance.copy())
+        return self._taken(bound, status, UNDEFINED), innovation
+
+    def _corrected_by_some(
+        self, estimate: StateEstimate, values: Sequence[float], inputs: Sequence[float]
+    ) -> tuple[StateEstimate, Innovation]:
+        """The estimate after the values that are not missing, and their innovation. Raises
+        SolveError for an infinite value.
+        """
         given = np.asarray(values, dtype=float)
         if np.isinf(given).any():
             raise SolveError(
@@ -296,12 +315,10 @@ class StateEstimator(ShortRepr, abc.ABC):
                 f" missing; {', '.join(self.measured)} are {values}."
             )
         here = ~np.isnan(given)
-        # a missing value counts with a variance beside which nothing is known
         bound = self._filled(estimate, inputs)
-        bound.values[:], bound.variances[:] = (
-            np.where(here, given, 0.0),
-            np.where(here, 1.0, UNKNOWN) * self.variances,
-        )
+        # a missing value counts with a variance beside which nothing is known
+        bound.values[:] = np.where(here, given, 0.0)
+        bound.variances[:] = np.where(here, 1.0, UNKNOWN) * self.variances
         status = bound.correct()
         innovation = Innovation(
             bound.difference[here], bound.difference_covariance[np.ix_(here, here)]
