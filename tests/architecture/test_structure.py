@@ -419,14 +419,16 @@ def test_an_import_that_is_not_from_a_face_is_detected():
 def test_all_exceptions_are_in_airmuscle_errors():
     from airmuscle import errors
     from airmuscle.core import errors as core_errors
+    from airmuscle.core import extras
 
     defined = {
-        name
-        for name, thing in vars(core_errors).items()
+        name: thing
+        for module in (core_errors, extras)
+        for name, thing in vars(module).items()
         if inspect.isclass(thing) and issubclass(thing, Exception | Warning)
     }
-    assert defined == set(errors.__all__)
-    assert all(getattr(errors, name) is getattr(core_errors, name) for name in errors.__all__)
+    assert set(defined) == set(errors.__all__)
+    assert all(getattr(errors, name) is defined[name] for name in errors.__all__)
     assert all(name in (errors.__doc__ or "") for name in errors.__all__)
 
 
