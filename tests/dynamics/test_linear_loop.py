@@ -358,13 +358,50 @@ def test_figures_show_the_open_loop(tmp_path):
     loop = our_loop()
     gain, phase = loop.bode().axes[:2]
     f, values = gain.lines[0].get_data()
-    assert values == pytest.approx(
-        np.abs(loop.open_loop().frequency_response(f)[:, 0, 0]), rel=1e-12
-    )
+    magnitude = np.abs(loop.open_loop().frequency_response(f)[:, 0, 0])
+    assert 10.0 ** (values / 20.0) == pytest.approx(magnitude, rel=1e-12)
     assert phase.get_xlabel() == "frequency [Hz]"
     circle = loop.nyquist().axes[0].lines[3].get_data()
     assert np.hypot(circle[0] + 1, circle[1]) == pytest.approx(1 / loop.margins().peak, rel=1e-12)
     assert len(small().bode([1.0, 2.0]).axes) == 2
+
+
+def vertical_ends(axes, frequency: float) -> list[np.ndarray]:
+    """The ends of the lines of an axes that stand at a frequency and span a part of its height."""
+    return [
+        line.get_ydata()
+        for line in axes.lines
+        if len(line.get_xdata()) == 2 and np.ptp(line.get_xdata()) == 0.0
+        if line.get_xdata()[0] == frequency and line.get_marker() != "None"
+    ]
+
+
+def test_the_bode_plot_of_a_loop_shows_its_margins_where_the_curves_are():
+    loop = our_loop()
+    margins = loop.margins()
+    gain, phase = loop.bode().axes[:2]
+    ((level, reached),) = vertical_ends(gain, margins.gain_frequency)
+    there = loop.open_loop().frequency_response([margins.gain_frequency])[0, 0, 0]
+    assert level == 0.0
+    assert reached == pytest.approx(20.0 * np.log10(abs(there)), rel=1e-9)
+    ((level, reached),) = vertical_ends(phase, margins.phase_frequency)
+    there = loop.open_loop().frequency_response([margins.phase_frequency])[0, 0, 0]
+    assert np.exp(1j * np.radians(level)) == pytest.approx(-1.0, abs=1e-12)
+    assert np.exp(1j * np.radians(reached)) == pytest.approx(there, rel=1e-6)
+    for axes, critical in ((gain, 0.0), (phase, -180.0)):
+        assert any(set(line.get_ydata()) == {critical} for line in axes.lines)
+        assert axes.get_ylim()[0] < critical < axes.get_ylim()[1]
+
+
+def test_the_bode_plot_of_an_unstable_loop_shows_no_margins():
+    loop = our_loop(gain=50.0 * GAINS["gain"])
+    assert not loop.is_stable
+    gain, phase = loop.bode().axes[:2]
+    assert not any(
+        len(line.get_xdata()) == 2 and line.get_marker() != "None"
+        for axes in (gain, phase)
+        for line in axes.lines
+    )
 
 
 def test_a_law_that_switches_is_refused():

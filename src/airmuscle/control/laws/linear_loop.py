@@ -19,13 +19,8 @@ from ...engine.loop import (
     designed_loop,
 )
 from ...physics.analysis import LinearModel, linearise
-from ...physics.analysis.sampled_model import (
-    SampledModel,
-    bode_figure,
-    checked_frequencies,
-    nyquist_figure,
-    sampled,
-)
+from ...physics.analysis.frequency_figures import nyquist_figure, open_loop_figure
+from ...physics.analysis.sampled_model import SampledModel, checked_frequencies, sampled
 from ...report.chapter import Chapter, NamedValue
 from .linear_law import LinearLaw, Point, linearise_law
 
@@ -285,12 +280,17 @@ class LinearLoop:
         return loop_margins(self._acting(column))
 
     def bode(self, column: str | None = None, frequencies: npt.ArrayLike | None = None) -> Any:
-        """A Matplotlib figure of gain and phase of the open loop, up to the Nyquist frequency
-        unless given [Hz].
+        """A Matplotlib figure of gain [dB] and phase [deg] of the open loop, up to the Nyquist
+        frequency unless given [Hz], with the margins of a stable loop.
         """
         opened = self._acting(column)
-        own = np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
-        return bode_figure(opened, own if frequencies is None else checked_frequencies(frequencies))
+        shown = (
+            np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
+            if frequencies is None
+            else checked_frequencies(frequencies)
+        )
+        margins = loop_margins(opened) if self.is_stable else None
+        return open_loop_figure(opened, shown, margins)
 
     def nyquist(self, column: str | None = None) -> Any:
         """A Matplotlib figure of the open loop in the complex plane, with the circle of its

@@ -18,6 +18,7 @@ from ...recording.columns import column_units
 from ..equilibrium import complete_inputs
 from ..plant.plant import Plant
 from . import sampled_model
+from .frequency_figures import bode_figure
 from .sampled_model import SampledModel, checked_frequencies, control_model, responses_at, sampled
 from .static_stiffness import Stiffness, stiffness
 
@@ -163,7 +164,7 @@ class LinearModel:
         """A Matplotlib figure of gain and phase of every output to every input at frequencies (F,)
         [Hz].
         """
-        return sampled_model.bode_figure(self, checked_frequencies(frequencies))
+        return bode_figure(self, checked_frequencies(frequencies))
 
     def frequency_response(self, frequencies: npt.ArrayLike) -> npt.NDArray[np.complex128]:
         """H(j 2 pi f) = (C (j 2 pi f I - A)^-1 B + D) exp(-j 2 pi f T) at frequencies (F,) [Hz], of
