@@ -69,7 +69,7 @@ def site_text(text: str, depth: int = 0) -> str:
     up = "../" * depth
     return (
         _links("".join(pieces), up)
-        .replace("](../docs/images/", f"]({up}images/")
+        .replace(f"]({up}docs/images/", f"]({up}images/")
         .replace("](../images/", "](images/")
     )
 
