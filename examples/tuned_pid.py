@@ -55,8 +55,8 @@ perturbations = Perturbations(loads=(0.5, 2.0), supplies=(0.8,), leak=0.01, dela
 family = perturbed_family(plant, loop, perturbations, initial_state=lifted)
 
 bounds = {"gain": (5.0, 1000.0), "integral_time": (0.05, 5.0), "derivative_time": (0.002, 0.2)}
-options = {"duration": 1.5, "budget": 600, "seed": 1}
-nominal = tune(family.cases[:1], bounds, **{**options, "budget": 160})
+options = {"duration": 1.5, "simulations": 600, "seed": 1}
+nominal = tune(family.cases[:1], bounds, **{**options, "simulations": 160})
 robust = tune(family.cases, bounds, start=[nominal.gains], **options)
 
 figure, (left, right) = plotting.new_figure(1, 2, height=3.4)

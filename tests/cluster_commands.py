@@ -30,7 +30,7 @@ COMMANDS = {
         "--leave-out",
         "pressure",
     ),
-    "tune": ("tune", "loop.toml", "--budget", 64, "--draws", 1),
+    "tune": ("tune", "loop.toml", "--simulations", 64, "--draws", 1),
     "compare-loops": ("compare", "loop.toml", "--spread", "mechanism.mass=20 %"),
     "campaign": ("campaign", "map.csv", "loop.csv", "--resting-length", "300 mm"),
     "size": ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--max-count", 1),

@@ -92,7 +92,7 @@ def test_a_batch_takes_designs_with_different_weights(integrator: RungeKutta4 | 
 
 def test_the_weights_of_a_design_are_tuned():
     case = LoopCase("lift", LIFT, loop(Placement(1.0)), START)
-    tuning = tune([case], {"time_constant": (0.01, 2.0)}, duration=0.4, budget=40, seed=1)
+    tuning = tune([case], {"time_constant": (0.01, 2.0)}, duration=0.4, simulations=40, seed=1)
     assert tuning.objective < 0.7 * tuning.present_objective
     assert isinstance(tuning.loop.controller, Placement)
     assert tuning.loop.controller.time_constant == tuning.gains["time_constant"]

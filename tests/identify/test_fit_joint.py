@@ -349,7 +349,7 @@ def test_the_command_inspects_and_fits(tmp_path):
             "--contraction",
             "1 %",
         ),
-        ("tune", controlled, "--budget", "80", "--out", tmp_path / "tuning"),
+        ("tune", controlled, "--simulations", "80", "--out", tmp_path / "tuning"),
         ("export", controlled, "--to", "c", "--out", tmp_path / "c"),
         ("export", controlled, "--controller", "--to", "c", "--out", tmp_path / "controller"),
     ):

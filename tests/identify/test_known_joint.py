@@ -216,7 +216,7 @@ def test_the_command_takes_the_scenario_of_a_joint(episodes, tmp_path):
     assert 0.0 < varied.std() < 0.003
     controlled = Path(tmp_path / "out" / "controlled.toml")
     done = airmuscle(
-        *map(str, ("tune", controlled, "--budget", "80", "--out", tmp_path / "tuning"))
+        *map(str, ("tune", controlled, "--simulations", "80", "--out", tmp_path / "tuning"))
     )
     assert done.exit_code == 0, done.output
     assert "drawn 4" in done.output  # from the covariance of the fit

@@ -432,7 +432,7 @@ def tuning(shaken: Shaken) -> list[Chapter]:
     loop = ControlLoop(PRESSURE, 0.01, steps)
     case = LoopCase("nominal", plant, loop, am.find_equilibrium(plant, pressure=1e5))
     bounds = {"gain": (1e-6, 1e-4), "integral_time": (0.05, 5.0)}
-    return [tune([case], bounds, duration=0.5, budget=200).chapter()]
+    return [tune([case], bounds, duration=0.5, simulations=200).chapter()]
 
 
 def sizing(shaken: Shaken) -> list[Chapter]:

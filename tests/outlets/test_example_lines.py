@@ -26,10 +26,10 @@ COMPARED = "--characteristic Sarosi2012 --characteristic Hunt2017"
 SHORTER = {
     "--bootstrap 1000": "--bootstrap 20",
     "--starts 20": "--starts 2",
-    "--budget 20000": "--budget 24",
+    "--simulations 20000": "--simulations 24",
     "--compare": f"--compare {COMPARED}",
-    "--rules": "--rules --budget 24",
-    "--cluster scheduler.json": "--cluster scheduler.json --budget 24",
+    "--rules": "--rules --simulations 24",
+    "--cluster scheduler.json": "--cluster scheduler.json --simulations 24",
     "--workers 8": "--workers 2",
     "--truth-seeds 101-108": "--truth-seeds 101",
     "--truth-seeds 1-200": "--truth-seeds 1-2 --spread 'mechanism.mass=20 %'",

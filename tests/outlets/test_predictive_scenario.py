@@ -216,7 +216,7 @@ def test_the_command_tunes_it(tmp_path):
         str(path),
         "--bounds",
         "permitted[0]=0.2 mm:5 mm",
-        "--budget",
+        "--simulations",
         "8",
         "--loads",
         "",

@@ -30,7 +30,7 @@ parameters = ["damper.damping"]
 standard_errors = [10.0]
 correlations = [[1.0]]
 """
-FEW = ["--budget", "64", "--draws", "1"]
+FEW = ["--simulations", "64", "--draws", "1"]
 """Eight sets of gains in seven cases."""
 
 
@@ -112,7 +112,7 @@ def test_the_printed_gains_are_those_of_the_file_and_of_the_search_in_python(sce
     }
     loaded = load_scenario_loop(scenario)
     cases = loaded.family(Perturbations(draws=1)).cases
-    again = tune(cases, loaded.bounds(), duration=0.3, budget=64)
+    again = tune(cases, loaded.bounds(), duration=0.3, simulations=64)
     assert again.gains == gains
     copy = loaded.save(again.gains, scenario.with_name("b.toml"))
     assert copy.read_bytes() == scenario.with_name("a.toml").read_bytes()
@@ -205,7 +205,7 @@ def test_an_interruption_writes_the_best_gains_so_far(scenario, monkeypatch):
 
     monkeypatch.setattr(command, "progress_bars", stopped)
     result = run(
-        "tune", scenario, "--budget", "128", "--draws", "0", "--out", scenario.parent / "out"
+        "tune", scenario, "--simulations", "128", "--draws", "0", "--out", scenario.parent / "out"
     )
     assert result.exit_code == 130
     assert "the best gains so far are written" in result.stderr
@@ -243,8 +243,9 @@ def test_a_scenario_that_cannot_be_tuned_is_refused(scenario):
         (["--loads", "0.5;2"], "--loads is '0.5;2'; it must be factors with commas between them"),
         (["--loads", "0"], "loads contains 0; a factor must be positive"),
         (["--quantile", "2"], "--quantile is 2; allowed range: 0 to 1"),
-        (["--budget", "9" * 30], "Invalid value for '--budget'"),
-        (["--budget", "20"], "budget is 20; it must be a whole number of at least 80"),
+        (["--simulations", "9" * 30], "Invalid value for '--simulations'"),
+        (["--budget", "64"], "To limit the number of simulated loops: --simulations 4000"),
+        (["--simulations", "20"], "simulations is 20; it must be a whole number of at least 80"),
     ],
 )
 def test_bad_options_are_refused_with_one_line(scenario, options, message):

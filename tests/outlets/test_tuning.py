@@ -92,14 +92,14 @@ def regulated(scale=3.0, limit=1e9):
 
 
 def small(**options):
-    return tune([NOMINAL, HEAVY], BOUNDS, duration=0.3, **{"budget": 64, "seed": 3, **options})
+    return tune([NOMINAL, HEAVY], BOUNDS, duration=0.3, **{"simulations": 64, "seed": 3, **options})
 
 
 # Optimum, seed, budget
 
 
 def test_the_known_optimum_is_found():
-    tuning = tune([regulated()], {"scale": (0.3, 8.0)}, duration=0.3, budget=160)
+    tuning = tune([regulated()], {"scale": (0.3, 8.0)}, duration=0.3, simulations=160)
     assert tuning.gains["scale"] == pytest.approx(1.0, rel=0.02)
     assert tuning.loop.controller.scale == tuning.gains["scale"]
     assert tuning.objective < 0.02 * tuning.present_objective
@@ -120,7 +120,7 @@ def test_the_same_seed_gives_the_same_search_and_another_seed_another_one():
 
 def test_the_budget_is_an_upper_bound_and_progress_counts_loops():
     seen = []
-    tuning = small(budget=90, progress=lambda done, total: seen.append((done, total)))
+    tuning = small(simulations=90, progress=lambda done, total: seen.append((done, total)))
     assert seen == [
         (32, 90),
         (48, 90),
@@ -133,7 +133,7 @@ def test_the_budget_is_an_upper_bound_and_progress_counts_loops():
 
 
 def test_a_search_ends_where_two_descents_agree():
-    tuning = tune([regulated()], {"scale": (0.3, 8.0)}, duration=0.1, budget=4000)
+    tuning = tune([regulated()], {"scale": (0.3, 8.0)}, duration=0.1, simulations=4000)
     assert tuning.converged
     assert tuning.simulated_loops < 600
     assert tuning.gains["scale"] == pytest.approx(1.0, rel=1e-3)
@@ -166,14 +166,16 @@ def test_the_result_is_never_worse_than_the_present_gains_or_a_start():
     assert first.tolist() == [5e-5, PRESSURE.integral_time]
     assert second.tolist() == [2e-5, 0.1]
     assert tuning.objective <= tuning.history.objective[:3].min()
-    outside = tune([NOMINAL], {"gain": (1e-4, 1e-3)}, duration=0.3, budget=16)
+    outside = tune([NOMINAL], {"gain": (1e-4, 1e-3)}, duration=0.3, simulations=16)
     assert outside.present_objective is None
 
 
 def test_gains_are_written_with_five_digits_within_their_bounds():
     low = 1.23456789e-6
     high = 9.87654321e-5
-    gains = tune([NOMINAL], {"gain": (low, high)}, duration=0.1, budget=32).history.gains[1:, 0]
+    gains = tune([NOMINAL], {"gain": (low, high)}, duration=0.1, simulations=32).history.gains[
+        1:, 0
+    ]
     assert ((gains >= low) & (gains <= high)).all()
     inner = gains[(gains > low) & (gains < high)]
     assert [float(f"{value:.4e}") for value in inner] == inner.tolist()
@@ -183,7 +185,7 @@ def test_gains_are_written_with_five_digits_within_their_bounds():
 
 
 def test_gains_that_fail_are_worse_than_all_others():
-    tuning = tune([regulated(1.5, limit=2.0)], {"scale": (0.3, 8.0)}, duration=0.1, budget=64)
+    tuning = tune([regulated(1.5, limit=2.0)], {"scale": (0.3, 8.0)}, duration=0.1, simulations=64)
     failed = tuning.history.gains[:, 0] > 2.0
     assert failed.any()
     assert np.isinf(tuning.history.objective[failed]).all()
@@ -195,7 +197,7 @@ def test_gains_that_all_fail_are_an_error_with_the_reason():
     with pytest.raises(
         SimulationError, match=r"each of 8 sets of gains fails .* a command that is not finite"
     ):
-        tune([regulated(3.0, limit=2.0)], {"scale": (2.5, 8.0)}, duration=0.1, budget=8)
+        tune([regulated(3.0, limit=2.0)], {"scale": (2.5, 8.0)}, duration=0.1, simulations=8)
 
 
 def test_an_unstable_range_is_avoided():
@@ -208,7 +210,7 @@ def test_an_unstable_range_is_avoided():
         [case],
         {"gain": (1e-6, 1e-3)},
         duration=1.0,
-        budget=64,
+        simulations=64,
         index=RootMeanSquareError(begin=0.5),
     )
     gains = tuning.history.gains[:, 0]
@@ -239,7 +241,7 @@ def test_an_interruption_keeps_the_best_so_far():
 
 
 def test_metrics_are_those_of_the_single_run():
-    tuning = small(budget=16)
+    tuning = small(simulations=16)
     gains = dict(zip(tuning.history.paths, tuning.history.gains[5].tolist(), strict=True))
     loop = dataclasses.replace(LOOP, controller=dataclasses.replace(PRESSURE, **gains))
     run = am.simulate(
@@ -263,7 +265,7 @@ def test_the_travel_of_a_set_point_is_counted_in_its_range():
     case = dataclasses.replace(regulated(1.0), initial_state=None)
     steps = Schedule({"pressure": ((0, 0.0), (0.05, 2e5), (0.15, 1e5))})
     case = dataclasses.replace(case, loop=dataclasses.replace(case.loop, setpoint=steps))
-    metrics = tune([case], {"scale": (0.3, 8.0)}, duration=0.3, budget=8).history.metrics
+    metrics = tune([case], {"scale": (0.3, 8.0)}, duration=0.3, simulations=8).history.metrics
     assert metrics.travel[0, 0] == pytest.approx((2e5 + 1e5) / REGULATOR.max_setpoint / 0.3)
 
 
@@ -274,9 +276,9 @@ def test_cases_of_several_kinds_share_one_controller():
     law = WithSensors(PRESSURE, (ColumnSensor("pressure", delay=1),))
     delayed = LoopCase("delay", LIFT, dataclasses.replace(LOOP, controller=law), START, "law")
     family = [NOMINAL, leaking.cases[1], HEAVY, delayed]
-    tuning = tune(family, BOUNDS, duration=0.3, budget=32)
+    tuning = tune(family, BOUNDS, duration=0.3, simulations=32)
     for i, case in enumerate(family):
-        alone = tune([case], BOUNDS, duration=0.3, budget=8)
+        alone = tune([case], BOUNDS, duration=0.3, simulations=8)
         assert alone.history.metrics.index[0, 0] == tuning.history.metrics.index[0, i]
     assert np.unique(tuning.history.metrics.index[0]).size == 4
 
@@ -284,8 +286,8 @@ def test_cases_of_several_kinds_share_one_controller():
 def test_a_controller_that_is_called_from_python_is_tuned_alike():
     called = LoopCase("called", LIFT, dataclasses.replace(LOOP, controller=Called(PRESSURE)), START)
     bounds = {f"inner.{name}": pair for name, pair in BOUNDS.items()}
-    first = tune([called], bounds, duration=0.2, budget=16)
-    second = tune([NOMINAL], BOUNDS, duration=0.2, budget=16)
+    first = tune([called], bounds, duration=0.2, simulations=16)
+    second = tune([NOMINAL], BOUNDS, duration=0.2, simulations=16)
     np.testing.assert_allclose(first.history.objective, second.history.objective, rtol=1e-9)
 
 
@@ -417,7 +419,7 @@ def test_another_objective_is_a_function_of_the_metrics():
 
 
 def test_no_set_of_gains_surpasses_the_pareto_front():
-    history = small(budget=128).history
+    history = small(simulations=128).history
     error = history.means("index")
     air = history.means("air")
     front = history.pareto("air")
@@ -457,8 +459,11 @@ def test_bad_bounds_are_refused(bounds, message):
     [
         ({"duration": 0.0}, "duration is 0.0 s; it must be positive"),
         ({"duration": float("nan")}, "duration is nan"),
-        ({"budget": 15}, "budget is 15; .* at least 16, 8 sets of gains for each of 2 cases"),
-        ({"budget": 1e3}, "budget is 1000.0; it must be a whole number"),
+        (
+            {"simulations": 15},
+            "simulations is 15; .* at least 16, 8 sets of gains for each of 2 cases",
+        ),
+        ({"simulations": 1e3}, "simulations is 1000.0; it must be a whole number"),
         ({"seed": -1}, "seed is -1"),
         ({"index": "rmse"}, "give a TrackingIndex"),
         ({"objective": "robust"}, "give RobustObjective"),
@@ -477,7 +482,7 @@ def test_bad_bounds_are_refused(bounds, message):
 )
 def test_bad_options_are_refused(options, message):
     with pytest.raises(ParameterError, match=message):
-        tune([NOMINAL, HEAVY], BOUNDS, **{"duration": 0.3, "budget": 64, **options})
+        tune([NOMINAL, HEAVY], BOUNDS, **{"duration": 0.3, "simulations": 64, **options})
 
 
 def test_bad_cases_are_refused():
@@ -551,7 +556,7 @@ def test_the_report_states_index_and_objective_in_words():
 
 
 def test_a_tuning_shows_its_gains_in_their_units_and_the_response_of_the_nominal_case():
-    tuning = pickle.loads(pickle.dumps(small(budget=16)))
+    tuning = pickle.loads(pickle.dumps(small(simulations=16)))
     gains, *_ = tuning.chapter().tables
     assert list(gains.columns["unit"].values) == ["1/Pa", "s"]
     assert str(tuning).startswith(f"Tuning of {type(PRESSURE).__name__}\n16 loops were simulated")
@@ -579,5 +584,5 @@ def test_further_local_processes_are_started_where_they_shorten_the_search(monke
         2: (LoopCase("called", LIFT, called, START), {"inner.gain": (1e-6, 1e-4)}),
     }
     for expected, (case, bounds) in cases.items():
-        tune([case], bounds, duration=0.05, budget=8, workers=2)
+        tune([case], bounds, duration=0.05, simulations=8, workers=2)
         assert asked.pop() == expected

@@ -93,7 +93,7 @@ def test_the_permission_ends_with_its_block(scenario):
 def test_tune_and_export_take_it(scenario):
     """Also in worker processes, which import the module of the current folder."""
     options = (
-        "--budget",
+        "--simulations",
         "8",
         "--draws",
         "0",

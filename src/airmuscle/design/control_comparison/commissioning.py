@@ -112,7 +112,7 @@ def find_gains(
         duration=joint.tuning_tasks[0].duration,
         index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN),
         objective=joint.objective,
-        budget=max(sets_per_gain * len(completed.bounds), MIN_SETS) * len(cases),
+        simulations=max(sets_per_gain * len(completed.bounds), MIN_SETS) * len(cases),
         seed=seed,
         integrator=None if joint.switching else TUNING_INTEGRATOR,
         progress=lambda done, total: progress(f"tuning {contender.name}", done, total),

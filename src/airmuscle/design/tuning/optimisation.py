@@ -132,7 +132,7 @@ class EvolutionStrategy:
 SETS_OF_A_TASK = 4
 """Sets of gains of one task of an executor (chosen: a generation has eight or more)."""
 MIN_SETS = 8
-"""Smallest first generation, and smallest number of sets of gains of a budget (chosen)."""
+"""Smallest first generation, and smallest number of sets of gains of a search (chosen)."""
 PATIENCE = 8
 TOLERANCE = 0.005
 """A descent ends where so many generations lower the objective by less than this part of it
@@ -152,7 +152,7 @@ def tune(
     duration: float,
     index: TrackingIndex = RootMeanSquareError(),
     objective: Objective = RobustObjective(),
-    budget: int = 4000,
+    simulations: int = 4000,
     seed: int = 0,
     start: Sequence[Mapping[str, float]] = (),
     start_time: float = 0.0,
@@ -169,13 +169,13 @@ def tune(
     index       tracking index of a run, evaluated at the sampling instants
     objective   from the metrics (E, M) of E sets of gains in M cases to values (E,); smaller is
                 better
-    budget      maximum number of simulated loops: sets of gains times cases
+    simulations maximum number of simulated loops: sets of gains times cases
     seed        of the optimiser; the same seed gives the same result on any number of cores
     start       sets of gains for the first generation, such as those of tuning rules; the present
                 gains of the controller are always among them if they are within the bounds, so that
                 the result is never worse
     start_time, integrator  as in simulate_batch
-    progress    called with the number of loops simulated so far, and the budget
+    progress    called with the number of loops simulated so far, and the maximum
     workers     number of processes, for several of which a script needs `if __name__ ==
                 "__main__":`, or an executor; by default this process, which uses all cores. Loops
                 of a ControlLaw are compiled and use all cores in one process, so that further local
@@ -184,7 +184,7 @@ def tune(
     The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every
     controller. The first generation are Sobol points, from whose best one a descent begins; further
     descents begin at other points of it. The search ends as converged where the two best descents
-    agree (`Tuning.converged`), otherwise with the budget. It requires bounds alone, accepts a
+    agree (`Tuning.converged`), otherwise after its simulations. It requires bounds alone, accepts a
     discontinuous objective (saturation, switchings, failed runs), and evaluates a generation at
     once, which is one batch on all cores. A set of gains that fails in a share p of the cases ranks
     behind all that do not, in the order of p; its objective is infinite.
@@ -194,13 +194,15 @@ def tune(
     every set of gains fails.
     """
     family = check_cases(cases)
-    duration = _check_options(duration, index, objective, budget, seed, len(family))
+    duration = _check_options(duration, index, objective, simulations, seed, len(family))
     ranges = gain_ranges(family[0].controller, bounds)
     paths = tuple(gain_range.path for gain_range in ranges)
     evaluator = Evaluator(
         family, group_cases(family, index), paths, duration, index, integrator, start_time
     )
-    search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
+    search = _Search(
+        evaluator, ranges, objective, simulations, progress or (lambda done, total: None)
+    )
     start_points = search.given(start)
     with process_pool(useful_workers(workers, family)) as executor:
         interrupted = search.run(start_points, seed, executor)
@@ -218,7 +220,7 @@ def tune(
         duration,
         start_time,
         seed,
-        budget,
+        simulations,
         history,
         search.present_count,
         search.converged,
@@ -247,7 +249,7 @@ def useful_workers(workers: Workers, family: Sequence[LoopCase]) -> Workers:
 
 
 def _check_options(
-    duration: Any, index: Any, objective: Any, budget: Any, seed: Any, count: int
+    duration: Any, index: Any, objective: Any, simulations: Any, seed: Any, count: int
 ) -> float:
     if (
         isinstance(duration, bool)
@@ -264,10 +266,12 @@ def _check_options(
             f"tune: objective is {objective!r}; give RobustObjective() or a function of"
             " CaseMetrics."
         )
-    for name, value, least in (("budget", budget, MIN_SETS * count), ("seed", seed, 0)):
+    for name, value, least in (("simulations", simulations, MIN_SETS * count), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             why = (
-                f", {MIN_SETS} sets of gains for each of {count} cases" if name == "budget" else ""
+                f", {MIN_SETS} sets of gains for each of {count} cases"
+                if name == "simulations"
+                else ""
             )
             raise ParameterError(
                 f"tune: {name} is {value!r}; it must be a whole number of at least {least}{why}."
@@ -283,14 +287,14 @@ class _Search:
         evaluator: Evaluator,
         ranges: tuple[GainRange, ...],
         objective: Objective,
-        budget: int,
+        simulations: int,
         progress: Progress,
     ) -> None:
         self.evaluator = evaluator
         self.ranges = ranges
         self.objective = objective
         self.progress = progress
-        self.budget, self.sets = budget, budget // len(evaluator.cases)
+        self.simulations, self.sets = simulations, simulations // len(evaluator.cases)
         self.present_count, self.converged, self.reasons = 0, False, Counter[str]()
         self.gains, self.metrics, self.values = list[Array](), list[CaseMetrics](), list[Array]()
         self._calls = DistributedCalls(None, Evaluator.metrics, evaluator)
@@ -299,7 +303,7 @@ class _Search:
     @property
     def population(self) -> int:
         """The number of points of the first generation: the power of two from 8 D on, at most half
-        the budget.
+        the number of simulations.
         """
         size = max(MIN_SETS, 1 << math.ceil(math.log2(8 * len(self.ranges))))
         while size > MIN_SETS and 2 * size > self.sets:
@@ -330,7 +334,9 @@ class _Search:
         return points
 
     def run(self, start_points: list[Array], seed: int, executor: Executor | None) -> bool:
-        """Search until two descents agree or the budget is used; whether the user interrupted."""
+        """Search until two descents agree or all simulations are made; whether the user
+        interrupted.
+        """
         from scipy.stats import qmc
 
         if executor is not None:
@@ -352,7 +358,7 @@ class _Search:
                     continue
                 used.append(start)
                 strategy = EvolutionStrategy(start, random)
-                if self.converged or not self._has_budget(strategy.size):
+                if self.converged or not self._has_simulations(strategy.size):
                     break
                 ends.append(self._descend(strategy))
                 best, *worse = sorted(ends)
@@ -361,13 +367,13 @@ class _Search:
             return True
         return False
 
-    def _has_budget(self, sets: int) -> bool:
+    def _has_simulations(self, sets: int) -> bool:
         return sum(map(len, self.values)) + sets <= self.sets
 
     def _descend(self, strategy: EvolutionStrategy) -> float:
-        """The smallest energy of one descent; infinite where the budget ended it."""
+        """The smallest energy of one descent; infinite where the number of simulations ended it."""
         best: list[float] = []
-        while self._has_budget(strategy.size):
+        while self._has_simulations(strategy.size):
             points = strategy.ask()
             energies = self._energies(points)
             strategy.tell(points, energies)
@@ -397,7 +403,7 @@ class _Search:
         self.gains.append(gains)
         self.metrics.append(metrics)
         self.values.append(values)
-        self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.budget)
+        self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.simulations)
         return np.where(
             np.isfinite(values), values, 1e30 * (1.0 + (1.0 - metrics.completed.mean(axis=1)))
         )

@@ -51,7 +51,7 @@ class Tuning(Reported):
     duration: float
     start_time: float
     seed: int
-    budget: int
+    simulations: int
     history: TuningHistory
     start: int
     converged: bool
@@ -124,7 +124,7 @@ class Tuning(Reported):
         error = "1" if self.index.scales else units.get(next(iter(self.scales))) or "1"
         unit = self.index.unit(error)
         captions = {
-            "convergence": "Objective over the budget; a failed set of gains is not drawn.",
+            "convergence": "Objective over the simulations; a failed set of gains is not drawn.",
             "pareto": (
                 "Mean tracking index over the cases against mean air drawn and travel of commands,"
                 " with Pareto fronts."
@@ -179,7 +179,7 @@ class Tuning(Reported):
             parts.append(f"{failed} sets of gains failed in at least one case.")
         if self.interrupted:
             parts.append(
-                f"The search was interrupted before its budget of {self.budget} loops was used."
+                f"The search was interrupted before its {self.simulations} simulations were used."
             )
         return " ".join(parts)
 
@@ -222,7 +222,11 @@ class Tuning(Reported):
             ("controller", type(controller).__name__, "scenario"),
             ("index", str(self.index), "chosen"),
             ("objective", str(self.criterion), "chosen"),
-            ("optimiser", f"CMA-ES, seed {self.seed}, budget {self.budget} loops", "chosen"),
+            (
+                "optimiser",
+                f"CMA-ES, seed {self.seed}, at most {self.simulations} simulations",
+                "chosen",
+            ),
             ("duration of a run", f"{self.duration:g} s", "scenario"),
         )
 

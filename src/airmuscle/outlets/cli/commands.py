@@ -234,6 +234,15 @@ def _exit_codes(ctx: click.Context) -> Iterator[None]:
         raise click.exceptions.Exit(INTERRUPTED) from None
 
 
+RENAMED_OPTIONS: dict[tuple[str | None, str], str] = {
+    ("tune", "--budget"): (
+        "tune has no --budget, which is a time wherever it is an option. To limit the number of"
+        " simulated loops: --simulations 4000"
+    )
+}
+"""The error for an option of a command that had another name before."""
+
+
 @contextlib.contextmanager
 def _printable_usage_errors() -> Iterator[None]:
     """Escape control characters of arguments that a usage error quotes, and replace those that
@@ -244,7 +253,10 @@ def _printable_usage_errors() -> Iterator[None]:
     except click.exceptions.NoArgsIsHelpError:
         raise
     except click.UsageError as error:
-        text = encodable(quotable(error.format_message()), sys.stderr)
+        command = error.ctx.info_name if error.ctx is not None else None
+        option = getattr(error, "option_name", "")
+        message = RENAMED_OPTIONS.get((command, option)) or error.format_message()
+        text = encodable(quotable(message), sys.stderr)
         raise click.UsageError(text, error.ctx) from None
 
 

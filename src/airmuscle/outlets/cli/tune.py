@@ -108,7 +108,9 @@ class TuneRequest:
     rules: bool = option(
         "Start from SIMC and AMIGO settings by a simulated step (PID only).", default=False
     )
-    budget: int = option("Maximum number of simulated loops.", default=4000, bounds=(8, 10_000_000))
+    simulations: int = option(
+        "Maximum number of simulated loops.", default=4000, bounds=(8, 10_000_000)
+    )
     seed: int = option(
         "Seed of the optimiser and of the draws.", default=0, bounds=(0, float("inf"))
     )
@@ -136,7 +138,7 @@ def tune(
     Examples:
       airmuscle tune examples/pressure_loop.toml --rules --out tuning
       airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s"
-          --budget 20000
+          --simulations 20000
       airmuscle tune lift.toml --cluster scheduler.json
     """
     loaded = load_scenario_loop(scenario)
@@ -198,7 +200,7 @@ def _search(
             duration=problem.duration,
             index=request.index(),
             objective=objective,
-            budget=request.budget,
+            simulations=request.simulations,
             seed=request.seed,
             start=rule_starts(rules, ranges),
             start_time=problem.start_time,
