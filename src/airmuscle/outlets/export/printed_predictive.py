@@ -279,10 +279,14 @@ def print_any_controller(
 
 def _table(name: str, array: Array, number: str) -> str:
     """A constant array, which an embedded program has in its flash memory alone."""
+    size = "".join(f"[{count}]" for count in array.shape)
+    kind = number
+    values = c_values(array, number=number)
     if array.dtype == np.int64:
-        return f"static const int {name}[{len(array)}] = {{{c_integers(array.tolist())}}};\n"
-    size = "".join(f"[{k}]" for k in array.shape)
-    return f"static const {number} {name}{size} = {{{c_values(array, number=number)}}};\n"
+        kind = "int"
+        values = c_integers(array.tolist())
+    head = f"static const {kind} {name}{size}"
+    return f"{head} = {{{values}}};\n"
 
 
 def _json(array: Array) -> str:
