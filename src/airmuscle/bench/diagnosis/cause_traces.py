@@ -254,4 +254,6 @@ def _integral(signals: Array, places: Array) -> Array:
     rows_before = np.minimum(places, 0.0)
     rows_after = np.maximum(places - last, 0.0)
     inside = _at(sums, places)
-    return np.asarray(inside + rows_before * first_value + rows_after * last_value)
+    before = rows_before * first_value
+    after = rows_after * last_value
+    return np.asarray(inside + before + after)

@@ -90,7 +90,8 @@ class MooneyRivlinTube(ForceLaw):
         thinning = excess * section / inner_squared
         by_stretch = free_squared * logarithm + 0.5 * thinning - section
         by_radius = 2.0 * outer * logarithm + thinning / (stretch * outer)
-        slope = by_stretch / stretch**2 + by_radius * widening
+        slope = by_stretch / stretch**2
+        slope = slope + by_radius * widening
         first = slope + stretch * section
         second = 2.0 * stretch * integral + stretch**2 * slope - section / stretch**3
         energy_slope = self.c1 * first + self.c2 * second
