@@ -341,5 +341,7 @@ def test_a_rule_states_a_remedy_as_an_imperative():
 
 
 def test_what_has_no_rules_is_refused_with_what_has_them():
-    with pytest.raises(ParameterError, match="Give recordings, the points of a fit, a fit"):
+    with pytest.raises(
+        ParameterError, match="Give recordings, the check of a record, the points of a fit, a fit"
+    ):
         diagnose(3.0)

@@ -10,7 +10,7 @@ import pytest
 from command_line import airmuscle
 from planted_faults import FAULTS, GOOD, Columns, recording, regulator, simulated
 
-from airmuscle.bench import check_record, fit_regulator
+from airmuscle.bench import check_record, diagnose, fit_regulator
 from airmuscle.errors import IdentificationError
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -20,6 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore")
 def test_a_good_record_is_not_blamed(name: str):
     check = check_record(recording(GOOD[name]()))
     assert check.is_usable, check.faults
+    assert diagnose(check) == ()
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -27,6 +28,10 @@ def test_a_planted_fault_is_named(name: str):
     rule, make = FAULTS[name]
     check = check_record(recording(make()))
     assert rule in [fault.rule for fault in check.faults], check.faults
+    found = {diagnosis.rule: diagnosis.text for diagnosis in diagnose(check)}
+    remedies = {fault.rule: fault.remedy for fault in check.faults}
+    assert found.keys() == remedies.keys()
+    assert all(text.endswith(remedies[name]) for name, text in found.items())
 
 
 @pytest.mark.parametrize("noisy", [True, False])

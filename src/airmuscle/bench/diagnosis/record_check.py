@@ -14,7 +14,7 @@ from ...report.chapter import Chapter, NamedValue, Table
 from ..inspection import Sampling, analyse_sampling, inspect
 from ..reported import Reported
 from .response_to_command import CommandResponse, command_response
-from .rules import apply_rules
+from .rules import Diagnosis, apply_rules
 from .value_rules import VALUE_RULES, bench_data
 
 MIN_ROWS = 30
@@ -89,6 +89,11 @@ class RecordCheck(Reported):
     def is_usable(self) -> bool:
         """Whether no fault was found."""
         return not self.faults
+
+    @property
+    def diagnoses(self) -> tuple[Diagnosis, ...]:
+        """The faults as the findings of their rules, each with its remedy."""
+        return tuple(Diagnosis(f.rule, f"{f.text}. {f.remedy}") for f in self.faults)
 
     def chapter(self) -> Chapter:
         """The description of the check."""

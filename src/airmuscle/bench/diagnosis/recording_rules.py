@@ -104,9 +104,9 @@ def examine_recordings(recordings: Sequence[Recording]) -> Findings:
 
 
 def diagnose(subject: Recording | Sequence[Recording] | Diagnosable) -> tuple[Diagnosis, ...]:
-    """The findings of all rules of recordings, of the points of a fit, of a fit or of a prediction,
-    each with its text and its rule. Raises ParameterError for anything else, and ColumnError for
-    recordings of no muscle."""
+    """The findings of all rules of recordings, of the check of a record, of the points of a fit, of
+    a fit or of a prediction, each with its text and its rule. Raises ParameterError for anything
+    else, and ColumnError for recordings of no muscle."""
     if isinstance(subject, Recording):
         return examine_recordings([subject]).diagnoses
     if isinstance(subject, Sequence) and not isinstance(subject, str):
@@ -114,7 +114,7 @@ def diagnose(subject: Recording | Sequence[Recording] | Diagnosable) -> tuple[Di
     diagnoses = getattr(subject, "diagnoses", None)
     if diagnoses is None:
         raise ParameterError(
-            f"diagnose: {one_line(subject)} has no rules. Give recordings, the points of a fit, a"
-            " fit, or a prediction."
+            f"diagnose: {one_line(subject)} has no rules. Give recordings, the check of a record,"
+            " the points of a fit, a fit, or a prediction."
         )
     return tuple(diagnoses)

@@ -49,7 +49,7 @@ class Diagnosis(NamedTuple):
 
 
 class Diagnosable(Protocol):
-    """What `diagnose` takes besides recordings: points, a fit, a prediction."""
+    """What `diagnose` takes besides recordings: a check, points, a fit, a prediction."""
 
     @property
     def diagnoses(self) -> tuple[Diagnosis, ...]:

@@ -69,10 +69,14 @@ class PriorRows(NamedTuple):
     @classmethod
     def of(cls, parameters: Sequence[FreeParameter]) -> "PriorRows":
         """Those of the parameters that have one."""
-        known = [(i, p.prior) for i, p in enumerate(parameters) if p.prior is not None]
-        columns = np.array([tuple(prior) for _, prior in known], dtype=float).reshape(-1, 3).T
-        indices = np.array([i for i, _ in known], dtype=np.intp)
-        return cls(indices, columns[0], columns[1], columns[2] > 0)
+        indices = [i for i, parameter in enumerate(parameters) if parameter.prior is not None]
+        priors = [parameter.prior for parameter in parameters if parameter.prior is not None]
+        return cls(
+            np.array(indices, dtype=np.intp),
+            np.array([prior.value for prior in priors], dtype=float),
+            np.array([prior.deviation for prior in priors], dtype=float),
+            np.array([prior.is_logarithmic for prior in priors], dtype=bool),
+        )
 
     def residuals(self, values: Array) -> Array:
         """The residuals (K,) at parameters (P,)."""

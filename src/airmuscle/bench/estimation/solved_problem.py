@@ -73,8 +73,9 @@ class SolvedProblem:
         check_whole("bootstrap", "refits", refits, 1)
         _, group = np.unique(self._runs.run, return_inverse=True)
         count = int(group.max()) + 1
-        share = np.full(count, 1.0 / count)
-        draws = np.random.default_rng(seed).multinomial(count, share, size=refits).astype(float)
+        shares = np.full(count, 1.0 / count)
+        random = np.random.default_rng(seed)
+        draws = random.multinomial(count, shares, size=refits).astype(float)
         return resampled_values(self.problem, self.values, self.loss, group, draws, workers=workers)
 
     @functools.cached_property
@@ -82,7 +83,9 @@ class SolvedProblem:
         """The combinations of parameters that the rows do not determine."""
         problem = self.problem
         residuals = problem.residuals(self.solution.modelled)
-        spread = float(np.sqrt(np.sum(residuals**2) / max(residuals.size - self.values.size, 1)))
+        freedom = max(residuals.size - self.values.size, 1)
+        spread = float(np.sqrt(np.sum(residuals**2) / freedom)) or 1e-12
         sensitivities = problem.weights[:, None] * self.solution.jacobian
-        magnitudes = np.where(self.values == 0.0, problem.coordinates.sizes, np.abs(self.values))
-        return analyse_identifiability(sensitivities, problem.names, magnitudes, spread or 1e-12)
+        is_zero = self.values == 0.0
+        magnitudes = np.where(is_zero, problem.coordinates.sizes, np.abs(self.values))
+        return analyse_identifiability(sensitivities, problem.names, magnitudes, spread)
