@@ -181,7 +181,7 @@ def measure_keys(address: str) -> None:
         )
         print(
             "working point:",
-            measured(page, page.locator("#panel-muscle .chart"), ("ArrowUp", "ArrowDown")),
+            measured(page, page.locator("#panel-muscle .first .chart"), ("ArrowUp", "ArrowDown")),
         )
         page.get_by_role("tab", name="Joint").click()
         page.wait_for_selector("#panel-joint[data-shown]", timeout=120_000)

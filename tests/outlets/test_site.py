@@ -7,11 +7,13 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 from command_line import airmuscle
 from studio_pages import BEGINNING, run_script, scripts
 
 import airmuscle as am
+from airmuscle.core import conversion
 from airmuscle.errors import ParameterError
 from airmuscle.files import to_toml
 from airmuscle.outlets import write_site
@@ -97,6 +99,71 @@ def command_value(name, missing, stated):
     done = airmuscle("evaluate", name, *options, "--json")
     assert done.exit_code == 0, done.stderr
     return json.loads(done.stdout)["evaluation"][missing]
+
+
+POINTS = """
+const law = new airmuscle.Law(airmuscleSite.sheets["models/law-dmsp-20-300.js"]);
+console.log(JSON.stringify(DATA.map((text) => {
+  try {
+    const points = airmuscle.readPoints(text, 0.3);
+    return { points, ...airmuscle.residualsOf(law, points) };
+  } catch (error) { return error.message; }
+})));
+"""
+
+
+def own_points(files, texts, folder):
+    """What the page makes of texts: points with their residuals, or a sentence."""
+    text = files["contents.js"] + scripts(*BEGINNING, "points-file")
+    return run_script(text + files["models/law-dmsp-20-300.js"] + POINTS, texts, folder)
+
+
+def test_points_in_other_separators_and_units_are_the_same_points(files, tmp_path):
+    texts = [
+        "pressure [bar],contraction [%],force [N]\n3,10,270\n4,5,700.5\n",
+        "Contraction (%);Gauge pressure (kPa);Load (kN)\n10;300;0,27\n5;400;0,7005\n",
+        "force [N]\tlength [mm]\tpressure [MPa]\tnote\n270\t270\t0.3\ta\n700.5\t285\t0.4\tb\n",
+    ]
+    law = am.load("dmsp-20-300").characteristic
+    measured = [(3e5, 0.1, 270.0), (4e5, 0.05, 700.5)]
+    errors = [float(law.force(p, c)) - f for p, c, f in measured]
+    for answer in own_points(files, texts, tmp_path):
+        points = [tuple(point.values()) for point in answer["points"]]
+        assert np.array(points) == pytest.approx(np.array(measured), rel=1e-12)
+        assert answer["rms"] == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=TOLERANCE)
+        assert answer["greatest"] == pytest.approx(np.max(np.abs(errors)), rel=TOLERANCE)
+        assert answer["mean"] == pytest.approx(np.mean(errors), rel=TOLERANCE)
+        assert answer["count"] == 2
+
+
+def test_a_text_that_contains_no_points_has_a_sentence_with_the_remedy(files, tmp_path):
+    remedies = {
+        "": "write a line with the headings, such as pressure [bar]; contraction [%]; force [N]",
+        "1,2,3\n4,5,6": "the first line must have the form pressure [bar]; contraction [%]; force",
+        "pressure [bar],force [N]\n1,2": "No heading names the contraction or length",
+        "pressure,contraction [%],force [N]\n1,2,3": "states no unit; write pressure with one of",
+        "pressure [ft],contraction [%],force [N]\n1,2,3": "states the unit ft; write pressure",
+        "pressure [bar],contraction [%],force [N]\n1,2,x": "Line 2: “x” is no number",
+    }
+    for sentence, remedy in zip(
+        own_points(files, list(remedies), tmp_path), remedies.values(), strict=True
+    ):
+        assert remedy in sentence
+
+
+def test_units_of_choice_are_those_of_the_program(tmp_path):
+    text = """
+console.log(JSON.stringify(DATA.map((system) => {
+  airmuscle.units.choose(system);
+  return ["pressure", "force", "length"].map((quantity) => airmuscle.units[quantity]);
+})));
+"""
+    systems = ["bar, N, mm", "kPa, N, mm", "MPa, N, mm", "psi, lbf, in"]
+    answers = run_script(scripts("numbers", "units") + text, systems, tmp_path)
+    for system, answer in zip(systems, answers, strict=True):
+        assert [unit["name"] for unit in answer] == system.split(", ")
+        for unit, base in zip(answer, ("Pa", "N", "m"), strict=True):
+            assert unit["factor"] == pytest.approx(conversion(unit["name"], base).factor, rel=1e-14)
 
 
 def test_what_is_no_file_or_has_the_name_of_another_model_is_refused(tmp_path):

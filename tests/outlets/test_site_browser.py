@@ -120,6 +120,55 @@ def test_two_muscles_are_compared_and_the_address_keeps_the_state(browser, folde
         assert other.get_by_label("Pressure [bar]").input_value() == field.input_value()
 
 
+def test_units_of_choice_and_own_points(page):
+    law = am.load("dmsp-20-300").characteristic
+    points = "pressure [bar]; contraction [%]; force [N]\n3; 10; 270\n4; 5; 700"
+    page.get_by_text("Draw own points over the law").click()
+    page.get_by_label("Own points (CSV)", exact=True).fill(points)
+    page.get_by_role("button", name="Draw these points").click()
+    errors = [float(law.force(3e5, 0.1)) - 270.0, float(law.force(4e5, 0.05)) - 700.0]
+    row = page.locator("#panel-muscle tr", has_text="dmsp-20-300").locator("td")
+    rms = float(row.nth(2).inner_text())
+    assert rms == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=5e-3)
+    page.get_by_label("Units").select_option("psi, lbf, in")
+    assert float(row.nth(2).inner_text()) == pytest.approx(rms / 4.4482216152605, rel=5e-3)
+    page.get_by_label("Solve for pressure").check()
+    page.get_by_label("Contraction [%]").fill("10")
+    page.get_by_label("Force [lbf]").fill("50")
+    expected = law.pressure(0.1, 50 * 4.4482216152605) / 6894.757293168361
+    field = page.get_by_label("Pressure [psi]", exact=True)
+    assert float(field.input_value()) == pytest.approx(expected, rel=1e-5)
+
+
+ISOTONICS = """
+async () => {
+  const panel = new airmuscle.CurvePanel(document.createElement("div"));
+  const law = new airmuscle.Law(await airmuscle.source.named("law", "dmsp-20-300"));
+  Object.assign(panel, { laws: [law], active: law, pressures: [3e5, 6e5], span: [0, 0.2], greatestForce: 1000 });
+  return ["isotonics", "stiffness"].map((kind) => {
+    panel.kind.value = kind;
+    const plan = panel[kind]();
+    return plan.levels.map((level) => [level, plan.grid, plan.grid.map((at) => plan.valueOf(law, level, at))]);
+  });
+}
+"""
+
+
+def test_isotonics_and_stiffness_are_those_of_the_law(page):
+    law = am.load("dmsp-20-300").characteristic
+    isotonics, stiffness = page.evaluate(ISOTONICS)
+    assert [level for level, *_ in isotonics] == [200.0, 400.0, 600.0, 800.0, 1000.0]
+    for force, grid, percents in isotonics:
+        expected = [100 * or_nan(law.contraction, pressure, force) for pressure in grid]
+        assert percents == pytest.approx(expected, rel=TOLERANCE, abs=TOLERANCE, nan_ok=True)
+    for pressure, grid, values in stiffness:
+        taut = [at for at in grid if law.force(pressure, at) > 0.0]
+        assert len(taut) > 40
+        expected = [float(law.stiffness(pressure, at)) / 0.3 / 1e3 for at in taut]
+        shown = [value for value in values if np.isfinite(value)]
+        assert shown == pytest.approx(expected, rel=TOLERANCE)
+
+
 def test_every_plant_and_joint_runs_in_the_page(page):
     for tab, label in (("plant", "Plant of the library"), ("joint", "Joint of the library")):
         page.get_by_role("tab", name=tab.capitalize()).click()

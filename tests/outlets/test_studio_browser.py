@@ -70,7 +70,7 @@ def test_two_of_three_quantities_give_the_third(muscle):
 
 def test_the_working_point_is_dragged_and_moved_by_keys(muscle):
     muscle.get_by_label("Solve for pressure").check()
-    box = muscle.locator("#panel-muscle .chart .u-over").bounding_box()
+    box = muscle.locator("#panel-muscle .first .chart .u-over").bounding_box()
     muscle.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     muscle.mouse.down()
     muscle.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.6 * box["height"], steps=5)
@@ -83,7 +83,7 @@ def test_the_working_point_is_dragged_and_moved_by_keys(muscle):
     assert number(muscle, "Pressure [bar]") == pytest.approx(
         law.pressure(contraction, force) / 1e5, rel=1e-4
     )
-    muscle.locator("#panel-muscle .chart").press("ArrowRight")
+    muscle.locator("#panel-muscle .first .chart").press("ArrowRight")
     assert number(muscle, "Contraction [%]") == pytest.approx(100 * contraction + 0.1, abs=2e-4)
 
 

@@ -20,7 +20,8 @@ MAX_MUSCLES = 6
 (chosen).
 """
 _NAMES = """
-    numbers roots beyond-range law elements source figure chart outline parameters muscle-chart muscle-point muscle-tab
+    numbers units roots beyond-range law elements source figure chart outline parameters points-file muscle-chart muscle-point
+    muscle-points muscle-curves muscle-tab
     plant-start plant-run plant-drawing plant-traces plant-tab fit-source fit-scatter fit-data fit-arm fit-files
     fit-result fit-tab joint-loop joint-statics joint-linear joint-drawing joint-charts joint-tab size-tab main
 """  # noqa: E501

@@ -68,6 +68,7 @@
       ctx.clip();
       ctx.scale(ratio, ratio);
       ctx.font = FONT;
+      ctx.setLineDash([]);   /* that of the last curve */
       this.options.overlay(this, ctx, { left: bbox.left / ratio, top: bbox.top / ratio, width: bbox.width / ratio, height: bbox.height / ratio });
       ctx.restore();
     }

@@ -82,16 +82,16 @@
   }
 
   /* A field in which a file may be dropped, chosen or pasted as text. */
-  function textField(label, button, receive) {
-    const area = element("textarea", { "aria-label": label, spellcheck: "false", placeholder: label });
-    const choose = element("input", { type: "file", accept: ".toml,text/plain", "aria-label": `${label}: choose a file` });
+  function textField(label, button, receive, { what = "TOML file", accept = ".toml,text/plain", example = label } = {}) {
+    const area = element("textarea", { "aria-label": label, spellcheck: "false", placeholder: example });
+    const choose = element("input", { type: "file", accept, "aria-label": `${label}: choose a file` });
     const message = element("p", { role: "alert" });
     const send = async (text) => {
       complain(message, "");
       try { await receive(text); area.value = text; } catch (error) { complain(message, error.message); }
     };
     choose.addEventListener("change", async () => { if (choose.files.length) { await readFile(choose.files[0], area, send); choose.value = ""; } });
-    const drop = element("div.drop", {}, element("p.small", {}, "Drop a TOML file here, choose one, or paste its text below."), choose);
+    const drop = element("div.drop", {}, element("p.small", {}, `Drop a ${what} here, choose one, or paste its text below.`), choose);
     drop.addEventListener("dragover", (event) => { event.preventDefault(); drop.classList.add("over"); });
     drop.addEventListener("dragleave", () => drop.classList.remove("over"));
     drop.addEventListener("drop", async (event) => {

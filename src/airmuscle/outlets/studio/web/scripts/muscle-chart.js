@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { Chart, shortText, roundSteps } = airmuscle;
+  const { Chart, shortText, roundSteps, units } = airmuscle;
   const POINTS = 1000, MAX_RATIO = 8, LABEL_GAP = 15, LABEL_WIDTH = 48;
   const COLOURS = ["c1", "c2", "c3", "c4", "c5", "c6"];
   const DASHES = [[], [8, 5], [2, 4], [], [8, 5], [2, 4]];
@@ -10,7 +10,7 @@
 
   /* Pressures of the isobars [Pa]: round steps over the validity range, or below the greatest rated pressure. */
   function usualPressures(laws) {
-    const highest = Math.max(...laws.map(greatestPressure)), steps = roundSteps(0, highest / 1e5, laws.length > 1 ? 4 : 8).map((b) => b * 1e5);
+    const highest = Math.max(...laws.map(greatestPressure)), { factor } = units.pressure, steps = roundSteps(0, highest / factor, laws.length > 1 ? 4 : 8).map((step) => step * factor);
     return steps.filter((p) => p > 0);
   }
 
@@ -38,6 +38,7 @@
       this.moved = moved;
       this.buffers = [];
       this.lines = [];
+      this.own = [];
       host.tabIndex = 0;
       host.setAttribute("role", "application");
       host.setAttribute("aria-label", this.chart.options.label);
@@ -47,7 +48,7 @@
 
     drag(event) {
       const at = this.chart.valuesAt(event);
-      if (Number.isFinite(at.x) && Number.isFinite(at.y)) this.moved({ contraction: at.x / 100, force: Math.max(0, at.y) });
+      if (Number.isFinite(at.x) && Number.isFinite(at.y)) this.moved({ contraction: at.x / 100, force: Math.max(0, at.y) * units.force.factor });
     }
 
     /* laws with colour numbers; keepAxes: the axes stay as they are, as while a slider moves */
@@ -55,11 +56,19 @@
       this.laws = laws;
       this.active = active;
       this.pressures = pressures;
+      this.setUnits();
       if (!keepAxes || !this.span) this.setSpan();
       this.compute();
       if (!keepAxes || !this.top) this.top = this.greatestForce();
       const low = 100 * this.span[0], high = 100 * this.span[1];
       this.chart.show(this.lines, this.percent, { x: [low, high], y: [0, this.top] });
+    }
+
+    /* The forces of the lines are in the unit of choice. */
+    setUnits() {
+      const label = `force [${units.force.name}]`;
+      if (this.chart.options.y !== label) this.chart.styles = "";
+      this.chart.options.y = label;
     }
 
     setSpan() {
@@ -77,9 +86,10 @@
           const values = this.buffers[this.lines.length] ??= new Array(POINTS);
           law.isobar(pressure, this.grid, values);
           clip(values, this.grid, law.contractionRange);
+          inUnit(values);
           this.lines.push({
             values, colour: COLOURS[k], dash: DASHES[k], width: law === this.active ? 1.8 : 1.4, pressure, law,
-            label: `${law.sheet.name}, ${shortText(pressure / 1e5)} bar`, spanned: !law.program.force,
+            label: `${law.sheet.name}, ${units.text("pressure", pressure)}`, spanned: !law.program.force,
           });
         }
       });
@@ -107,10 +117,24 @@
         if (left > box.left) ctx.fillRect(box.left, box.top, left - box.left, box.height);
         if (right < box.left + box.width) ctx.fillRect(right, box.top, box.left + box.width - right, box.height);
       }
+      this.drawOwn(chart, ctx);
       for (const { x, y, text, colour } of this.labels(chart, box)) chart.write(ctx, text, x, y, chart.colours[colour]);
       const at = this.point;
       if (!at || ![at.contraction, at.force, at.pressure].every(Number.isFinite)) return;
       this.drawPoint(chart, ctx, box, at);
+    }
+
+    /* The points of the user. */
+    drawOwn(chart, ctx) {
+      ctx.lineWidth = 1.5;
+      ctx.strokeStyle = chart.colours.card;
+      ctx.fillStyle = chart.colours.c4;
+      for (const { contraction, force } of this.own) {
+        ctx.beginPath();
+        ctx.arc(chart.px(100 * contraction), chart.py(force / units.force.factor), 4.5, 0, 2 * Math.PI);
+        ctx.fill();
+        ctx.stroke();
+      }
     }
 
     drawPoint(chart, ctx, box, at) {
@@ -119,6 +143,7 @@
       if (this.active.program.force) {
         this.active.isobar(at.pressure, grid, line);
         clip(line, grid, this.active.contractionRange);
+        inUnit(line);
         ctx.beginPath();
         let pen = false;
         for (let i = 0; i < 200; i++) {
@@ -132,7 +157,7 @@
         ctx.setLineDash([]);
         ctx.stroke();
       }
-      const x = chart.px(100 * at.contraction), y = chart.py(at.force);
+      const x = chart.px(100 * at.contraction), y = chart.py(at.force / units.force.factor);
       ctx.setLineDash([4, 4]);
       ctx.lineWidth = 1;
       ctx.strokeStyle = chart.colours.soft;
@@ -148,7 +173,7 @@
       ctx.strokeStyle = chart.colours.card;
       ctx.stroke();
       const left = x > box.left + box.width - 90;
-      chart.write(ctx, `${shortText(at.pressure / 1e5)} bar`, x + (left ? -12 : 12), Math.max(box.top + 16, y - 10), chart.colours.ink, left ? "right" : "left");
+      chart.write(ctx, units.text("pressure", at.pressure), x + (left ? -12 : 12), Math.max(box.top + 16, y - 10), chart.colours.ink, left ? "right" : "left");
     }
 
     /* Pressure at the left end of each isobar of the active law; labels that would overlap are left out. */
@@ -159,7 +184,7 @@
         const i = values.findIndex((v) => v !== null && v <= this.top * 0.95 && v > 0);
         if (i < 0) continue;
         const x = Math.max(box.left + 5, chart.px(this.percent[i]) + 5), y = Math.min(box.top + box.height - 4, chart.py(values[i]) - 4);
-        if (i < POINTS * 0.6 && free(x, Math.max(y, box.top + 13))) found.push({ x, y: Math.max(y, box.top + 13), text: `${shortText(pressure / 1e5)} bar`, colour });
+        if (i < POINTS * 0.6 && free(x, Math.max(y, box.top + 13))) found.push({ x, y: Math.max(y, box.top + 13), text: units.text("pressure", pressure), colour });
       }
       return found;
     }
@@ -169,17 +194,19 @@
       const marks = [], at = this.point;
       for (const { values, law, pressure, colour } of this.lines) {
         const i = values.findIndex((v) => v !== null && v <= this.top * 0.95 && v > 0);
-        if (law === this.active && i >= 0) marks.push({ x: this.percent[i], y: values[i], label: `${shortText(pressure / 1e5)} bar`, colour });
+        if (law === this.active && i >= 0) marks.push({ x: this.percent[i], y: values[i], label: units.text("pressure", pressure), colour });
       }
-      if (at && Number.isFinite(at.force + at.contraction + at.pressure)) marks.push({ x: 100 * at.contraction, y: at.force, dot: true, label: `${shortText(at.pressure / 1e5)} bar, ${shortText(100 * at.contraction)} %, ${shortText(at.force)} N` });
+      if (at && Number.isFinite(at.force + at.contraction + at.pressure)) marks.push({ x: 100 * at.contraction, y: at.force / units.force.factor, dot: true, label: `${units.text("pressure", at.pressure)}, ${shortText(100 * at.contraction)} %, ${units.text("force", at.force)}` });
+      marks.push(...this.own.map((point) => ({ x: 100 * point.contraction, y: point.force / units.force.factor, dot: true })));
       return {
-        title, marks, x: { label: "contraction [%]", range: this.chart.ranges.x }, y: { label: "force [N]", range: this.chart.ranges.y },
+        title, marks, x: { label: "contraction [%]", range: this.chart.ranges.x }, y: { label: `force [${units.force.name}]`, range: this.chart.ranges.y },
         curves: this.lines.map(({ values, colour, dash, width, spanned }) => ({ x: this.percent, y: values, colour, dash, width, spanned })),
       };
     }
 
     csv() {
-      const columns = this.lines.map(({ values, law, pressure }) => ({ heading: `force of ${law.sheet.name} at ${shortText(pressure / 1e3, 6)} kPa [N]`, values }));
+      const { factor } = units.force;
+      const columns = this.lines.map(({ values, law, pressure }) => ({ heading: `force of ${law.sheet.name} at ${shortText(pressure / 1e3, 6)} kPa [N]`, values: values.map((value) => (value === null ? null : value * factor)) }));
       return airmuscle.csvText([{ heading: "contraction [1]", values: this.grid }, ...columns]);
     }
   }
@@ -189,5 +216,10 @@
     for (let i = 0; i < values.length; i++) if (grid[i] < low || grid[i] > high || !(values[i] > -1e12)) values[i] = null;
   }
 
-  Object.assign(airmuscle, { IsobarChart, usualPressures, MUSCLE_COLOURS: COLOURS });
+  function inUnit(values) {
+    const { factor } = units.force;
+    if (factor !== 1) for (let i = 0; i < values.length; i++) if (values[i] !== null) values[i] /= factor;
+  }
+
+  Object.assign(airmuscle, { IsobarChart, usualPressures, MUSCLE_COLOURS: COLOURS, MUSCLE_DASHES: DASHES });
 })();

@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, Law, source, say, download, oncePerFrame } = airmuscle;
+  const { element, Law, source, say, download, oncePerFrame, units } = airmuscle;
   const MOST = 6, FIRST = "dmsp-20-300";
 
   class MuscleTab {
@@ -21,7 +21,7 @@
     get active() { return this.laws[this.activeIndex] ?? this.laws[0]; }
 
     build() {
-      const card = (title, ...children) => element(`section.card${{ "Force over contraction": ".first", "Outline to scale": ".early", Source: ".late" }[title] ?? ""}`, {}, element("h2", {}, title), ...children);
+      const card = (title, ...children) => element(`section.card${{ "Force over contraction": ".first", "Isotonics and stiffness": ".late", "Outline to scale": ".early", Source: ".late" }[title] ?? ""}`, {}, element("h2", {}, title), ...children);
       this.select = element("select", { "aria-label": "Muscle or law of the library" });
       this.select.addEventListener("change", () => this.replaceActive(this.select.value));
       this.list = element("ul.chosen", { "aria-label": "Muscles in the chart" });
@@ -29,8 +29,11 @@
       this.own = airmuscle.textField("Muscle file (TOML)", "Read this muscle", async (text) => { this.add(await source.ownText("law", text), { text }); say("The muscle was read."); });
       this.about = element("div.small");
       this.message = element("p", { role: "alert" });
-      const pointHost = element("div"), chartHost = element("div"), drawingHost = element("div.drawing"), parameterHost = element("div");
-      this.pressureField = element("input.grow", { type: "text", "aria-label": "Pressures of the isobars [bar]", autocomplete: "off" });
+      const pointHost = element("div"), chartHost = element("div"), drawingHost = element("div.drawing"), parameterHost = element("div"), curveHost = element("div"), ownHost = element("div");
+      this.unitSelect = element("select", { "aria-label": "Units" }, ...units.systems.map((system) => element("option", { value: system }, system)));
+      this.unitSelect.addEventListener("change", () => this.chooseUnits(this.unitSelect.value));
+      this.pressureUnit = element("span.soft");
+      this.pressureField = element("input.grow", { type: "text", autocomplete: "off" });
       this.pressureField.addEventListener("change", () => this.readPressures());
       this.pressureMessage = element("p", { role: "alert" });
       this.resetButton = element("button", { type: "button", onclick: () => this.reset() }, "Reset parameters");
@@ -44,15 +47,33 @@
       this.host.append(element("div.columns", {},
         element("div.stack", {},
           card("Muscle", element("div.row", {}, element("div.grow", {}, this.select), this.compare), this.list, this.message, element("details", { hidden: !source.hasServer }, element("summary", {}, "Own muscle file"), this.own)),
-          card("Working point", pointHost), this.parameterCard),
+          card("Working point", element("div.row.small.units", {}, element("span.soft", {}, "Units"), this.unitSelect), pointHost), this.parameterCard),
         element("div.stack.second", {},
-          card("Force over contraction", chartHost, element("div.row.small", {}, element("span.soft", {}, "Isobars [bar]"), this.pressureField, exports), this.pressureMessage),
-          card("Outline to scale", drawingHost), card("Source", this.about))));
+          card("Force over contraction", chartHost, element("div.row.small", {}, this.pressureUnit, this.pressureField, exports), this.pressureMessage, ownHost),
+          card("Outline to scale", drawingHost), card("Isotonics and stiffness", curveHost), card("Source", this.about))));
       this.chart = new airmuscle.IsobarChart(chartHost, (at) => this.dragged(at));
       chartHost.addEventListener("keydown", (event) => this.key(event));
       this.panel = new airmuscle.PointPanel(pointHost, (point, solved, typing) => { this.point = point; this.solved = solved; this.showPoint(typing); });
       this.drawing = new airmuscle.Drawing(drawingHost);
       this.parameters = new airmuscle.ParameterPanel(parameterHost);
+      this.moreCurves = new airmuscle.CurvePanel(curveHost);
+      this.ownPoints = new airmuscle.OwnPoints(ownHost, () => this.active.restingLength, () => { this.curves(false); this.stateChanged(); });
+      this.nameUnits();
+    }
+
+    chooseUnits(system) {
+      units.choose(system);
+      this.nameUnits();
+      this.pressures = null;
+      this.refresh();
+    }
+
+    nameUnits() {
+      const { name } = units.pressure;
+      this.unitSelect.value = units.system;
+      this.pressureUnit.textContent = `Isobars [${name}]`;
+      this.pressureField.setAttribute("aria-label", `Pressures of the isobars [${name}]`);
+      this.panel.nameUnits();
     }
 
     /* Fill the list of the library, then open what the state names. */
@@ -83,6 +104,8 @@
     }
 
     restore(state) {
+      if (state.units) { units.choose(state.units); this.nameUnits(); }
+      this.ownPoints.restore(state.points);
       if (["pressure", "contraction", "force"].includes(state.solved)) this.solved = state.solved;
       for (const name of Object.keys(this.point)) if (Number.isFinite(state.point?.[name])) this.point[name] = state.point[name];
       if (Array.isArray(state.pressures) && state.pressures.length && state.pressures.every((p) => p > 0 && p <= 1e8)) this.pressures = state.pressures.slice(0, 20);
@@ -95,7 +118,7 @@
         return { ...(law.text ? { text: law.text } : { name: law.sheet.name }), values };
       });
       const point = Object.fromEntries(Object.entries(this.point).filter(([, v]) => Number.isFinite(v)));
-      return { muscles, active: this.activeIndex ?? 0, point, solved: this.solved, pressures: this.pressures };
+      return { muscles, active: this.activeIndex ?? 0, point, solved: this.solved, pressures: this.pressures, units: units.system, points: this.ownPoints.state() };
     }
 
     add(sheet, { text, quiet } = {}) {
@@ -166,16 +189,19 @@
 
     curves(keepAxes) {
       const pressures = this.pressures ?? airmuscle.usualPressures(this.laws);
-      if (document.activeElement !== this.pressureField) this.pressureField.value = pressures.map((p) => airmuscle.shortText(p / 1e5)).join("; ");
+      if (document.activeElement !== this.pressureField) this.pressureField.value = pressures.map((p) => airmuscle.shortText(p / units.pressure.factor)).join("; ");
+      this.chart.own = this.ownPoints.points;
       this.chart.show(this.laws, this.active, pressures, keepAxes);
+      this.ownPoints.show(this.laws);
+      this.moreCurves.show(this.laws, this.active, pressures, this.chart.span, this.chart.top * units.force.factor);
     }
 
     readPressures() {
       const values = this.pressureField.value.split(/[;\s]+/).filter(Boolean).map(airmuscle.readNumber);
-      const valid = values.length <= 20 && values.every((v) => v > 0 && v <= 1000);
-      airmuscle.complain(this.pressureMessage, valid ? "" : "Write at most 20 pressures from 0 to 1000 in bar, separated by semicolons; the chart shows the isobars before.", this.pressureField);
+      const valid = values.length <= 20 && values.every((v) => v > 0 && v * units.pressure.factor <= 1e8);
+      airmuscle.complain(this.pressureMessage, valid ? "" : `Write at most 20 pressures from 0 to ${units.text("pressure", 1e8)}, separated by semicolons; the chart shows the isobars before.`, this.pressureField);
       if (!valid) return;
-      this.pressures = values.length ? values.map((v) => v * 1e5) : null;
+      this.pressures = values.length ? values.map((v) => v * units.pressure.factor) : null;
       this.curves(false);
       this.showPoint();
     }
@@ -202,7 +228,7 @@
       else if (this.solved === "force" && move[1]) this.point.pressure = Math.max(0, this.point.pressure + move[1] * step * 2e3);
       else {
         this.point.contraction += move[0] * step * 0.001;
-        this.point.force = Math.max(0, this.point.force + move[1] * step * this.chart.top / 400);
+        this.point.force = Math.max(0, this.point.force + move[1] * step * this.chart.top * units.force.factor / 400);
       }
       this.showPoint();
     }
@@ -228,8 +254,16 @@
     const near = sheet.approximation;
     if (near) rows.push(element("p.message", {}, `${sheet.law} has no closed form. The page shows a polynomial of degree ${near.degree} on its validity range; estimated maximum error ${airmuscle.shortText(near.max_error)} N, root mean square error ${airmuscle.shortText(near.rms_error)} N. airmuscle evaluate ${sheet.name} gives the exact values.`));
     if (sheet.note) rows.push(element("p.soft", {}, sheet.note));
+    rows.push(...permitted(sheet.ratings));
     rows.push(element("ul", {}, ...sheet.references.map((text) => element("li", {}, text))));
     return rows;
+  }
+
+  /* What the maker of a muscle permits. */
+  function permitted(ratings) {
+    const limits = [["max_pressure", "pressure", "pressure up to"], ["max_force", "force", "force up to"], ["max_contraction", "contraction", "contraction up to"], ["max_prestretch", "contraction", "stretch up to"]];
+    const texts = limits.filter(([key]) => Number.isFinite(ratings[key])).map(([key, quantity, words]) => `${words} ${units.text(quantity, ratings[key])}`);
+    return texts.length ? [element("p", {}, `Permitted by the maker: ${texts.join(", ")}.`)] : [];
   }
 
   Object.assign(airmuscle, { MuscleTab });

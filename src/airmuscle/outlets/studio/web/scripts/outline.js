@@ -42,9 +42,9 @@
       parts.push(...scaleBar(length, scale, height));
       this.picture.setAttribute("viewBox", `0 0 ${WIDTH} ${height.toFixed(0)}`);
       this.picture.replaceChildren(...parts);
-      const mm = (value) => `${airmuscle.shortText(1000 * value)} mm`;
-      const radius = now ? `, maximum radius ${mm(widest(now))}` : ", without a geometry (drawn as a bar)";
-      this.text.textContent = `Length ${mm(current)} of ${mm(length)}${radius}. Dashed: at rest.`;
+      const inUnit = (value) => airmuscle.units.text("length", value);
+      const radius = now ? `, maximum radius ${inUnit(widest(now))}` : ", without a geometry (drawn as a bar)";
+      this.text.textContent = `Length ${inUnit(current)} of ${inUnit(length)}${radius}. Dashed: at rest.`;
       this.picture.setAttribute("aria-label", `Outline of the muscle. ${this.text.textContent}`);
     }
 
@@ -61,15 +61,15 @@
     const tip = x + 62;
     return [
       svg("path", { d: `M${x} ${y}H${tip}M${tip - 9} ${y - 6}L${tip} ${y}L${tip - 9} ${y + 6}`, fill: "none", stroke: "var(--accent)", "stroke-width": 2.5 }),
-      svg("text", { x: x + 6, y: y - 10, fill: "var(--ink)", "font-size": 17 }, `${airmuscle.shortText(force)} N`),
+      svg("text", { x: x + 6, y: y - 10, fill: "var(--ink)", "font-size": 17 }, airmuscle.units.text("force", force)),
     ];
   }
 
   function scaleBar(length, scale, height) {
-    const [, step = length] = airmuscle.roundSteps(0, length, 5), x = MARGIN + FITTING, y = height - 18;
+    const { factor } = airmuscle.units.length, [, step = length / factor] = airmuscle.roundSteps(0, length / factor, 5), size = step * factor * scale, x = MARGIN + FITTING, y = height - 18;
     return [
-      svg("path", { d: `M${x} ${y - 5}V${y}H${x + step * scale}V${y - 5}`, fill: "none", stroke: "var(--soft)" }),
-      svg("text", { x: x + step * scale + 8, y: y + 3, fill: "var(--soft)", "font-size": 15 }, `${airmuscle.shortText(1000 * step)} mm`),
+      svg("path", { d: `M${x} ${y - 5}V${y}H${x + size}V${y - 5}`, fill: "none", stroke: "var(--soft)" }),
+      svg("text", { x: x + size + 8, y: y + 3, fill: "var(--soft)", "font-size": 15 }, `${airmuscle.shortText(step)} ${airmuscle.units.length.name}`),
     ];
   }
 
