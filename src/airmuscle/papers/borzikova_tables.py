@@ -90,10 +90,11 @@ def surface_table(curves: PlaneCurves, laws: Laws) -> Table:
     columns = {
         "surface": list(laws),
         **{
-            heading: [_rms_text(each[rows]) for each in errors] for heading, rows in at_load.items()
+            heading: [_rms_text(error[rows]) for error in errors]
+            for heading, rows in at_load.items()
         },
-        "rms error [%]": [_rms_text(each) for each in errors],
-        "maximum error [%]": [f"{100 * np.abs(each).max():.3g}" for each in errors],
+        "rms error [%]": [_rms_text(error) for error in errors],
+        "maximum error [%]": [f"{100 * np.abs(error).max():.3g}" for error in errors],
         EXPLAINED: [f"{index.r_squared:.5g}" for index in indices],
         "index [1]": [None if index.value is None else f"{index.value:.4f}" for index in indices],
     }
@@ -135,7 +136,8 @@ def coefficient_table(curves: PlaneCurves) -> Table:
     """
     exact = curves.interpolate()
     fits = [
-        each.model.coefficients for each in _fit_both(sample(curves), curves.curves[0].saturation)
+        surface_fit.model.coefficients
+        for surface_fit in _fit_both(sample(curves), curves.curves[0].saturation)
     ]
     powers = [
         (i, j) for i in range(exact.pressure_degree + 1) for j in range(exact.force_degree + 1)
@@ -200,10 +202,10 @@ def conditioning_table(data: am.Recording) -> Table:
     designs["Chebyshev polynomials, without the largest load"] = conditioning(
         two_loads, Chebyshev(limits)
     )
-    numbers = [each.condition for each in designs.values()]
+    numbers = [design.condition for design in designs.values()]
     columns: dict[str, Any] = {
         "scaling": list(designs),
-        "rank of 15": [each.rank for each in designs.values()],
+        "rank of 15": [design.rank for design in designs.values()],
     }
     columns["condition number [1]"] = [
         "infinite" if np.isinf(number) else f"{number:.1e}" for number in numbers
@@ -214,19 +216,21 @@ def conditioning_table(data: am.Recording) -> Table:
 def violation_table(laws: Laws) -> Table:
     """Return the regions in which a surface violates monotonicity."""
     by_surface = {name: find_monotonicity_violations(laws[name]) for name in USABLE}
-    found = [(name, each) for name, violations in by_surface.items() for each in violations]
+    violated = [
+        (name, violation) for name, violations in by_surface.items() for violation in violations
+    ]
     columns = {
-        "surface": [name for name, _ in found],
-        "violated constraint": [b.rule.description for _, b in found],
+        "surface": [name for name, _ in violated],
+        "violated constraint": [b.rule.description for _, b in violated],
         "pressure [bar]": [
-            f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in found
+            f"{b.pressure[0] / bar:.2f} to {b.pressure[1] / bar:.2f}" for _, b in violated
         ],
         "force [N]": [
-            f"{b.second_argument[0]:.0f} to {b.second_argument[1]:.0f}" for _, b in found
+            f"{b.second_argument[0]:.0f} to {b.second_argument[1]:.0f}" for _, b in violated
         ],
-        "fraction of the validity range [%]": [f"{100 * b.area_fraction:.1f}" for _, b in found],
-        "worst point [bar]": [f"{b.worst_point[0] / bar:.2f}" for _, b in found],
-        "worst point [N]": [f"{b.worst_point[1]:.0f}" for _, b in found],
+        "fraction of the validity range [%]": [f"{100 * b.area_fraction:.1f}" for _, b in violated],
+        "worst point [bar]": [f"{b.worst_point[0] / bar:.2f}" for _, b in violated],
+        "worst point [N]": [f"{b.worst_point[1]:.0f}" for _, b in violated],
     }
     monotone = ", ".join(name for name, violations in by_surface.items() if not violations)
     return titled("borzikova_breaks", columns, note=f"Without violations: {monotone or 'none'}.")

@@ -199,11 +199,11 @@ def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
 def figure_4(low: Release, high: Release) -> Plot:
     """Return Fig. 4: contraction and acceleration after the release."""
     figure, axes = new_figure(2, 1, height=4.6, sharex=True)
-    for i, one in enumerate((low, high)):
-        label = f"{one.pressure / 1e3:g} kPa (gauge)"
+    for i, released in enumerate((low, high)):
+        label = f"{released.pressure / 1e3:g} kPa (gauge)"
         style = {"color": LINES[i], "linestyle": DASHES[i], "label": label}
-        axes[0].plot(one.run["time"] - RELEASED_AT, one.run["contraction"] * 100, **style)
-        axes[1].plot(one.run["time"] - RELEASED_AT, one.run["acceleration"], **style)
+        axes[0].plot(released.run["time"] - RELEASED_AT, released.run["contraction"] * 100, **style)
+        axes[1].plot(released.run["time"] - RELEASED_AT, released.run["acceleration"], **style)
     axes[0].set_ylabel("contraction [%]")
     axes[1].set(ylabel="acceleration [m/s²]", xlabel="time after the release [s]", xlim=(-0.2, 3.0))
     legend_below(figure, axes[0])

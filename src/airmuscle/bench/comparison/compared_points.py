@@ -122,11 +122,14 @@ def residuals_of_rows(model: Characteristic, rows: EvaluatedRows, max_force: flo
     distinct = list(dict.fromkeys(muscles))
     member = np.array([distinct.index(muscle) for muscle in muscles])[rows.run]
     for i in np.unique(member):
-        own = member == i
+        of_length = member == i
         forces = evaluate_force(
-            law_of_length(model, *distinct[i]), rows.pressure[own], rows.contraction[own], max_force
+            law_of_length(model, *distinct[i]),
+            rows.pressure[of_length],
+            rows.contraction[of_length],
+            max_force,
         )
-        residuals[own] = forces - np.maximum(rows.force[own], 0.0)
+        residuals[of_length] = forces - np.maximum(rows.force[of_length], 0.0)
     return residuals
 
 
@@ -198,10 +201,12 @@ class ComparedPoints:
         slack = 0
         count = int(np.count_nonzero(self.rows.measured))
         for i, (length, _) in enumerate(rows.muscles):
-            own = rows.at(self.rows.measured & (rows.run == i))
+            measured = rows.at(self.rows.measured & (rows.run == i))
             slack += int(
                 np.count_nonzero(
-                    slack_rows(law_of_length(model, length), own.pressure, own.contraction)
+                    slack_rows(
+                        law_of_length(model, length), measured.pressure, measured.contraction
+                    )
                 )
             )
         text = (
@@ -245,9 +250,13 @@ class ComparedPoints:
         ends = np.cumsum([len(run) for run in self.recordings])[:-1]
         parts = zip(self.recordings, np.split(self.fold_of_rows != fold, ends), strict=True)
         try:
-            others = [run if kept.all() else run.rows(kept) for run, kept in parts if kept.any()]
+            parts_used = [
+                run if selected.all() else run.rows(selected)
+                for run, selected in parts
+                if selected.any()
+            ]
             return refit(
-                fit.model, FitPoints.from_recordings(others), loss=loss, fixed=candidate.fixed
+                fit.model, FitPoints.from_recordings(parts_used), loss=loss, fixed=candidate.fixed
             )
         except AirmuscleError as error:
             without = f"without {self.folds[fold]}"

@@ -196,10 +196,10 @@ def _rival(best: _Form, forms: Sequence[_Form], unexplained: _Unexplained) -> st
     """The cause that leaves nearly as little as the best one; empty if none does."""
     if best.name == RUNS:
         return ""
-    others = [form for form in forms if form.name not in (best.name, RUNS)]
-    if not others:
+    rivals = [form for form in forms if form.name not in (best.name, RUNS)]
+    if not rivals:
         return ""
-    second = max(others, key=unexplained.taken_up)
+    second = max(rivals, key=unexplained.taken_up)
     left = unexplained.left_by(best)
     left_by_second = unexplained.left_by(second)
     is_alike = left_by_second <= ALIKE * left
@@ -491,11 +491,11 @@ def _share_of_steps(
 def _steps(recordings: Sequence[Recording], traces: Traces) -> _Steps:
     """The quantity whose steps give the greatest variance of the force."""
     slopes = _slopes(traces)
-    found = []
+    steps_of = []
     for quantity, slope in slopes.items():
         step = max((_step(recording, quantity) for recording in recordings), default=0.0)
-        found.append(_Steps(quantity, (slope * step) ** 2 / 12.0))
-    return max(found, key=lambda steps: steps.variance)
+        steps_of.append(_Steps(quantity, (slope * step) ** 2 / 12.0))
+    return max(steps_of, key=lambda steps: steps.variance)
 
 
 def _step(recording: Recording, quantity: str) -> float:

@@ -35,25 +35,26 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
         return []
     sensors = estimate_sensors(timed)
     greatest = _greatest_force(timed)
-    found = [
+    outliers = [
         (run, outlier)
         for run in timed
         for outlier in find_outliers(run, {"force": sensors["force"]})
         if abs(outlier.value - outlier.expected) > MIN_DISTANCE * greatest
     ]
     rows = sum(map(len, timed))
-    rms = math.sqrt(sum((outlier.value - outlier.expected) ** 2 for _, outlier in found) / rows)
-    if not found or (len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest):
+    rms = math.sqrt(sum((outlier.value - outlier.expected) ** 2 for _, outlier in outliers) / rows)
+    if not outliers or (len(outliers) < MIN_SHARE * rows and rms < MIN_RMS * greatest):
         return []
     files = {run.origin for run in timed}
-    spoilt = {run.origin for run, _ in found}
+    spoilt = {run.origin for run, _ in outliers}
     examples = "; ".join(
-        f"{run.origin}, row {each.row + 1} ({each.value:.4g} N, neighbours {each.expected:.4g} N)"
-        for run, each in found[:3]
+        f"{run.origin}, row {outlier.row + 1} ({outlier.value:.4g} N, neighbours"
+        f" {outlier.expected:.4g} N)"
+        for run, outlier in outliers[:3]
     )
     return [
         HintedText(
-            f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in"
+            f"Suspected outliers of the force pull the law: {len(outliers)} of {rows} rows, in"
             f" {len(spoilt)} of {len(files)} files, which alone give an rms error of {rms:.2g} N"
             f" ({examples}).",
             Hint("To leave them out", "drop_outliers", True, "ColumnMapping"),
@@ -84,19 +85,19 @@ def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
     at_limit = {
         run.origin: run.rows(run["pressure"] >= limit.upper_limit - limit.tolerance) for run in runs
     }
-    held = {
+    saturated = {
         name: run
         for name, run in at_limit.items()
         if len(run) and np.ptp(run["contraction"]) < HELD
     }
-    found = {name: len(run) for name, run in held.items() if np.ptp(run["force"]) > least}
+    rows_of = {name: len(run) for name, run in saturated.items() if np.ptp(run["force"]) > least}
     text = (
         f"The pressure sensor saturates at {limit.upper_limit / 1e3:.4g} kPa, in"
-        f" {sum(found.values())} rows of {file_list([*found])}, where the force still changes: the"
-        " pressure is greater there, and the law takes the limit for it. Leave these rows out, or"
-        " use a sensor of a greater range."
+        f" {sum(rows_of.values())} rows of {file_list([*rows_of])}, where the force still changes:"
+        " the pressure is greater there, and the law takes the limit for it. Leave these rows out,"
+        " or use a sensor of a greater range."
     )
-    return [text] if found else []
+    return [text] if rows_of else []
 
 
 def _greatest_force(recordings: Sequence[Recording]) -> float:

@@ -128,14 +128,16 @@ def match_rows(recordings: Sequence[Recording], *, by_branch: bool = False) -> M
     """The matched runs of recordings with pressure, contraction and force, by specimen; with
     `by_branch` each branch of a run is matched with its other branches of the same direction,
     too."""
-    given = [run for run in recordings if len(run) and all(name in run for name in POINT_COLUMNS)]
-    greatest = max((float(np.nanquantile(run["force"], 0.99)) for run in given), default=0.0)
+    complete = [
+        run for run in recordings if len(run) and all(name in run for name in POINT_COLUMNS)
+    ]
+    greatest = max((float(np.nanquantile(run["force"], 0.99)) for run in complete), default=0.0)
     if not greatest > 0:
         return Matches((), 0.0)
-    names = [specimen_name(run) for run in given]
+    names = [specimen_name(run) for run in complete]
     matched: list[MatchedRuns] = []
     for name in dict.fromkeys(names):
-        members = [run for run, own in zip(given, names, strict=True) if own == name]
+        members = [run for run, specimen in zip(complete, names, strict=True) if specimen == name]
         step = -(-sum(map(len, members)) // MAX_ROWS)
         blocks = [
             block
@@ -211,11 +213,11 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
         pair for pair in zip(blocks, points, strict=True) if "time" not in pair[0].recording
     ]
     within = [
-        _within(block, own, NEIGHBOURS, 1.0)
-        for block, own in without_time
-        if len(own) >= NEIGHBOURS
+        _within(block, scaled, NEIGHBOURS, 1.0)
+        for block, scaled in without_time
+        if len(scaled) >= NEIGHBOURS
     ]
-    matched = [each for each in within if len(each.pairs) >= MIN_MATCHES]
+    matched = [pair for pair in within if len(pair.pairs) >= MIN_MATCHES]
     for i, j in itertools.combinations(range(len(blocks)), 2):
         apart = (limits[i][0] > limits[j][1]).any() or (limits[j][0] > limits[i][1]).any()
         if not apart and blocks[i].direction == blocks[j].direction:
@@ -233,13 +235,13 @@ def _spread(blocks: Sequence[Block]) -> Iterator[MatchedRuns]:
     for block in blocks:
         if "time" not in block.recording:
             parts.setdefault(id(block.recording), []).append(block)
-    for own in parts.values():
+    for group in parts.values():
         joined = [
-            np.concatenate([getattr(block, n) for block in own])
+            np.concatenate([getattr(block, n) for block in group])
             for n in ("rows", "residuals", "slopes")
         ]
         if len(joined[0]) >= MIN_SPREAD_ROWS:
-            block = Block(own[0].recording, joined[0], 0, {}, *joined[1:])
+            block = Block(group[0].recording, joined[0], 0, {}, *joined[1:])
             spread = block.points / np.maximum(np.ptp(block.points, axis=0), 1e-9)
             yield _within(block, spread, SPREAD_NEIGHBOURS, np.inf)
 
@@ -262,12 +264,14 @@ def _nearest_of_fewer(first: Array, second: Array) -> npt.NDArray[np.intp]:
     return _nearest(second, first, 1, 1.0)[:, ::-1]
 
 
-def _nearest(points: Array, others: Array, count: int, reach: float) -> npt.NDArray[np.intp]:
+def _nearest(points: Array, candidates: Array, count: int, reach: float) -> npt.NDArray[np.intp]:
     """Each point (N, 2) with the nearest ones of others within the reach; indices of shape (M,
     2).
     """
     from scipy.spatial import cKDTree
 
-    distance, index = cKDTree(others).query(points, range(1, count + 1), distance_upper_bound=reach)
+    distance, index = cKDTree(candidates).query(
+        points, range(1, count + 1), distance_upper_bound=reach
+    )
     first, place = np.nonzero(np.isfinite(distance))
     return np.column_stack([first, index[first, place]])

@@ -173,21 +173,24 @@ class FitPoints:
         its level. Its noise and its ripple vary in these rows, and its level in repeated runs, but
         do not show how the muscle depends on it."""
         columns = [_columns_at_levels(run) for run in self.recordings]
-        if not any(held.any() for _, each in columns for held in each.values()):
+        if not any(
+            at_level.any() for _, columns_of_run in columns for at_level in columns_of_run.values()
+        ):
             return self.data
         levels: dict[str, Array] = {}
         for name in ("pressure", "contraction"):
-            values, held = (
-                np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True)
+            values, at_level = (
+                np.concatenate([columns_of_run[name] for columns_of_run in part])
+                for part in zip(*columns, strict=True)
             )
-            distinct, member = np.unique(values[held], return_inverse=True)
+            distinct, member = np.unique(values[at_level], return_inverse=True)
             merged = distinct.copy()
             band = RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0))
             for interval in level_intervals(
                 distinct, band
             ):  # those within the band count as the lowest of them
                 merged[interval.rows] = distinct[interval.start]
-            values[held] = merged[member]
+            values[at_level] = merged[member]
             levels[name] = values[~self.missing]
         return self.data.with_columns(**levels)
 
@@ -230,10 +233,10 @@ class FitPoints:
         if censoring is None:
             censoring = default_censoring(law)
             if isinstance(law, ForceLaw):  # the range that the law and the sensor have in common
-                own = censoring
+                stated = censoring
                 sensor = force_limits(self.recordings)
                 censoring = Censoring(
-                    max(own.min_force, sensor.min_force), min(own.max_force, sensor.max_force)
+                    max(stated.min_force, sensor.min_force), min(stated.max_force, sensor.max_force)
                 )
         return make_problem(law, self.data, censoring, weights, fixed)
 
@@ -245,15 +248,15 @@ def _columns_at_levels(
     level, in these rows.
     """
     columns = {name: np.array(recording[name], dtype=float) for name in ("pressure", "contraction")}
-    held = {name: np.zeros(len(recording), dtype=bool) for name in columns}
+    at_level = {name: np.zeros(len(recording), dtype=bool) for name in columns}
     if not np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all():
-        return columns, held
+        return columns, at_level
     bands = {
         "pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)),
         "contraction": 0.01,
     }
     if not any(_may_be_constant(columns[name], band) for name, band in bands.items()):
-        return columns, held
+        return columns, at_level
     names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
     for run in find_runs(recording):
         name = names.get(run.kind)
@@ -264,8 +267,8 @@ def _columns_at_levels(
             and spread(columns[name][rows]) <= bands[name]
         ):
             columns[name][rows] = np.median(columns[name][rows])
-            held[name][rows] = True
-    return columns, held
+            at_level[name][rows] = True
+    return columns, at_level
 
 
 def _may_be_constant(values: Array, band: float) -> bool:

@@ -85,12 +85,14 @@ class Pooling:
         pressure, contraction = self.problem.arguments
         matrix, constant = self._design
         modelled = matrix @ values + constant
-        kept = np.ones(len(modelled), dtype=bool) if rows is None else rows
-        ranges = [(float(x[kept].min()), float(x[kept].max())) for x in (pressure, contraction)]
+        selected = np.ones(len(modelled), dtype=bool) if rows is None else rows
+        ranges = [
+            (float(x[selected].min()), float(x[selected].max())) for x in (pressure, contraction)
+        ]
         surface = self.effect.with_validity_range(*ranges)
-        decay = 1.0 / (DECAY_RANGE * max(float(np.max(problem.data["force"][kept])), 1e-9))
+        decay = 1.0 / (DECAY_RANGE * max(float(np.max(problem.data["force"][selected])), 1e-9))
         basis = _decayed(np.array(surface.basis(pressure, contraction)).T, modelled, decay)
-        used = problem.active_rows(modelled) & kept
+        used = problem.active_rows(modelled) & selected
         weights = np.where(used, problem.weights, 0.0)  # no sum changes with a row of zeros
         members = self.specimens.member, len(self.specimens.names)
         rest = problem.target - modelled
@@ -109,29 +111,32 @@ class Pooling:
             return predicted
         limited = []
         for i, start in enumerate(effects.coefficients):
-            own = kept & (self.specimens.member == i)
+            of_specimen = selected & (self.specimens.member == i)
             measured = BoundedRows(
-                basis[own], rest[own], problem.censoring[own], problem.weights[own]
+                basis[of_specimen],
+                rest[of_specimen],
+                problem.censoring[of_specimen],
+                problem.weights[of_specimen],
             )
-            bounds = self._slack_region(i, predicted, values, kept)
+            bounds = self._slack_region(i, predicted, values, selected)
             joined = BoundedRows(*map(np.concatenate, zip(measured, bounds, strict=True)))
             limited.append(bounded_coefficients(joined, ratio, start))
         effects = dataclasses.replace(effects, coefficients=np.array(limited))
         return predicted._replace(effects=effects)
 
     def _slack_region(
-        self, index: int, predicted: PredictedEffects, values: Array, kept: Rows
+        self, index: int, predicted: PredictedEffects, values: Array, selected: Rows
     ) -> BoundedRows:
         """The bounds in the slack region of one specimen, which weigh together as much as its
         rows.
         """
         problem = self.problem
-        own = kept & (self.specimens.member == index)
+        of_specimen = selected & (self.specimens.member == index)
         surface = predicted.surface
-        pressure, contraction = (x[own] for x in problem.arguments)
-        side = problem.censoring[own]
-        weights = problem.weights[own]
-        force = problem.data["force"][own]
+        pressure, contraction = (x[of_specimen] for x in problem.arguments)
+        side = problem.censoring[of_specimen]
+        weights = problem.weights[of_specimen]
+        force = problem.data["force"][of_specimen]
         pulls = (side == 0) & (force > PULL_RATIO * predicted.effects.sigma)
         steps = Slackness.of(pressure, contraction, side > 0, pulls)
         region = steps.region(surface.min_pressure, surface.max_contraction)
@@ -249,7 +254,9 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
         recording=data,
         effects=effects,
         sigma=effects.sigma,
-        estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
+        estimates=tuple(
+            dataclasses.replace(estimate, stderr=error) for estimate, error in estimates
+        ),
         correlations=normalised(covariance.matrix[:count, :count]),
         **goodness_of_fit(population.problem, modelled, data),
     )

@@ -308,16 +308,16 @@ class StateEstimator(ShortRepr, abc.ABC):
         """The estimate after the values that are not missing, and their innovation. Raises
         SolveError for an infinite value.
         """
-        given = np.asarray(values, dtype=float)
-        if np.isinf(given).any():
+        readings = np.asarray(values, dtype=float)
+        if np.isinf(readings).any():
             raise SolveError(
                 f"{type(self).__name__}: the measured values must be finite, or NaN where one is"
                 f" missing; {', '.join(self.measured)} are {values}."
             )
-        here = ~np.isnan(given)
+        here = ~np.isnan(readings)
         bound = self._filled(estimate, inputs)
         # a missing value counts with a variance beside which nothing is known
-        bound.values[:] = np.where(here, given, 0.0)
+        bound.values[:] = np.where(here, readings, 0.0)
         bound.variances[:] = np.where(here, 1.0, UNKNOWN) * self.variances
         status = bound.correct()
         innovation = Innovation(
@@ -341,11 +341,11 @@ class StateEstimator(ShortRepr, abc.ABC):
         `rejected` is 1 in the rows that it has rejected. Raises ParameterError for other times.
         """
         rows = self.rows(recording)
-        passes = [each for each in self._passes(rows, first) if each.row is not None]
+        passes = [step for step in self._passes(rows, first) if step.row is not None]
         return {
             "time": rows.time,
-            **self.table(np.array([each.corrected.mean for each in passes]), rows.held),
-            **self.rejected_rows(rows, [each.corrected is each.predicted for each in passes]),
+            **self.table(np.array([step.corrected.mean for step in passes]), rows.held),
+            **self.rejected_rows(rows, [step.corrected is step.predicted for step in passes]),
         }
 
     def rejected_rows(self, rows: MeasuredRows, rejected: Sequence[bool]) -> dict[str, Array]:
@@ -406,14 +406,14 @@ class StateEstimator(ShortRepr, abc.ABC):
     def _passes(self, rows: MeasuredRows, first: StateEstimate) -> Iterator[Pass]:
         """Prediction and correction of every sample, also of those without a row."""
         predicted = first
-        for k, held in enumerate(rows.held):
+        for k, inputs in enumerate(rows.held):
             for lost in range(rows.counts[k - 1] - 1 if k else 0, -1, -1):
                 before = predicted
-                predicted = self.predict(before, held) if k else first
+                predicted = self.predict(before, inputs) if k else first
                 if lost:
-                    yield Pass(None, predicted, predicted, held)
-            corrected, _ = self.correct(predicted, rows.measured[k], held)
-            yield Pass(k, predicted, corrected, held)
+                    yield Pass(None, predicted, predicted, inputs)
+            corrected, _ = self.correct(predicted, rows.measured[k], inputs)
+            yield Pass(k, predicted, corrected, inputs)
             predicted = corrected
 
     def table(self, means: Array, inputs: Array) -> dict[str, Array]:

@@ -113,8 +113,8 @@ def frequency_grid(model: SampledModel) -> Array:
     near = np.array(
         [f * (1.0 + part) for f in turns if f > grid[0] for part in np.linspace(-0.02, 0.02, 21)]
     )
-    found = np.unique(np.concatenate([grid, near]))
-    return found[(found > 0) & (found <= top)]
+    frequencies = np.unique(np.concatenate([grid, near]))
+    return frequencies[(frequencies > 0) & (frequencies <= top)]
 
 
 def loop_margins(opened: SampledModel) -> Margins:
@@ -188,10 +188,10 @@ def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> 
     i = int(np.argmin(distances))
     low = grid[max(i - 1, 0)]
     high = grid[min(i + 1, grid.size - 1)]
-    found = minimize_scalar(
+    search = minimize_scalar(
         function, bounds=(low, high), method="bounded", options={"xatol": 1e-12 * high}
     )
-    best, where = min((float(found.fun), float(found.x)), (float(distances[i]), float(grid[i])))
+    best, where = min((float(search.fun), float(search.x)), (float(distances[i]), float(grid[i])))
     return (math.inf if best == 0 else 1.0 / best), where
 
 
@@ -422,11 +422,11 @@ def linearise_loop(
             " of its samples."
         )
     present = control_state.applied_inputs if control_state else ()
-    given = {
+    inputs_at_rest = {
         **dict(zip((i.name for i in plant.input_variables), present, strict=False)),
         **(inputs or {}),
     }
-    model = linearise(plant, state, given)
+    model = linearise(plant, state, inputs_at_rest)
     loop.check_columns(model.outputs, model.inputs)
     drift = _drift(model)
     _check_rest(plant, model, drift)
@@ -436,7 +436,7 @@ def linearise_loop(
         return LinearLoop(selected, (law.linear_law(),), loop.sample_time, drift)
     columns = model.output_values
     measured = [columns[name] for name in law.measured_columns]
-    nominal = {each.name: abs(each.nominal) for each in plant.states}
+    nominal = {state_variable.name: abs(state_variable.nominal) for state_variable in plant.states}
     sizes = [max(abs(columns[name]), nominal.get(name, 1e-3)) for name in law.measured_columns]
     limits = np.array(list(loop.command_ranges(plant).values()))
     memory = law.initial_memory if control_state is None else control_state.controller
@@ -491,7 +491,10 @@ def _drift(model: LinearModel) -> dict[str, float]:
 
 def _check_rest(plant: System, model: LinearModel, drift: Mapping[str, float]) -> None:
     """Raise ParameterError for a state that moves: it has no margins."""
-    permitted = {each.name: REST_TOLERANCE * abs(each.nominal) for each in plant.states}
+    permitted = {
+        state_variable.name: REST_TOLERANCE * abs(state_variable.nominal)
+        for state_variable in plant.states
+    }
     name = max(drift, key=lambda state: drift[state] / permitted[state], default="")
     if name and not drift[name] <= permitted[name]:
         unit = model.units[name]

@@ -61,8 +61,8 @@ class LoopComparison(Reported):
         values = list[float]()
         for plant in self.plants:
             metrics = self.runs[RunName(loop, plant.name)].metrics
-            found = math.inf if metrics is None else getattr(metrics, metric)
-            values.append(found[column] if isinstance(found, Mapping) else float(found))
+            value = math.inf if metrics is None else getattr(metrics, metric)
+            values.append(value[column] if isinstance(value, Mapping) else float(value))
         return np.array(values)
 
     def ratios(self) -> dict[str, Array]:
@@ -206,29 +206,29 @@ class LoopComparison(Reported):
     def margin_table(self) -> Table:
         """Margins of each loop at the end of its nominal run, or why there are none."""
         rows = [
-            (name, found)
+            (name, opened)
             for name in self.names
-            for found in self.runs[RunName(name, self.plants[0].name)].margins
+            for opened in self.runs[RunName(name, self.plants[0].name)].margins
         ]
-        margins = [found.margins for _, found in rows]
+        margins = [opened.margins for _, opened in rows]
 
         def column(field: str) -> list[float | None]:
-            return [None if found is None else getattr(found, field) for found in margins]
+            return [None if opened is None else getattr(opened, field) for opened in margins]
 
         return Table(
             "margins",
             "Margins",
             {
                 "controller": [name for name, _ in rows],
-                "opened at": [found.column for _, found in rows],
+                "opened at": [opened.column for _, opened in rows],
                 "gain margin": TableColumn(column("gain"), "1"),
                 "phase margin": TableColumn(column("phase"), "rad", "deg"),
                 "delay margin": TableColumn(column("delay"), "s", "ms"),
                 "sensitivity peak": TableColumn(column("peak"), "1"),
-                "remark": TableColumn([found.reason for _, found in rows], brief=False),
+                "remark": TableColumn([opened.reason for _, opened in rows], brief=False),
             },
             "At the end of the nominal run, or at the equilibrium at its last pressures.",
-            brief=[i for i, found in enumerate(margins) if found is not None][:MAX_BRIEF],
+            brief=[i for i, opened in enumerate(margins) if opened is not None][:MAX_BRIEF],
         )
 
     def order_table(self) -> Table | None:
@@ -331,18 +331,18 @@ class LoopComparison(Reported):
     def _order_sentence(self, names: Sequence[str]) -> str:
         """Which controller has the smallest error, by how much, and on how many plants."""
         ratios = self.ratios()
-        best, other = names[:2]
-        better = int((ratios[best][0] < ratios[other][0]).sum())
-        factor = float(np.median(ratios[other][0] / ratios[best][0]))
+        best, second = names[:2]
+        better = int((ratios[best][0] < ratios[second][0]).sum())
+        factor = float(np.median(ratios[second][0] / ratios[best][0]))
         count = counted(len(self.plants), "plant")
         errors = "rms error" if len(self.columns) == 1 else "rms errors"
         if not factor > 1.0 + ABOUT_EQUAL:
             return (
-                f"{best} and {other} have about the same {errors}: the ratio is {factor:.3g} in the"
-                f" median, and {best} has the smaller one on {better} of {count}."
+                f"{best} and {second} have about the same {errors}: the ratio is {factor:.3g} in"
+                f" the median, and {best} has the smaller one on {better} of {count}."
             )
         return (
-            f"{best} has the smallest {errors}: those of {other}, the next one, are"
+            f"{best} has the smallest {errors}: those of {second}, the next one, are"
             f" {factor:.3g} times as large in the median, and larger on {better} of {count}."
         )
 

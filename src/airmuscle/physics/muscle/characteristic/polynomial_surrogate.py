@@ -181,17 +181,17 @@ def estimate_maximum(error: _Error, values: Array, nodes: Array) -> float:
     dx, dy = (offset.reshape(-1) for offset in np.meshgrid(_OFFSETS, _OFFSETS))
     for _ in range(_REFINEMENTS):
         near = [np.clip(at[:, None] + step * d, -1.0, 1.0) for at, d in ((x, dx), (y, dy))]
-        found = np.nan_to_num(error(near[0].reshape(-1), near[1].reshape(-1)), nan=-1.0).reshape(
+        errors = np.nan_to_num(error(near[0].reshape(-1), near[1].reshape(-1)), nan=-1.0).reshape(
             near[0].shape
         )
         row = np.arange(len(x))
-        column = found.argmax(axis=1)
-        better = found[row, column] > best
+        column = errors.argmax(axis=1)
+        better = errors[row, column] > best
         x, y = (
             np.where(better, points[row, column], at)
             for points, at in zip(near, (x, y), strict=True)
         )
-        best = np.maximum(best, found[row, column])
+        best = np.maximum(best, errors[row, column])
         step /= 3.0
     return float(best.max())
 
@@ -210,14 +210,14 @@ def _edges(error: _Error, values: Array, nodes: Array) -> list[tuple[Array, Arra
     x, y and error.
     """
     y, x = np.meshgrid(nodes, nodes, indexing="ij")
-    found = []
-    for one, other in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        for inside, outside in ((one, other), (other, one)):
+    edges = []
+    for first, second in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+        for inside, outside in ((first, second), (second, first)):
             at_edge = np.isfinite(values[inside]) & np.isnan(values[outside])
             if at_edge.any():
                 limits = [(v[inside][at_edge], v[outside][at_edge]) for v in (x, y)]
-                found.append(_bisect(error, values[inside][at_edge], *limits))
-    return found
+                edges.append(_bisect(error, values[inside][at_edge], *limits))
+    return edges
 
 
 def _bisect(
