@@ -84,8 +84,8 @@ def select_for_both(
         recordings, candidates, SPLITS, loss=loss, workers=workers, progress=progress
     )
     rankings = [
-        {model.candidate.name: model for model in eligible_models(each.ranking)}
-        for each in comparisons
+        {model.candidate.name: model for model in eligible_models(comparison.ranking)}
+        for comparison in comparisons
     ]
     names = [name for name in rankings[0] if all(name in ranking for ranking in rankings)]
     if not names:
@@ -106,11 +106,11 @@ def select_for_both(
     )[0]
     limit = max(1 + MAX_JOINT_EXCESS, *ratios(best))
     within = [name for name in names if max(ratios(name)) <= limit]
-    for each in (
+    for ranking in (
         rankings
     ):  # not worse by more than one standard error, nor contradicted by the rows of the fit
-        not_worse = [name for name in within if excess_error(each[name], each[best]) <= 0]
-        within = [name for name in not_worse if not is_contradicted(each[name], each[best])]
+        not_worse = [name for name in within if excess_error(ranking[name], ranking[best]) <= 0]
+        within = [name for name in not_worse if not is_contradicted(ranking[name], ranking[best])]
     chosen = min(within, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
     models = tuple(ranking[chosen] for ranking in rankings)
     opening = recommendation("all purposes", models[0], list(rankings[0].values()))

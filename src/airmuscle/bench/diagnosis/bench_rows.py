@@ -122,12 +122,12 @@ SINGULAR = 1e-9
 @remembered
 def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
     """The complete rows of the recordings that have all three quantities."""
-    given = recordings_with(recordings, *BenchRows._fields)
-    columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
+    measured = recordings_with(recordings, *BenchRows._fields)
+    columns = [np.concatenate([[], *(run[name] for run in measured)]) for name in BenchRows._fields]
     complete = np.isfinite(np.sum(columns, axis=0))
     if complete.size:  # at its upper limit, the force sensor states a bound only
         sensor = estimate_sensors(
-            [Recording({"force": each["force"]}, each.origin) for each in given]
+            [Recording({"force": recording["force"]}, recording.origin) for recording in measured]
         )["force"]
         complete &= columns[2] < sensor.upper_limit - sensor.tolerance
     return BenchRows(*(column[complete] for column in columns))
@@ -138,7 +138,7 @@ def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
     contraction, up to the shortest length. Drift and friction of a run, which returns, are in the
     mean of each step of the contraction.
     """
-    found = []
+    plateaus = []
     for recording in recordings_with(recordings, *BenchRows._fields):
         run = bench_rows([recording])
         if run.force.size < MIN_ROWS or np.ptp(run.pressure) > CONSTANT_PRESSURE * np.max(
@@ -152,9 +152,12 @@ def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
         flat = np.count_nonzero(
             np.logical_and.accumulate((counts > 0) & (np.abs(means - means[0]) < change))
         )
-        found += [run.at(step < flat)] if flat >= MIN_STEPS else []
+        plateaus += [run.at(step < flat)] if flat >= MIN_STEPS else []
     return BenchRows(
-        *(np.concatenate([np.zeros(0), *(getattr(e, n) for e in found)]) for n in BenchRows._fields)
+        *(
+            np.concatenate([np.zeros(0), *(getattr(e, n) for e in plateaus)])
+            for n in BenchRows._fields
+        )
     )
 
 

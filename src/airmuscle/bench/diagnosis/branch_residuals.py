@@ -158,7 +158,7 @@ def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[f
     low = float(np.min(pressure))
     high = float(pressure[top])
     edges = np.linspace(low + 0.2 * (high - low), high - 0.1 * (high - low), LOOP_BINS + 1)
-    found = []
+    delays = []
     for a, b in itertools.pairwise(edges):
         sides = [
             _line(time, pressure, force, part, a, b) for part in (slice(0, top), slice(top, None))
@@ -168,8 +168,8 @@ def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[f
         width = sides[1][0] - sides[0][0]
         change = abs(sides[0][1]) + abs(sides[1][1])
         if change > 0:
-            found.append((width / change, width))
-    return tuple(np.median(found, axis=0).tolist()) if len(found) >= LOOP_BINS // 2 else None
+            delays.append((width / change, width))
+    return tuple(np.median(delays, axis=0).tolist()) if len(delays) >= LOOP_BINS // 2 else None
 
 
 def _line(
@@ -220,11 +220,11 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
     differences: list[
         float
     ] = []  # median residual of inflating or contracting rows minus that of the others
-    for run, own in zip(runs, residuals, strict=True):
+    for run, of_run in zip(runs, residuals, strict=True):
         known, direction, bins, _ = _branch_bins(run)
         if not direction.any():
             continue
-        values = own[known]
+        values = of_run[known]
         used = np.isfinite(values) & (direction != 0)
         cell = 2 * bins[used] + (direction[used] > 0)
         counts = np.bincount(cell, minlength=2 * BINS)
@@ -302,7 +302,7 @@ def _branch_bins(run: Recording) -> _BranchBins:
     known = np.isfinite(run["pressure"])
     complete = run if known.all() else run.rows(known)
     branches = tuple(
-        each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS
+        branch for branch in find_branches(complete) if len(branch.interval) >= MIN_BRANCH_ROWS
     )
     if len({branch.direction for branch in branches}) < 2:
         return known, np.zeros(0), np.zeros(0, dtype=np.intp), ""

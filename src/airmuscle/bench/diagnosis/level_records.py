@@ -70,14 +70,14 @@ class LevelRecord(Reported):
 
     def chapter(self) -> Chapter:
         """The description of the record: one quantity for each value."""
-        held = "contraction" if self.kind == "isometric" else "pressure"
-        units = ("1", "%") if held == "contraction" else ("Pa", "kPa")
+        constant = "contraction" if self.kind == "isometric" else "pressure"
+        units = ("1", "%") if constant == "contraction" else ("Pa", "kPa")
         return Chapter(
             "level-record",
             f"{self.origin}, {self.kind}",
             "The line through the rows that pull, the distance of the branches, and the noise; a"
             " law needs records at three levels or more.",
-            values=(NamedValue(held, self.level, *units), *self.values()),
+            values=(NamedValue(constant, self.level, *units), *self.values()),
         )
 
     def values(self) -> tuple[NamedValue, ...]:
@@ -126,11 +126,11 @@ def level_record(recording: Recording) -> LevelRecord | None:
         return None
     threshold = float(-intercept / slope)
     low, high = limits(swept)
-    held = rows.contraction if held_length else rows.pressure
+    constant = rows.contraction if held_length else rows.pressure
     return LevelRecord(
         origin=recording.origin,
         kind=kind,
-        level=float(np.median(held)),
+        level=float(np.median(constant)),
         threshold=threshold,
         is_reached=low <= threshold <= high,
         slope=float(slope),
@@ -165,10 +165,12 @@ def level_tables(recordings: Sequence[Recording]) -> tuple[Table, ...]:
     tables = []
     for kind, swept in _SWEPT.items():
         records = [result for result in results if result.kind == kind]
-        held = _SWEPT["isobaric" if kind == "isometric" else "isometric"]
+        constant = _SWEPT["isobaric" if kind == "isometric" else "isometric"]
         columns: dict[str, Any] = {
             "record": [result.origin for result in records],
-            held.column: TableColumn([result.level for result in records], held.unit, held.shown),
+            constant.column: TableColumn(
+                [result.level for result in records], constant.unit, constant.shown
+            ),
             swept.vanishing: TableColumn(
                 [result.threshold for result in records], swept.unit, swept.shown, short="threshold"
             ),

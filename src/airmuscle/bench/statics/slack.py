@@ -62,15 +62,15 @@ class Slackness(NamedTuple):
         """Pressure [Pa] up to which a slack row shows the muscle to be slack; -inf where none
         does.
         """
-        found = np.searchsorted(self.slack_contraction, contraction, side="right")
-        return np.asarray(np.append(-np.inf, self.slack_pressure)[found])
+        place = np.searchsorted(self.slack_contraction, contraction, side="right")
+        return np.asarray(np.append(-np.inf, self.slack_pressure)[place])
 
     def pull_limit(self, contraction: Array) -> Array:
         """Pressure [Pa] from which a measured force shows the muscle to pull; inf where none
         does.
         """
-        found = np.searchsorted(self.pull_contraction, -contraction, side="right")
-        return np.asarray(np.append(np.inf, self.pull_pressure)[found])
+        place = np.searchsorted(self.pull_contraction, -contraction, side="right")
+        return np.asarray(np.append(np.inf, self.pull_pressure)[place])
 
     def region(
         self,
@@ -140,11 +140,11 @@ def slack_pull(
     judged = np.zeros(force.size, dtype=bool)
     specimens = np.zeros(force.size) if specimen is None else specimen
     for name in np.unique(specimens):
-        own = specimens == name
-        p = pressure[own]
-        c = contraction[own]
-        f = force[own]
-        judged[own] = (f <= 0) & (p < Slackness.of(p, c, f <= 0, f > limit).pull_limit(c))
+        of_specimen = specimens == name
+        p = pressure[of_specimen]
+        c = contraction[of_specimen]
+        f = force[of_specimen]
+        judged[of_specimen] = (f <= 0) & (p < Slackness.of(p, c, f <= 0, f > limit).pull_limit(c))
     if not judged.any():
         return SlackPull(count, 0, limit, 0.0)
     worst = int(np.argmax(np.where(judged, modelled, -np.inf)))

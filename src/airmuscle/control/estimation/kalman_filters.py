@@ -79,14 +79,14 @@ class ExtendedKalmanFilter(StateEstimator):
                 / scale
             )
             means.append(now.corrected.mean + now.corrected.covariance @ f.T @ moved)
-        kept = [
-            mean for mean, each in zip(reversed(means), passes, strict=True) if each.row is not None
+        means_of_rows = [
+            mean for mean, step in zip(reversed(means), passes, strict=True) if step.row is not None
         ]
-        measured = [each for each in passes if each.row is not None]
+        measured = [step for step in passes if step.row is not None]
         return {
             "time": rows.time,
-            **self.table(np.array(kept), rows.held),
-            **self.rejected_rows(rows, [each.corrected is each.predicted for each in measured]),
+            **self.table(np.array(means_of_rows), rows.held),
+            **self.rejected_rows(rows, [step.corrected is step.predicted for step in measured]),
         }
 
     def _kernels(self, at: SimpleNamespace) -> tuple[Any, Any]:

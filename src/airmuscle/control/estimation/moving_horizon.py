@@ -105,8 +105,10 @@ class MovingHorizonEstimator(ShortRepr):
         arrival = window.arrival
         noise = window.noise
         if len(samples) > self.horizon:
-            (held, measured), (later, _) = samples[:2]
-            corrected, _ = self.filter.corrected_by_all(arrival, measured.tolist(), held.tolist())
+            (applied, measured), (later, _) = samples[:2]
+            corrected, _ = self.filter.corrected_by_all(
+                arrival, measured.tolist(), applied.tolist()
+            )
             arrival = self.filter.predict(corrected, later.tolist())
             samples = samples[1:]
             noise = np.zeros(0)
@@ -138,8 +140,8 @@ class MovingHorizonEstimator(ShortRepr):
         windows = [window]
         none = np.full(len(self.filter.measured), np.nan)
         for count, values, held in zip(rows.counts, rows.measured[1:], rows.held[1:], strict=True):
-            for each in (*[none] * (count - 1), values):
-                window = self.update(window, each, held)
+            for readings in (*[none] * (count - 1), values):
+                window = self.update(window, readings, held)
             windows.append(window)
         rejected = [
             bool(np.isnan(window.samples[-1][1]).all() and np.isfinite(values).any())
@@ -147,7 +149,7 @@ class MovingHorizonEstimator(ShortRepr):
         ]
         return {
             "time": rows.time,
-            **self.filter.table(np.array([self.mean(each) for each in windows]), rows.held),
+            **self.filter.table(np.array([self.mean(window) for window in windows]), rows.held),
             **self.filter.rejected_rows(rows, rejected),
         }
 

@@ -157,13 +157,13 @@ class GaussianResidual:
         count = len(self.energies)
         joints = len(self.angle_scales)
         wanted = (len(self.pressures), count * (joints + len(self.pressures)), count * joints)
-        found = (len(self.pressure_scales), len(self.centres), len(self.friction_logs))
-        if found != wanted or not count:
+        sizes = (len(self.pressure_scales), len(self.centres), len(self.friction_logs))
+        if sizes != wanted or not count:
             raise ParameterError(
                 f"GaussianResidual: {count} energies, {joints} angle_scales and"
                 f" {len(self.pressures)} pressures need {wanted[0]} pressure_scales, {wanted[1]}"
-                f" centres and {wanted[2]} friction_logs; there are {found[0]}, {found[1]} and"
-                f" {found[2]}."
+                f" centres and {wanted[2]} friction_logs; there are {sizes[0]}, {sizes[1]} and"
+                f" {sizes[2]}."
             )
 
     def evaluate(self, angles: Sequence[Value], q: Values) -> tuple[list[Value], list[Value]]:
@@ -267,19 +267,19 @@ class WithStickSlip(ForceWrapper):
 
     @property
     def inner_states(self) -> tuple[StateVariable, ...]:
-        own = (
+        bristles = (
             StateVariable(_bristle(c), "1", 1.0, f"bristle of the friction of {c.name}")
             for c in self._angles
         )
-        return (*self.inner.inner_states, *own)
+        return (*self.inner.inner_states, *bristles)
 
     def inner_rates(self, q: Values, v: Values, forces: Values) -> dict[str, Value]:
         joints = zip(self._angles, self.elements, strict=True)
-        own = {
+        rates = {
             _bristle(c): element.bristle_rate(q.get(_bristle(c), 0.0), v[c.speed])
             for c, element in joints
         }
-        return {**self.inner.inner_rates(q, v, forces), **own}
+        return {**self.inner.inner_rates(q, v, forces), **rates}
 
     def generalised_forces(
         self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
@@ -311,8 +311,8 @@ class WithStickSlip(ForceWrapper):
         """Friction torque [N m] of a joint, from 0, by its bearing, at the accelerations of the
         other joints.
         """
-        others = {**accelerations, self._angles[joint].name: 0.0}
-        forces = cast(SerialArm, self.inner).bearing_force(joint, q, v, others)
+        without_joint = {**accelerations, self._angles[joint].name: 0.0}
+        forces = cast(SerialArm, self.inner).bearing_force(joint, q, v, without_joint)
         return sum(
             r * force for r, force in zip(self.elements[joint].bearing_arms, forces, strict=False)
         )
