@@ -204,10 +204,7 @@ def score_candidates(
     `can_exclude` the laws that are not linear in all parameters, whose fits take longest, are
     scored last, and not cross-validated further where they cannot be recommended. The scores do not
     depend on the number of workers."""
-    late = []
-    if can_exclude:
-        late = [i for i, law in enumerate(candidates) if max_excess(law) < float("inf")]
-    early = [i for i in range(len(candidates)) if i not in late]
+    early, late = _early_and_late(candidates, can_exclude=can_exclude)
     scores_of: dict[int, tuple[Score, ...]] = {}
     with process_pool(workers, one_thread_each=True) as pool:
         if pool is not None:
@@ -227,6 +224,16 @@ def score_candidates(
     if progress is not None:
         progress("", 1.0)
     return [scores_of[i] for i in range(len(candidates))]
+
+
+def _early_and_late(
+    candidates: Sequence[Candidate], *, can_exclude: bool
+) -> tuple[list[int], list[int]]:
+    """The candidates that are scored first, and those that may then be excluded."""
+    late = []
+    if can_exclude:
+        late = [i for i, law in enumerate(candidates) if max_excess(law) < float("inf")]
+    return [i for i in range(len(candidates)) if i not in late], late
 
 
 def _lowest_errors(scores_of: Sequence[tuple[Score, ...]]) -> list[float]:

@@ -158,14 +158,12 @@ def is_contradicted(model: RankedModel, best: RankedModel) -> bool:
 
 def excess_error(model: RankedModel, best: RankedModel) -> float:
     """Difference of the mean square errors [N^2], minus one standard error of it over the folds."""
-    difference = np.array(
-        [a.rmse**2 - b.rmse**2 for a, b in zip(model.fold_scores, best.fold_scores, strict=True)]
-    )
+    folds = zip(model.fold_scores, best.fold_scores, strict=True)
+    difference = np.array([score.rmse**2 - of_best.rmse**2 for score, of_best in folds])
     rows = np.array([score.rows for score in best.fold_scores], dtype=float)
     mean = float(np.average(difference, weights=rows))
-    spread = float(
-        np.sqrt(np.average((difference - mean) ** 2, weights=rows) / max(difference.size - 1, 1))
-    )
+    variance = np.average((difference - mean) ** 2, weights=rows)
+    spread = float(np.sqrt(variance / max(difference.size - 1, 1)))
     excess = mean - spread
     return excess if abs(excess) > TIE * best.cross_validated_rmse**2 else 0.0
 

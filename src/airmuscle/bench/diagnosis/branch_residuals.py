@@ -304,7 +304,8 @@ def _branch_bins(run: Recording) -> _BranchBins:
     branches = tuple(
         branch for branch in find_branches(complete) if len(branch.interval) >= MIN_BRANCH_ROWS
     )
-    if len({branch.direction for branch in branches}) < 2:
+    directions = {branch.direction for branch in branches}
+    if len(directions) < 2:
         return known, np.zeros(0), np.zeros(0, dtype=np.intp), ""
     column = branches[0].column
     driven = complete[column]

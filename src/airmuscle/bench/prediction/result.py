@@ -211,22 +211,24 @@ def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
     """Return the errors of every quantity of every record, beside those of the baselines."""
     quantities = [quantity for prediction in predictions for quantity in prediction.quantities]
     records = [prediction for prediction in predictions for _ in prediction.quantities]
-    names = [quantity.name for quantity in quantities]
+
+    def all_of(name: str) -> list[Any]:
+        return [getattr(quantity, name) for quantity in quantities]
+
+    names = all_of("name")
     columns: dict[str, Any] = {
         "record": [prediction.origin for prediction in records],
         "quantity": names,
         "rows": [int(quantity.compared.sum()) for quantity in quantities],
-        "rms error": TableColumn([quantity.rms for quantity in quantities], BY_ROW),
-        "maximum error": TableColumn([quantity.max_error for quantity in quantities], BY_ROW),
+        "rms error": TableColumn(all_of("rms"), BY_ROW),
+        "maximum error": TableColumn(all_of("max_error"), BY_ROW),
         "in row": TableColumn([quantity.worst_row + 1 for quantity in quantities], brief=False),
         "half width of the 95 % band": TableColumn(
-            [quantity.median_half_width for quantity in quantities], BY_ROW, short="95 % band ±"
+            all_of("median_half_width"), BY_ROW, short="95 % band ±"
         ),
         "unit": unit_column(names),
         **_baseline_columns(predictions),
-        "rows within the band": TableColumn(
-            [quantity.share for quantity in quantities], "1", "%", digits=3, short="within"
-        ),
+        "rows within the band": TableColumn(all_of("share"), "1", "%", digits=3, short="within"),
         "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
         "notes": TableColumn(["; ".join(prediction.notes) for prediction in records], brief=False),
     }

@@ -126,13 +126,16 @@ def joint_table(body: Body, demands: Sequence[TensionBalance]) -> Table:
         for balance, column in zip(balances, columns_of, strict=True)
     ]
     stated = [values[np.isfinite(values)] for values in torque]
-    levers = {
-        sign: [
-            np.clip(sign * balance.moment_arm[:, column], 0.0, None).sum(axis=1)
-            for balance, column in zip(balances, columns_of, strict=True)
-        ]
-        for sign in (1.0, -1.0)
-    }
+
+    def levers(sign: float) -> list[tuple[float, float]]:
+        """The least and the greatest lever of the routes that pull in one direction."""
+        ranges = []
+        for balance, column in zip(balances, columns_of, strict=True):
+            arms = np.clip(sign * balance.moment_arm[:, column], 0.0, None)
+            lever = arms.sum(axis=1)
+            ranges.append((float(lever.min()), float(lever.max())))
+        return ranges
+
     units = ["N m" if body.joints[joint].is_hinge else "N" for _, joint in rows]
     columns: dict[str, Any] = {
         "joint": [joint for _, joint in rows],
@@ -141,13 +144,13 @@ def joint_table(body: Body, demands: Sequence[TensionBalance]) -> Table:
         "greatest torque": TableColumn([_greatest(values) for values in stated], BY_ROW),
         "unit": TableColumn(units),
         "lever towards greater positions": TableColumn(
-            [(float(lever.min()), float(lever.max())) for lever in levers[1.0]],
+            levers(1.0),
             "m",
             "mm",
             short="lever +",
         ),
         "lever towards lesser positions": TableColumn(
-            [(float(lever.min()), float(lever.max())) for lever in levers[-1.0]],
+            levers(-1.0),
             "m",
             "mm",
             short="lever -",

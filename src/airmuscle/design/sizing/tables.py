@@ -54,16 +54,9 @@ def law_table(laws: Sequence[LawOfProduct], best: MuscleChoice) -> tuple[Table, 
     """The published laws of each product with several, side by side: what they rest on, where they
     are valid, and the length that each gives; of the best choice in the brief view.
     """
-    products = [law.product for law in laws]
-    rows = [
-        LawRow(law, number, law is laws[products.index(law.product)] and law.coverage > 0.0)
-        for law in laws
-        if products.count(law.product) > 1
-        for number in sorted({*law.choices, *law.reasons} - {0})
-    ]
+    rows = _rows_of_laws(laws, best)
     if not rows:
         return ()
-    rows.sort(key=lambda row: (not row.is_of(best), products.index(row.law.product), row.number))
     columns: dict[str, Any] = {
         "product": [row.law.product for row in rows],
         "number": [row.number * best.total_count // best.count for row in rows],
@@ -82,6 +75,20 @@ def law_table(laws: Sequence[LawOfProduct], best: MuscleChoice) -> tuple[Table, 
     )
     brief = sum(row.is_of(best) for row in rows)
     return (Table("laws", "Published laws of each product", columns, note, brief=brief),)
+
+
+def _rows_of_laws(laws: Sequence[LawOfProduct], best: MuscleChoice) -> "list[LawRow]":
+    """The laws of products with several, by number of muscles; those of the best choice first."""
+    products = [law.product for law in laws]
+    rows = []
+    for law in laws:
+        if products.count(law.product) > 1:
+            is_first = law is laws[products.index(law.product)]
+            for number in sorted({*law.choices, *law.reasons} - {0}):
+                rows.append(LawRow(law, number, is_first and law.coverage > 0.0))
+    return sorted(
+        rows, key=lambda row: (not row.is_of(best), products.index(row.law.product), row.number)
+    )
 
 
 class LawRow(NamedTuple):
