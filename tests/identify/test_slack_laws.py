@@ -31,6 +31,7 @@ from airmuscle.bench.comparison import (
     excess_error,
     odd_specimen_notes,
     recommend,
+    specimen_notes,
 )
 from airmuscle.bench.estimation import batch_sample_size, solve_least_squares
 from airmuscle.bench.statics import FitPoints, Slackness, SlackPull, slack_pull
@@ -279,6 +280,33 @@ def test_the_specimen_that_does_not_follow_the_others_is_named(
         )
         assert "extrapolated" in notes[0]
     assert odd_specimen_notes(None) == []
+
+
+def test_the_force_where_a_specimen_was_slack_is_that_of_the_law_of_the_others(measured):
+    blank = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(1), 0.2, 0.2)
+    comparison = compare(measured, [Candidate("law", blank)], leave_out=SpecimenSplit())
+    scores = comparison["law"].fold_scores
+    for (length, *_), score in zip(MUSCLES, scores, strict=True):
+        runs = [run for run in measured if run.constants["resting_length"] == length]
+        others = [run for run in measured if run.constants["resting_length"] != length]
+        law = fit(blank, others).model.with_resting_length(length)
+        at_slack = [
+            np.max(law.force(run["pressure"], run["contraction"])[run["force"] <= 0.0], initial=0.0)
+            for run in runs
+        ]
+        assert score.fold == f"{1e3 * length:.0f} mm"
+        assert score.slack_force == pytest.approx(max(at_slack), rel=1e-3)
+    assert max(score.slack_force for score in scores) > 1.0
+
+
+@pytest.mark.parametrize(("force", "is_named"), [(76.0, True), (3.0, False)])
+def test_a_force_beyond_the_band_where_a_specimen_was_slack_is_named(force: float, is_named: bool):
+    errors = SpecimenErrors(("a", "b", "c"), (3.0, 4.0, 5.0), (), (1.0, force, 2.0))
+    assert errors.slack_force == (force if is_named else None)
+    notes = " ".join(specimen_notes(errors))
+    named = "specimen b was slack where the law gives up to 76 N; the 95 % band of another"
+    assert (named in notes) == is_named
+    assert dataclasses.replace(errors, slack_forces=()).slack_force is None
 
 
 def isobars(curve: float = 40.0, rows: int = 200) -> list[Recording]:

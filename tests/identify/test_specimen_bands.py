@@ -5,6 +5,7 @@ as the measured ones do.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -117,6 +118,21 @@ def test_the_band_widens_and_a_note_names_the_length_beyond_the_measured_ones(en
         beyond.notes
     )
     assert "resting length" not in " ".join(within.notes)
+
+
+def test_a_prediction_of_another_specimen_states_the_force_where_others_were_slack(entry, tmp_path):
+    assert entry.error_band.new_specimen_slack_force is None  # no row of these is slack
+    band = dataclasses.replace(entry.error_band, new_specimen_slack_force=76.0)
+    save(dataclasses.replace(entry, error_band=band), tmp_path / "muscle.toml")
+    stated = am.load(tmp_path / "muscle.toml")
+    assert stated.error_band == band
+    rng = np.random.default_rng(9)
+    other, measured = (
+        " ".join(predict_with_entry(stated, specimen(rng, 0.2, name)[0]).notes)
+        for name in ("X", "S0")
+    )
+    assert "specimens left out of the fit were slack, the law gave up to 76 N" in other
+    assert "slack" not in measured
 
 
 def test_two_specimens_state_no_band_for_others(tmp_path):

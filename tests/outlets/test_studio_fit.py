@@ -554,9 +554,7 @@ def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
         patch.setattr(
             model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:3], ())
         )
-        patch.setattr(
-            "airmuscle.outlets.requests.fitting.odd_specimen_notes", lambda errors: [text]
-        )
+        patch.setattr("airmuscle.outlets.requests.fitting.specimen_notes", lambda errors: [text])
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]

@@ -16,8 +16,8 @@ from ..comparison import (
     compare,
     force_residuals,
     law_of_length,
-    odd_specimen_notes,
     ranked_specimen_errors,
+    specimen_notes,
 )
 from ..diagnosis import examine_recordings, support_of
 from ..prediction import creep_force, friction_along
@@ -291,8 +291,10 @@ def fit_static_stage(
             NAME, str(error.message), "measure at more levels of pressure and contraction"
         )
     progress(1.0)
-    odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
-    notes = (*examine_recordings([record.recording for record in used]).notes, *odd)
+    of_specimens = specimen_notes(
+        ranked_specimen_errors(comparison.recommended, [comparison], points)
+    )
+    notes = (*examine_recordings([record.recording for record in used]).notes, *of_specimens)
     return StaticStage(comparison, points, bands, notes, isometric_band)
 
 

@@ -11,6 +11,7 @@ from .model_selection import recommend as recommend
 from .result_chapter import error_interval as error_interval
 from .specimen_errors import SpecimenErrors as SpecimenErrors
 from .specimen_errors import odd_specimen_notes as odd_specimen_notes
+from .specimen_errors import specimen_notes as specimen_notes
 
 # isort: split
 # For the other rooms, not in __all__

@@ -23,7 +23,7 @@ from ..statics import (
     linear_fields,
     population_of,
 )
-from .compared_points import ComparedPoints, cause_of, residuals_of_rows
+from .compared_points import ComparedPoints, LeftOutFold, cause_of, residuals_of_rows
 
 MAX_RECOMMENDED_EXCESS = 0.25
 """Maximum excess of the error of a recommended law over the lowest one (chosen)."""
@@ -43,12 +43,21 @@ class FoldScore:
     slack rows are added."""
     rows: int
     """Number of rows with a positive force; of a fold without any, the number of its slack rows."""
+    slack_force: float = 0.0
+    """Greatest force [N] of the law at the slack rows of the fold."""
 
     @classmethod
-    def of(cls, fold: str, residuals: Array, measured: int) -> "FoldScore":
-        """The score for residuals (N,), `measured` of them at a positive force."""
-        rows = measured or residuals.size
-        return cls(fold, float(np.sqrt(residuals @ residuals / rows)), rows)
+    def of(cls, fold: LeftOutFold, limit: float = np.inf) -> "FoldScore":
+        """The score for the residuals of a fold, limited to `limit` [N]."""
+        rows = fold.measured or fold.residuals.size
+        errors = np.clip(fold.residuals, -limit, limit)
+        rmse = float(np.sqrt(errors @ errors / rows))
+        return cls(
+            fold.name,
+            rmse,
+            rows,
+            fold.slack_force,
+        )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -152,14 +161,16 @@ def _cross_validate(
         int(np.count_nonzero(rows.measured)) or rows.force.size for rows in points.left_out_rows
     )
     try:
-        for name, errors, measured in points.left_out_residuals(candidate, fit, loss):
-            if errors.size:
-                score = FoldScore.of(name, np.clip(errors, -limit, limit), measured)
-                left_out.append(score)
+        for fold in points.left_out_residuals(candidate, fit, loss):
+            if fold.residuals.size:
+                left_out.append(FoldScore.of(fold, limit))
             least = float(np.sqrt(sum(score.rmse**2 * score.rows for score in left_out) / count))
             if least > bound:
                 return _excess_error(
-                    candidate.name, least, bound, f"without {name} and the groups before it alone"
+                    candidate.name,
+                    least,
+                    bound,
+                    f"without {fold.name} and the groups before it alone",
                 )
     except AirmuscleError as error:
         return ExcludedModel(candidate.name, error.message, cause_of(error))

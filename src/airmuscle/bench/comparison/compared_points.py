@@ -133,6 +133,35 @@ def residuals_of_rows(model: Characteristic, rows: EvaluatedRows, max_force: flo
     return residuals
 
 
+def _slack_pull_of_rows(rows: EvaluatedRows, residuals: Array, permitted: float) -> SlackPull:
+    """The force at the slack rows of a law with these residuals (N,), of which `permitted` [N], and
+    a part of the greatest force, do not count."""
+    greatest = float(np.max(rows.force, initial=0.0))
+    limit = max(permitted, MIN_PULL * greatest)
+    modelled = residuals + np.maximum(rows.force, 0.0)
+    specimens = [name for _, name in rows.muscles]
+    specimen = np.array(specimens)[rows.run]
+    return slack_pull(rows.pressure, rows.contraction, rows.force, modelled, limit, specimen)
+
+
+class LeftOutFold(NamedTuple):
+    """The rows of a fold, with the residuals in force [N] (N,) of the law fitted to all others."""
+
+    name: str
+    rows: EvaluatedRows
+    residuals: Array
+
+    @property
+    def measured(self) -> int:
+        """Number of rows with a positive force."""
+        return int(np.count_nonzero(self.rows.measured))
+
+    @property
+    def slack_force(self) -> float:
+        """Greatest force [N] of the law at the slack rows that no measured force contradicts."""
+        return _slack_pull_of_rows(self.rows, self.residuals, 0.0).greatest
+
+
 def cause_of(error: AirmuscleError) -> str:
     """The cause of an error in one phrase."""
     return getattr(error, "cause", "") or "the fit fails"
@@ -188,11 +217,7 @@ class ComparedPoints:
         """The force at the slack rows of a law with these residuals of the evaluated rows (N,) and
         this error [N].
         """
-        rows = self.rows
-        limit = max(PULL_RATIO * rmse, MIN_PULL * float(np.max(rows.force, initial=0.0)))
-        modelled = residuals + np.maximum(rows.force, 0.0)
-        specimen = np.array([name for _, name in rows.muscles])[rows.run]
-        return slack_pull(rows.pressure, rows.contraction, rows.force, modelled, limit, specimen)
+        return _slack_pull_of_rows(self.rows, residuals, PULL_RATIO * rmse)
 
     def slack_notes(self, model: Characteristic) -> tuple[str, ...]:
         """A remark where the law is slack at points with a positive force. Raises
@@ -217,10 +242,9 @@ class ComparedPoints:
 
     def left_out_residuals(
         self, candidate: Candidate, fit: Fit, loss: Loss
-    ) -> Iterator[tuple[str, Array, int]]:
-        """The name of each fold, the residuals in force [N] on its rows of the law fitted to all
-        other rows, and the number of its rows with a positive force. Raises IdentificationError
-        where the other rows do not determine the parameters."""
+    ) -> Iterator[LeftOutFold]:
+        """Each fold with the residuals in force [N] on its rows of the law fitted to all other
+        rows. Raises IdentificationError where the other rows do not determine the parameters."""
         law = candidate.law
         refits = None
         if isinstance(loss, LeastSquares):
@@ -237,11 +261,7 @@ class ComparedPoints:
             model = None if refits is None else refits.law_without(i, pooling)
             if model is None:
                 model = self._refit_exactly(candidate, fit, i, loss)
-            yield (
-                name,
-                residuals_of_rows(model, rows, self.max_force),
-                int(np.count_nonzero(rows.measured)),
-            )
+            yield LeftOutFold(name, rows, residuals_of_rows(model, rows, self.max_force))
 
     def _refit_exactly(
         self, candidate: Candidate, fit: Fit, fold: int, loss: Loss

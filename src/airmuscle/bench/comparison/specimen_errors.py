@@ -44,6 +44,17 @@ class SpecimenErrors:
     not.
     """
 
+    slack_forces: tuple[float, ...] = ()
+    """Greatest force [N] of the law where each specimen was measured slack; empty if it is not
+    known."""
+
+    @property
+    def slack_force(self) -> float | None:
+        """Greatest force [N] of the law where a specimen was measured slack, if it exceeds the band
+        of another specimen; None if it does not."""
+        greatest = max(self.slack_forces, default=0.0)
+        return greatest if greatest > self.half_width else None
+
     @property
     def deviation(self) -> float:
         """Standard deviation [N] of the error of a specimen about the regression of the specimens
@@ -93,6 +104,30 @@ class SpecimenErrors:
         )
 
 
+def specimen_notes(errors: SpecimenErrors | None) -> list[HintedText]:
+    """The remarks on a specimen that does not follow the others, and on the force of the law where
+    a specimen that was left out is slack; empty without them."""
+    return [*odd_specimen_notes(errors), *slack_specimen_notes(errors)]
+
+
+def slack_specimen_notes(errors: SpecimenErrors | None) -> list[HintedText]:
+    """The remark on a law that pulls, by more than its band, where a specimen that was left out is
+    slack."""
+    force = None if errors is None else errors.slack_force
+    if errors is None or force is None:
+        return []
+    name = errors.names[int(np.argmax(errors.slack_forces))]
+    return [
+        HintedText(
+            f"The pressure at which a specimen starts to pull is not predicted well: left out,"
+            f" specimen {name} was slack where the law gives up to {force:.3g} N; the 95 % band of"
+            f" another specimen is {errors.half_width:.3g} N. For a length that was not measured,"
+            " do not rely on smaller forces: measure the pressure at which the muscle starts to"
+            " pull at its greatest contraction."
+        )
+    ]
+
+
 def odd_specimen_notes(errors: SpecimenErrors | None) -> list[HintedText]:
     """The remark on a specimen that does not follow the others; empty without one."""
     found = None if errors is None else errors.odd
@@ -132,13 +167,13 @@ def specimen_errors(
     try:
         points = comparison.ComparedPoints.of(recordings, SpecimenSplit())
         parts = [
-            p
-            for p in points.left_out_residuals(Candidate("", fit.model, fixed), fit, fit.loss)
-            if p[1].size
+            fold
+            for fold in points.left_out_residuals(Candidate("", fit.model, fixed), fit, fit.loss)
+            if fold.residuals.size
         ]
     except AirmuscleError:  # the others do not determine the law, so that no error is known
         return None
-    return _checked([comparison.FoldScore.of(*part) for part in parts], fit.model, recordings)
+    return _checked([comparison.FoldScore.of(part) for part in parts], fit.model, recordings)
 
 
 def ranked_specimen_errors(
@@ -163,4 +198,9 @@ def _checked(
     if len(rms) < MIN_MEMBERS or not np.isfinite(rms).all() or max(rms) == 0.0:
         return None
     lengths = resting_lengths_of(recordings) if hasattr(law, "with_resting_length") else {}
-    return SpecimenErrors(names, rms, tuple(lengths[name] for name in names if name in lengths))
+    return SpecimenErrors(
+        names,
+        rms,
+        tuple(lengths[name] for name in names if name in lengths),
+        tuple(score.slack_force for score in scores),
+    )

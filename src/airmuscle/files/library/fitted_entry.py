@@ -166,7 +166,10 @@ def complete_band(
     timed = [run for run in recordings if "time" in run]
     if errors is not None and band.quantity == "force":
         band = dataclasses.replace(
-            band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors)
+            band,
+            new_specimen_half_width=errors.half_width,
+            new_specimen_source=str(errors),
+            new_specimen_slack_force=errors.slack_force,
         )
     return dataclasses.replace(
         band,

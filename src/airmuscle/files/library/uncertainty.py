@@ -16,6 +16,8 @@ PREDICTED = ("force", "contraction", "pressure")
 """Quantities that a law may give."""
 WIDTHS = ("half_width", "held_half_width", "new_specimen_half_width")
 """The half widths, in the unit of the quantity."""
+NOT_NEGATIVE = ("max_contraction_rate", "max_pressure_rate", "new_specimen_slack_force")
+"""Further numbers that may be unknown."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,6 +44,13 @@ class StatedBand:
     )
     new_specimen_source: str = ""
     """The specimens left out of the fit that it comes from."""
+    new_specimen_slack_force: float | None = parameter(
+        "N",
+        "F_0",
+        "greatest force of the law where a specimen left out was slack, if it exceeds the half"
+        " width for other specimens",
+        default=None,
+    )
     max_contraction_rate: float | None = parameter(
         "1/s",
         "deps_max",
@@ -64,9 +73,7 @@ class StatedBand:
                 raise ParameterError(
                     f"StatedBand: {name} is {value:g}; it must be finite and positive."
                 )
-        rates = (
-            (name, getattr(self, name)) for name in ("max_contraction_rate", "max_pressure_rate")
-        )
+        rates = ((name, getattr(self, name)) for name in NOT_NEGATIVE)
         for name, value in (*rates, *(("length", length) for length in self.resting_lengths)):
             if value is not None and not (math.isfinite(value) and value >= 0.0):
                 raise ParameterError(

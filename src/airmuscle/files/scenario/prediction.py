@@ -271,5 +271,11 @@ def _band(entry: Entry, quantity: str, recording: Recording) -> tuple[float | No
         and hasattr(entry.characteristic, "with_resting_length")
     ):
         new *= widening(band.resting_lengths, float(length))
+    if band.new_specimen_slack_force is not None:
+        notes.append(
+            "where specimens left out of the fit were slack, the law gave up to"
+            f" {band.new_specimen_slack_force:.3g} N: do not rely on smaller forces, and measure"
+            " the pressure at which this muscle starts to pull"
+        )
     source = f"for a specimen that was not measured: {band.new_specimen_source}"
     return max(new, half_width), source, [f"{which}; the band is that of other specimens", *notes]

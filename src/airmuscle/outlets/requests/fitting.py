@@ -11,9 +11,9 @@ import numpy as np
 from ...bench import comparison, statics
 from ...bench.comparison.result_chapter import result_chapter, without_opening_figures
 from ...bench.comparison.specimen_errors import (
-    odd_specimen_notes,
     ranked_specimen_errors,
     specimen_errors,
+    specimen_notes,
 )
 from ...bench.diagnosis import DataUse, support_of
 from ...bench.estimation import UNCENSORED
@@ -107,13 +107,13 @@ def _fit_named(
     errors = specimen_errors(fitted, recordings, fixed)
     entry = fitted_entry(fitted, start, names, recordings=recordings, errors=errors)
     entry, chapters, notes = _more(request, fitted, entry, recordings, progress, workers)
-    odd = odd_specimen_notes(errors)
+    of_specimens = specimen_notes(errors)
     chapter = fit_chapter(
-        fitted, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings)
+        fitted, entry, [*notes, *of_specimens, *missing_geometry(entry)], _notes_of(recordings)
     )
     result = result_chapter(_measured_in(names), fitted, chapter, recordings)
     chapter = without_opening_figures(chapter, result)
-    return FittedMuscle(fitted, entry, [result, chapter, *chapters], odd)
+    return FittedMuscle(fitted, entry, [result, chapter, *chapters], of_specimens)
 
 
 def _compare(
@@ -162,15 +162,15 @@ def _compare(
     comparisons = _in_one_screen(
         comparison.compare_chapters(selection.comparisons, best, selection.reason)
     )
-    odd = odd_specimen_notes(errors)
-    notes = [*notes, *unused, *odd, *missing_geometry(entry)]
+    of_specimens = specimen_notes(errors)
+    notes = [*notes, *unused, *of_specimens, *missing_geometry(entry)]
     comparisons[0] = dataclasses.replace(comparisons[0], notes=(*comparisons[0].notes, *notes))
     fitted = dataclasses.replace(
         fit_chapter(best.fit, entry, (), _notes_of(recordings)), brief=False
     )
     result = result_chapter(_measured_in(names), best.fit, fitted, recordings, selection)
     chapters = [result, without_opening_figures(fitted, result), *comparisons, *more]
-    return FittedMuscle(best.fit, entry, chapters, [*odd, *unused], selection)
+    return FittedMuscle(best.fit, entry, chapters, [*of_specimens, *unused], selection)
 
 
 def _more(
