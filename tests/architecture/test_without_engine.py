@@ -96,3 +96,64 @@ def test_further_work_of_a_bench_needs_no_compiler(work: str):
     exec(work, scope)
     assert json.loads(process.stdout) == pytest.approx(scope["results"], rel=1e-12)
     assert all(scope["results"].values())
+
+
+CALLS = """
+import sys
+for name in ("numba", "llvmlite"):
+    sys.modules[name] = None
+import numpy as np
+import airmuscle as am
+from airmuscle.engine import simulate_batch
+from airmuscle.errors import AirmuscleError
+from airmuscle.physics import find_equilibrium, linearise
+valve = am.Valve(conductance=1e-9, critical_ratio=0.4)
+circuit = am.FillDischarge(am.Supply(6e5), valve, valve)
+plant = am.Plant(am.load("dmsp-20-300").muscle, circuit, am.HangingMass(10.0))
+inputs = am.Schedule({"fill": ((0.5, 1),)})
+for call in (
+    lambda: am.simulate(plant, inputs, duration=1.0),
+    lambda: simulate_batch(plant, {"mechanism.mass": [5.0, 6.0]}, inputs, duration=1.0),
+    lambda: find_equilibrium(plant, pressure=2e5),
+    lambda: linearise(plant, {state.name: state.nominal for state in plant.states}),
+):
+    try:
+        call()
+    except AirmuscleError as error:
+        print(type(error).__name__, error)
+    else:
+        print("no error")
+"""
+
+
+def test_python_calls_that_need_the_engine_say_what_to_install():
+    done = subprocess.run([sys.executable, "-c", CALLS], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    sentence = (
+        "MissingPackageError simulation needs the engine, the packages numba and llvmlite, which"
+        ' are not both installed; install them: pip install "airmuscle[sim]"'
+    )
+    assert done.stdout.splitlines() == [sentence] * 4
+
+
+BROKEN = """
+import sys
+class Broken:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == sys.argv[1]:
+            raise ImportError("needs NumPy 2.3 or less")
+sys.meta_path.insert(0, Broken())
+from airmuscle.engine.compile.llvm import engine_packages
+from airmuscle.errors import MissingPackageError
+call = {"numba": engine_packages.numba_module, "llvmlite": engine_packages.llvm_binding}
+try:
+    call[sys.argv[1]]()
+except MissingPackageError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("package", ["numba", "llvmlite"])
+def test_an_engine_that_does_not_start_states_its_reason(package: str):
+    done = subprocess.run([sys.executable, "-c", BROKEN, package], capture_output=True, text=True)
+    assert "which do not start (needs NumPy 2.3 or less); install them: pip" in done.stdout
