@@ -24,7 +24,7 @@ from airmuscle.outlets.cli import app
 CLUSTER = "tcp://head-node:8786"
 SLOW = re.compile(
     r"reproduce|--cluster|campaign bench|fit-regulator|--to (?:fmu|ssp)|--build"
-    r"|--starts 20|--workers|--rules|valve_study|--known|--separate|muscles/\*|site page"
+    r"|--starts 20|--workers|--rules|valve_study|--known|--separate|muscles/\*|site page my"
 )
 QUICK = (
     "airmuscle reproduce saga hosovsky --out report",
