@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from airmuscle.outlets import export_page
+from airmuscle.outlets import export_page, write_site
 
 from . import gallery, pictures
 from .contents import ROOT, broken_links, documents
@@ -46,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if code == 0:
         export_page(list(LIVE), live := html / "_static" / "live" / "muscle.html")
         note(f"live page: {live.stat().st_size // 1000} kB")
+        static = write_site(html / "_static" / "page")
+        note(f"page of the library: {static.size // 1000} kB")
         note(f"site: {html / 'index.html'}")
     return code
 

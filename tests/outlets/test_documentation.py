@@ -336,6 +336,7 @@ def test_the_site_is_built_without_warnings_and_needs_no_network(tmp_path: Path)
     pages = list((tmp_path / "html").rglob("*.html"))
     assert len(pages) > len(documents())
     loaded = re.compile(r"<(?:script|img|iframe|link)\b[^>]*\b(?:src|href)=\"(?:https?:)?//")
+    assert (tmp_path / "html" / "_static" / "page" / "index.html").is_file()
     assert [page.name for page in pages if loaded.search(page.read_text(encoding="utf-8"))] == []
     law = (tmp_path / "html" / "models" / "characteristic" / "TonduLopez2000.html").read_text(
         encoding="utf-8"

@@ -13,7 +13,6 @@ from command_line import airmuscle
 from studio_pages import BEGINNING, run_script, scripts
 
 import airmuscle as am
-from airmuscle.core import conversion
 from airmuscle.errors import ParameterError
 from airmuscle.files import to_toml
 from airmuscle.outlets import write_site
@@ -163,7 +162,9 @@ console.log(JSON.stringify(DATA.map((system) => {
     for system, answer in zip(systems, answers, strict=True):
         assert [unit["name"] for unit in answer] == system.split(", ")
         for unit, base in zip(answer, ("Pa", "N", "m"), strict=True):
-            assert unit["factor"] == pytest.approx(conversion(unit["name"], base).factor, rel=1e-14)
+            assert unit["factor"] == pytest.approx(
+                am.units.conversion(unit["name"], base).factor, rel=1e-14
+            )
 
 
 def test_what_is_no_file_or_has_the_name_of_another_model_is_refused(tmp_path):
