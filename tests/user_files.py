@@ -4,6 +4,7 @@ studies, mappings and scenarios, all made of a muscle of the library.
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,7 @@ from scenario_files import HELD_FILL, HELD_STUDY, MUSCLE_FILE, PRESSURE_LOOP
 
 import airmuscle as am
 from airmuscle.bench import write
+from airmuscle.design import declaration_toml, propose_submission
 from airmuscle.engine import RungeKutta4, SampledSignal, Schedule, simulate_batch
 from airmuscle.files import save
 from airmuscle.physics import PressureDriven
@@ -292,6 +294,29 @@ def _write_loops(folder: Path) -> None:
         (folder / f"{name}.toml").write_text(short, encoding="utf-8")
 
 
+def write_contribution(folder: Path) -> None:
+    """A contribution whose questions are answered: muscle, records of the fit, one held out."""
+    folder.mkdir()
+    write(force_map(1), folder / "map.csv")
+    write(loop(1), folder / "loop.csv")
+    write(force_map(2), folder / "later.csv")
+    save(am.load(MUSCLE), folder / "muscle.toml")
+    answered = dataclasses.replace(
+        propose_submission(folder),
+        name="smith-pam-20-300",
+        licence="CC0-1.0",
+        contributor="A. Smith <smith@example.org>",
+        measured_by="A. Smith, Example University 2026",
+        rig=dict.fromkeys(("pressure", "force", "motion", "procedure"), "simulated"),
+    )
+    records = [
+        dataclasses.replace(record, use="held out" if record.file == "later.csv" else "fit")
+        for record in answered.records
+    ]
+    text = declaration_toml(dataclasses.replace(answered, records=tuple(records)))
+    (folder / "submission.toml").write_text(text, encoding="utf-8")
+
+
 def _write_audited(folder: Path) -> None:
     """A model of a user and its constants, as `audit` examines them."""
     shutil.copy(Path(__file__).with_name("audited_models.py"), folder / "mymodel.py")
@@ -301,6 +326,10 @@ def _write_audited(folder: Path) -> None:
     (folder / "constants.csv").write_text(constants, encoding="utf-8")
 
 
+def _write_contribution(folder: Path) -> None:
+    write_contribution(folder / "contribution")
+
+
 WRITERS: tuple[Callable[[Path], None], ...] = (
     _write_static,
     _write_campaign,
@@ -308,6 +337,7 @@ WRITERS: tuple[Callable[[Path], None], ...] = (
     _write_joint,
     _write_simulation,
     _write_audited,
+    _write_contribution,
 )
 
 

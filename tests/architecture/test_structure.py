@@ -347,6 +347,7 @@ def test_options_of_commands_are_declared_in_requests():
         "library",
         "simulate",
         "approximate",
+        "submit",
         "tune",
     }
 

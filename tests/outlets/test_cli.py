@@ -109,6 +109,7 @@ NAMES = (
     "tune",
     "compare",
     "export",
+    "submit",
     "studio",
     "site",
     "schema",
@@ -192,6 +193,7 @@ def test_list_names_every_entry_with_title_kind_and_trust():
         "title": entry.title,
         "kind": f"muscle, {type(entry.characteristic).__name__}; data set",
         "provenance": f"{entry.provenance}; measured",
+        "grade": "measured by Martens and Boblan 2017",
     }
     table = airmuscle("list").output
     assert all(name in table for name in list_laws())

@@ -139,6 +139,15 @@ from .study import load_study as load_study
 from .study import process_pool as process_pool
 from .study import result_store as result_store
 from .study import run_study as run_study
+from .submission import Refusal as Refusal
+from .submission import Submission as Submission
+from .submission import SubmissionVerdict as SubmissionVerdict
+from .submission import SubmittedRecord as SubmittedRecord
+from .submission import check_submission as check_submission
+from .submission import declaration_toml as declaration_toml
+from .submission import prepare_submission as prepare_submission
+from .submission import propose_submission as propose_submission
+from .submission import read_submission as read_submission
 from .tuning import CaseMetrics as CaseMetrics
 from .tuning import FirstOrderDeadTime as FirstOrderDeadTime
 from .tuning import IntegralAbsoluteError as IntegralAbsoluteError

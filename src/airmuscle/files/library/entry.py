@@ -47,7 +47,8 @@ class Entry(EntryDisplay):
     `validity_range` is the range of the measurements or the publication, `uncertainty` the standard
     errors and correlations of fitted parameters, if the file states them, `error_band` the 95 %
     band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if
-    known.
+    known. `measured_by` is who measured, `submitted_by` who contributed the entry; empty where it
+    is not stated.
     """
 
     characteristic: Characteristic
@@ -66,6 +67,8 @@ class Entry(EntryDisplay):
     uncertainty: "library.ParameterUncertainty | None" = None
     error_band: "library.StatedBand | None" = None
     evidence: str = ""
+    measured_by: str = ""
+    submitted_by: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()

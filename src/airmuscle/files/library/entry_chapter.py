@@ -44,11 +44,12 @@ def entry_chapter(entry: EntryDisplay) -> Chapter:
         name="entry",
         title=f"{entry.name}: {entry.title}",
         summary=(
-            f"Provenance: {entry.provenance}. Components:"
+            f"Provenance: {entry.provenance}. Grade: {entry.grade}. Components:"
             f" {', '.join(map(' '.join, models.items()))}."
         ),
         values=tuple(
-            NamedValue(name, getattr(entry, name), brief=False) for name in ("name", "provenance")
+            NamedValue(name, getattr(entry, name), brief=False)
+            for name in ("name", "provenance", "grade")
         ),
         tables=tuple(table for table in tables if len(table)),
         plots=() if chart is None else (Plot("entry", entry.title, chart),),

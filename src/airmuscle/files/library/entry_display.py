@@ -72,6 +72,13 @@ class EntryDisplay(Reported, abc.ABC):
         """The description of the entry."""
         return library.entry_chapter(self)
 
+    @property
+    def grade(self) -> str:
+        """Whose numbers these are: a table of the maker, a secondary source, who measured, who
+        submitted.
+        """
+        return library.grade_of(vars(self))
+
     def tables(self) -> Iterator[Table]:
         """Tables besides components, parameters, checks and sources."""
         return iter(())

@@ -121,6 +121,7 @@ COMMANDS = (
     CommandRow(
         "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.", runs_code=True
     ),
+    CommandRow("submit", "Prepare a muscle and its records for the library."),
     CommandRow("studio", "Show muscles and plants in the browser."),
     CommandRow("site", "Write a page with the whole library, without a server."),
     CommandRow(

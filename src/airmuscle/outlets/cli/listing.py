@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...files.library.folders import DATA, FOLDERS, list_data, list_names
+from ...files.library.grade import grade_of
 from .options import Json
 from .terminal import print_json, print_table
 
@@ -22,7 +23,8 @@ def list_entries(json: Json = False) -> None:
     in a scenario as { library = NAME }, and a plant as [plant] library = NAME; `airmuscle simulate
     NAME` runs its example. A data set is used as FILES of `airmuscle fit`; that of a specimen is
     listed with its law. The provenance is the origin of the numbers: printed, measured, data sheet,
-    secondary source, fitted or chosen.
+    secondary source, fitted or chosen. The grade is whose numbers they are: a table of the maker, a
+    secondary source, who measured, who submitted the entry.
 
     \b
     Examples:
@@ -60,7 +62,13 @@ def _library_rows() -> list[dict[str, str]]:
                     filter(None, dict.fromkeys((provenance, measured["provenance"])))
                 )
             rows.append(
-                {"name": name, "title": tables["title"], "kind": kind, "provenance": provenance}
+                {
+                    "name": name,
+                    "title": tables["title"],
+                    "kind": kind,
+                    "provenance": provenance,
+                    "grade": grade_of(tables),
+                }
             )
     return [*rows, *data.values()]
 
@@ -81,4 +89,10 @@ def _data_row(path: Path) -> dict[str, str]:
     text = " ".join(lines)
     title = lines[0] if lines else ""
     provenance = next((word for word in ("secondary source", "measured") if word in text), "")
-    return {"name": path.stem, "title": title, "kind": "data set", "provenance": provenance}
+    return {
+        "name": path.stem,
+        "title": title,
+        "kind": "data set",
+        "provenance": provenance,
+        "grade": provenance,
+    }

@@ -1,0 +1,12 @@
+from .declaration import DECLARATION as DECLARATION
+from .declaration import LICENCES as LICENCES
+from .declaration import Submission as Submission
+from .declaration import SubmittedRecord as SubmittedRecord
+from .declaration import declaration_toml as declaration_toml
+from .declaration import read_submission as read_submission
+from .examination import check_submission as check_submission
+from .examination import prepare_submission as prepare_submission
+from .proposal import REPORT_FOLDER as REPORT_FOLDER
+from .proposal import propose_submission as propose_submission
+from .verdict import Refusal as Refusal
+from .verdict import SubmissionVerdict as SubmissionVerdict
