@@ -6,6 +6,7 @@ import ast
 import dataclasses
 import importlib.util
 import inspect
+import re
 from pathlib import Path
 
 import airmuscle
@@ -122,3 +123,24 @@ def test_the_model_stands_before_the_measurements():
             if kinds != sorted(kinds):
                 wrong.add(f"{function.__name__}({', '.join(names)})")
     assert wrong == set()
+
+
+OTHER_WORDS_FOR_A_BRANCH = re.compile(
+    r"\b(rising|falling|loading|unloading|forward|backward) (branch|and (a |the )?\w+ branch)"
+)
+
+
+def test_a_branch_of_a_measured_run_is_inflating_deflating_contracting_or_extending():
+    """The branches of an equilibrium path (a snap-through) are those of a figure of a paper."""
+    texts = [
+        *SOURCE.rglob("*.py"),
+        *SOURCE.rglob("*.js"),
+        *DOCS.rglob("*.md"),
+        DOCS.parent / "README.md",
+    ]
+    found = [
+        f"{path.name}: {match[0]}"
+        for path in texts
+        for match in OTHER_WORDS_FOR_A_BRANCH.finditer(path.read_text(encoding="utf-8"))
+    ]
+    assert not found

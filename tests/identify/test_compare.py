@@ -541,7 +541,7 @@ def test_laws_that_need_a_length_are_named_where_none_is_stated():
     assert line.endswith(
         "Serres2009, TonduLopez2000: not every recording states its resting length."
     )
-    assert family.endswith("LogarithmicLength: it needs recordings of two resting lengths or more.")
+    assert family.endswith("LogarithmicLength: data of two resting lengths or more are required.")
     assert compare(runs, CANDIDATES[1:2], leave_out=RunSplit()).unavailable == ()
 
 

@@ -65,7 +65,7 @@ def test_the_terms_of_speed_of_one_speed_stay_within_the_force_of_the_muscle_and
     assert fit.friction.damping <= greatest / 2e-3
     assert not fit.justified
     assert (
-        "The speed in the data is 0.002 to 0.002 m/s, so the terms of speed are not determined"
+        "The speed in the data is 0.002 to 0.002 m/s, so the terms of speed cannot be identified"
         in fit.verdict
     )
 

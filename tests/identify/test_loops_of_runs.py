@@ -47,6 +47,23 @@ def test_a_file_with_three_isobaric_runs_has_three_loops_of_which_each_is_justif
     assert fit.recommended.series.origin == "three.csv, rows 1 to 800"
 
 
+def test_the_figure_of_a_loop_names_its_branches_by_what_is_varied():
+    def labels(run: Recording) -> set[str]:
+        (loop,) = find_loops([run])
+        return {text.get_text() for text in loop.plot().legends[0].get_texts()}
+
+    isobaric = recording(LEVELS[:1])
+    pressure = 1e5 + 3e6 * (isobaric["contraction"] - LEG[0])
+    friction = SLIP.force_along((isobaric["contraction"] - LEG[0]) * 0.3)
+    isometric = isobaric.with_columns(
+        pressure=pressure,
+        contraction=np.full(len(isobaric), 0.05),
+        force=3e-3 * pressure - friction,
+    )
+    assert labels(isobaric) == {"contracting", "extending"}
+    assert labels(isometric) == {"inflating", "deflating"}
+
+
 def test_a_file_with_one_run_is_one_loop_with_the_name_of_the_file():
     (loop,) = find_loops([recording(LEVELS[:1])])
     assert (loop.recording.origin, len(loop.recording)) == ("three.csv", 800)
@@ -54,7 +71,7 @@ def test_a_file_with_one_run_is_one_loop_with_the_name_of_the_file():
 
 def test_sweeps_in_one_direction_at_several_levels_are_no_loop():
     with pytest.raises(
-        IdentificationError, match=r"three.csv, rows \d+ to \d+: the falling branch has no rows"
+        IdentificationError, match=r"three.csv, rows \d+ to \d+: the extending branch has no rows"
     ):
         find_loops([recording(LEVELS, LEG)])
 
@@ -70,7 +87,7 @@ def test_a_loop_of_another_muscle_at_the_same_level_is_no_repeat():
 def test_a_recording_without_a_loop_is_left_out_with_a_warning_that_names_it():
     one_way = dataclasses.replace(recording(LEVELS[:1], LEG), origin="one_way.csv")
     with pytest.warns(
-        AirmuscleWarning, match=r"left out: one_way\.csv: the falling branch has no rows to fit"
+        AirmuscleWarning, match=r"left out: one_way\.csv: the extending branch has no rows to fit"
     ):
         loops = find_loops([one_way, recording(LEVELS[:1])])
     assert [loop.recording.origin for loop in loops] == ["three.csv"]

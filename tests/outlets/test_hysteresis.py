@@ -377,8 +377,8 @@ def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
             (0.02, 0.14),
             LENGTH,
             (
-                "loop.csv: the falling branch has no rows to fit, but a loop needs a rising and a"
-                " falling branch"
+                "loop.csv: the extending branch has no rows to fit, but a loop needs both branches,"
+                " contracting and extending"
             ),
         ),
         (TURNS, (), "loop.csv: friction against shortening needs the resting length"),

@@ -69,7 +69,9 @@ def test_what_is_neither_permitted_nor_measured_is_refused(
 ):
     result = airmuscle("evaluate", name, *given)
     assert result.exit_code == 1
-    assert "error: beyond the values that the maker permits, and not measured" in result.stderr
+    assert (
+        "error: the point exceeds the ratings of the maker and the measured range" in result.stderr
+    )
     assert message in result.stderr
 
 
@@ -79,7 +81,7 @@ def test_a_measured_point_beyond_the_permitted_pressure_gives_a_warning():
     )
     assert result.exit_code == 0
     assert (
-        "warning: beyond the values that the maker permits: the pressure 650 kPa" in result.stderr
+        "warning: the point exceeds the ratings of the maker: the pressure 650 kPa" in result.stderr
     )
     assert json.loads(result.stdout)["evaluation"]["permitted"] is False
     inside = airmuscle(

@@ -128,7 +128,9 @@ def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutSt
             "move the muscle by a few per cent of its length within a second at constant pressure,"
             " hold the length for two minutes or more, and record the force"
         )
-        return LeftOutStage(NAME, "no record with a force is a hold after a motion", remedy)
+        return LeftOutStage(
+            NAME, "no record contains a hold after a motion with measured force", remedy
+        )
     motions = zip(recordings, map(find_motion, recordings), strict=True)
     return fit_held_rows(
         [HeldRows.after(recording, motion.end) for recording, motion in motions if motion]

@@ -222,7 +222,7 @@ def fit_friction_stage(
         reason = (
             failed[0]
             if failed
-            else "no record at constant pressure has a rising and a falling branch"
+            else "no record at constant pressure has a contracting and an extending branch"
         )
         remedy = (
             "shorten and lengthen the muscle slowly at constant pressure, at three pressures or"

@@ -89,9 +89,9 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
     if simpler is not recommended:  # the rows of the fit contradict it
         text += (
             f" {simpler.candidate.name} with {simpler.parameter_count} parameters is within one"
-            f" standard error, which {len(best.fold_scores)} folds do not determine well; on the"
-            f" rows of the fit its error is {simpler.in_sample_rmse:.4g} N against"
-            f" {best.in_sample_rmse:.4g} N, more than their noise explains."
+            f" standard error, which is poorly estimated from {len(best.fold_scores)} folds, but"
+            f" its error on the rows of the fit, {simpler.in_sample_rmse:.4g} N, exceeds"
+            f" {best.in_sample_rmse:.4g} N by more than the noise explains."
         )
     misfit = recommended.fit.misfit
     stated = "" if misfit is None else f" {misfit}"

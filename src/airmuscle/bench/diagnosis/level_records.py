@@ -63,8 +63,9 @@ class LevelRecord(Reported):
     slope: float
     """Slope of this line [N/Pa], or [N] per unit of contraction."""
     hysteresis: float | None
-    """Median difference of the falling and the rising branch of the force [N] at equal pressure, or
-    of the extending and the contracting one at equal contraction; None without both branches."""
+    """Median difference of the force [N] of the deflating and the inflating branch at equal
+    pressure, or of the extending and the contracting one at equal contraction; None without both
+    branches."""
     noise: float
     """Standard deviation of the noise of the force [N]."""
 

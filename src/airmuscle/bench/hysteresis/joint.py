@@ -156,9 +156,9 @@ class JointFit(FrictionFit):
                 else ""
             )
             text = (
-                f"The friction at a gauge pressure p is its value at {reference:.4g} kPa times"
-                f" {factor}p/({reference:.4g} kPa) (F test of this dependence"
-                f" {format_p_value(self.scale_p_value)})."
+                f"The friction depends on the gauge pressure p (F test,"
+                f" {format_p_value(self.scale_p_value)}): the value at {reference:.4g} kPa is"
+                f" multiplied by {factor}p/({reference:.4g} kPa)."
             )
             levels = {
                 round(run.pressure / self.friction.reference_pressure, 1) for run in self.agreement

@@ -303,11 +303,11 @@ def speed_reservation(limits: DataLimits, axis: Axis) -> str:
     if limits.has_speed_variation:
         return ""
     if math.isnan(limits.high_speed):
-        return "The data have no time, so the terms of speed are not determined."
+        return "The data have no time, so the terms of speed cannot be identified."
     (low, unit), (high, _) = (
         axis.display(speed, "m/s") for speed in (limits.low_speed, limits.high_speed)
     )
     return (
-        f"The speed in the data is {low:.3g} to {high:.3g} {unit}, so the terms of speed are not"
-        " determined; measure loops at clearly different speeds."
+        f"The speed in the data is {low:.3g} to {high:.3g} {unit}, so the terms of speed"
+        " cannot be identified; measure loops at clearly different speeds."
     )

@@ -29,7 +29,7 @@ from ...recording.columns import display_scale
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.formatting import P_VALUE
 from ..diagnosis import level_text
-from ..inspection import Mask, Run, motion_direction
+from ..inspection import Mask, Run, branch_name, motion_direction
 from ..reported import Reported
 from .loop_data import MILLIMETRES, Axis, ContractionPath, FrictionPath, StaticCurve
 from .result import FrictionFit, HysteresisFit, preferred_fit
@@ -38,7 +38,7 @@ from .search import LoopSeries, make_loop_series
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class HysteresisLoop(ShortRepr):
-    """One run with a rising and a falling branch, the path of the friction, the static curve and
+    """One run with both branches, the path of the friction, the static curve and
     the fitted rows.
     """
 
@@ -70,8 +70,8 @@ class HysteresisLoop(ShortRepr):
 
     @property
     def direction(self) -> Array:
-        """Direction of the motion at the rows, 1 on the rising branch, -1 on the falling one, shape
-        (N,).
+        """Direction of the motion at the rows, shape (N,): 1 inflating or contracting, -1 deflating
+        or extending.
         """
         return motion_direction(
             self.friction_path.displacement(self.recording), self.recording.columns.get("time")
@@ -89,10 +89,10 @@ class HysteresisLoop(ShortRepr):
         axes.plot(
             recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3
         )
-        for sign, colour, branch in ((1, BLUE, "rising"), (-1, RED, "falling")):
+        for sign, colour in ((1, BLUE), (-1, RED)):
             for used, alpha, label in (
                 (~self.fitted_rows, 0.05, None),
-                (self.fitted_rows, 0.8, branch),
+                (self.fitted_rows, 0.8, branch_name(name, sign)),
             ):
                 rows = (direction == sign) & used
                 style = {
@@ -188,8 +188,8 @@ def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
         int(np.count_nonzero((loop.direction == sign) & loop.fitted_rows)) for sign in (1, -1)
     )
     rows = (
-        f"{up} rows of the rising branch and {down} of the falling branch are used, of"
-        f" {len(loop.recording)}."
+        f"{up} rows of the {branch_name(loop.varied, 1)} and {down} of the"
+        f" {branch_name(loop.varied, -1)} branch are used, of {len(loop.recording)}."
     )
     if shown is None:
         return [rows]

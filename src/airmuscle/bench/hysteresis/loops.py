@@ -15,7 +15,7 @@ from ...recording import Recording, resting_length_of
 from .. import inspection
 from ..diagnosis import DataUse, support_of
 from ..estimation import in_order
-from ..inspection import CONTRACTION_BAND, RELATIVE_BAND
+from ..inspection import CONTRACTION_BAND, RELATIVE_BAND, branch_name
 from . import loop_data as data
 from .loop_result import HysteresisLoop, LoopFit
 from .result import HysteresisFit, assess_fit
@@ -35,7 +35,7 @@ def find_loops(
     """The loops in the runs of recordings, one for each kind and level; a second run at a level
     validates the first.
 
-    Each run with a rising and a falling branch gives a loop; if a recording has several runs, the
+    Each run with both branches gives a loop; if a recording has several runs, the
     loop is named after the file and the rows of the run, and runs of one direction are left out. A
     muscle of another resting length or another specimen gives no repeat. A recording without a
     usable run is left out with an AirmuscleWarning if another one has a loop.
@@ -142,7 +142,8 @@ def _make_loop(
         rows &= sensors["force"].censoring(force) == 0
     rows = rows if all_rows else rows & inspection.quasi_static_rows(recording, sensors)
     direction = _directions(recording, friction_path)
-    for sign, branch in ((1, "rising"), (-1, "falling")):
+    varied = "pressure" if isinstance(friction_path, data.PressurePath) else "contraction"
+    for sign in (1, -1):
         if not np.any((direction == sign) & rows):
             count = np.count_nonzero(direction == sign)
             excluded = (
@@ -151,9 +152,10 @@ def _make_loop(
                 else ""
             )
             raise IdentificationError(
-                f"{recording.origin}: the {branch} branch has no rows to fit{excluded}, but a loop"
-                " needs a rising and a falling branch. Give such a run, or run it more slowly"
-                " where its rows are not quasi-static.",
+                f"{recording.origin}: the {branch_name(varied, sign)} branch has no rows to"
+                f" fit{excluded}, but a loop needs both branches, {branch_name(varied, 1)} and"
+                f" {branch_name(varied, -1)}. Give such a run, or run it more slowly where its rows"
+                " are not quasi-static.",
                 hint=Hint("To fit all rows, if only the length changes quickly", "all_rows", True),
             )
     if (
@@ -241,7 +243,7 @@ def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | Non
         raise IdentificationError(
             f"{run.origin}: {rows} fitted rows along a path of {length:.3g} m cannot determine"
             f" {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of"
-            " the static curve. Give a run with a rising and a falling branch, or include more"
+            " the static curve. Give a run with both branches, or include more"
             " rows."
         )
     fitted, undetermined = search_parameters(friction, (run,))

@@ -213,7 +213,7 @@ class HysteresisFit(FrictionFit):
     """A friction law fitted to a loop, compared with the same static curve without friction; forces
     in N.
 
-    `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that
+    `gap` is the rms difference of the two branches, `residual_gap` the part that
     the friction does not explain. `repeatability` is the standard deviation of one run about the
     mean of it and a second one; an error below it means overfitting. It is NaN without a second
     run.

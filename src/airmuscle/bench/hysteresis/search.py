@@ -85,8 +85,8 @@ def _bin_means(path: Array, values: Array, edges: Array) -> tuple[Array, Array]:
 
 
 def branch_gap(path: Array, values: Array, direction: Array) -> BinnedDifference:
-    """Falling minus rising branch in bins along the path; `direction` is 1 where the path rises, -1
-    where it falls.
+    """The branch along which the path falls minus the other one, in bins along the path;
+    `direction` is 1 where the path rises, -1 where it falls.
     """
     rising = direction > 0
     falling = direction < 0

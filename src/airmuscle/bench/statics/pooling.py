@@ -220,7 +220,7 @@ def check_poolable(law: PooledLengthLaw, points: FitPoints) -> Specimens:
             f"{points.joined.origin}: partial pooling needs two specimens or more, but there is"
             f" one, {names[0] if names else 'none'}. Give recordings of several muscles of the"
             " type, or a law of one.",
-            cause="it needs recordings of two specimens or more",
+            cause="data of two specimens or more are required",
         )
     order = list(lengths)
     member = np.repeat(

@@ -138,8 +138,9 @@ def end_point_table(choices: Sequence[MuscleChoice]) -> Table:
             columns[f"{name}, {end}"] = TableColumn(values, unit, shown)
     columns["reserve"] = TableColumn([choice.design.reserve for choice in choices], "1", "%")
     note = (
-        "Long and short: the extended and the contracted end point of each muscle. Reserve: force"
-        " beyond the load at the maximum working pressure, as a part of the load."
+        "'Long' and 'short' denote the extended and the contracted end point of each muscle."
+        " 'Reserve' is the force beyond the load at the maximum working pressure, as a part of the"
+        " load."
     )
     return Table("choices", "Choices, best first", columns, note)
 

@@ -17,7 +17,7 @@ def working_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
     valid = validity_range_of(entry.characteristic, entry.validity_range)
     if valid is None:
         raise ParameterError(
-            "no validity range is stated for its law; add [validity_range] to a muscle file"
+            "no validity range is stated for its law, whose errors are therefore unknown"
         )
     if isinstance(entry.series, ElasticSeriesElement):
         raise ParameterError(

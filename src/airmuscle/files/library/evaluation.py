@@ -198,10 +198,10 @@ def _warnings(evaluation: Evaluation) -> Iterator[str]:
     if excesses := "; ".join(ratings.excesses(**point._asdict()) if ratings is not None else ()):
         if not is_measured:
             raise RatingError(
-                f"beyond the values that the maker permits, and not measured: {excesses}. Choose a"
-                " permitted point, or a larger muscle."
+                f"the point exceeds the ratings of the maker and the measured range: {excesses}."
+                " Choose a permitted point, or a larger muscle."
             )
-        yield f"beyond the values that the maker permits: {excesses}."
+        yield f"the point exceeds the ratings of the maker: {excesses}."
     if point.force < 0:
         yield "the force is negative; a muscle cannot push and is slack here."
     if limits is not None and not is_measured:

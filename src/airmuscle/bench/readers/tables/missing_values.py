@@ -274,7 +274,10 @@ def _remedies(faulty_cells: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hi
         and not any(map(str.isdigit, texts[0]))
     ):
         yield Hint(
-            "If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping"
+            f"If '{texts[0]}' stands for a missing value",
+            "missing",
+            DropMissing((texts[0],)),
+            "ColumnMapping",
         )
     if any(column.missing[row] for row, column in faulty_cells):
         yield Hint(

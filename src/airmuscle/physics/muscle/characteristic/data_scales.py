@@ -86,7 +86,7 @@ class DataScales:
     def check_lengths(self) -> Self:
         """These scales. Raises IdentificationError for fewer than two resting lengths."""
         if self.length_count < 2:
-            refuse_guess("it needs recordings of two resting lengths or more")
+            refuse_guess("data of two resting lengths or more are required")
         return self
 
 

@@ -51,7 +51,7 @@ class LoopScales:
         if not stroke > 0:
             raise IdentificationError(
                 "the displacement of the friction is constant, so it cannot be identified. Give a"
-                " run with a rising and a falling branch."
+                " run with both branches, for example contracting and extending."
             )
         return cls(stroke, max(float(np.std(force)), MIN_FRICTION), elements)
 
