@@ -55,6 +55,9 @@ ARM = (
 )
 KNEE = URDF.replace('"arm"', '"knee"')
 KNEE_ROUTES = URDF_ROUTES.replace("arm_flexor", "knee_flexor")
+TORQUES = "angle [deg],torque [N m]\n" + "".join(
+    f"{angle},{6.0 + 3.0 * np.sin(np.radians(2.0 * angle)):.4g}\n" for angle in range(0, 61, 5)
+)
 WALK = "time [s],hip [deg],knee [deg],ankle [deg]\n" + "".join(
     f"{0.1 * i:.1f},{10.0 * np.sin(0.6 * i) - 5.0:.2f},{30.0 + 20.0 * np.sin(0.6 * i):.2f},0\n"
     for i in range(11)
@@ -275,7 +278,7 @@ def _write_simulation(folder: Path) -> None:
         (folder / f"{name}.toml").write_text(content, encoding="utf-8")
     _write_loops(folder)
     shutil.copy(EXAMPLES / "air_leg.xml", folder / "leg.xml")
-    bodies = {"leg.urdf": KNEE, "routes.toml": KNEE_ROUTES, "walk.csv": WALK}
+    bodies = {"leg.urdf": KNEE, "routes.toml": KNEE_ROUTES, "walk.csv": WALK, "torque.csv": TORQUES}
     for name, content in bodies.items():
         (folder / name).write_text(content, encoding="utf-8")
     cluster = (EXAMPLES / "cluster_local.toml").read_text(encoding="utf-8")
