@@ -95,7 +95,7 @@ def test_friction_that_grows_with_pressure_is_found_and_predicts_a_pressure_betw
     assert [run.amplitude for run in best.agreement] == pytest.approx(
         [GROWING[p] for p in LEVELS], rel=0.05
     )
-    assert "times 0.2" in best.verdict
+    assert "multiplied by 0.2" in best.verdict
     assert best.verdict.endswith("The data justify this friction for all runs.")
 
 
