@@ -75,6 +75,8 @@ VALUES = {
     "censoring": ...,
     "free": ("circuit.fill.conductance",),
     "": ...,
+    "spreads": ("mechanism.mass=20 %",),
+    "rig": ...,
 }
 """A value of every argument that a hint of the source names."""
 
