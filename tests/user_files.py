@@ -297,7 +297,7 @@ def _write_loops(folder: Path) -> None:
         (folder / f"{name}.toml").write_text(short, encoding="utf-8")
 
 
-def write_contribution(folder: Path) -> None:
+def write_contribution(folder: Path, rms_error: str = "") -> None:
     """A contribution whose questions are answered: muscle, records of the fit, one held out."""
     folder.mkdir()
     write(force_map(1), folder / "map.csv")
@@ -313,7 +313,9 @@ def write_contribution(folder: Path) -> None:
         rig=dict.fromkeys(("pressure", "force", "motion", "procedure"), "simulated"),
     )
     records = [
-        dataclasses.replace(record, use="held out" if record.file == "later.csv" else "fit")
+        dataclasses.replace(record, use="held out", rms_error=rms_error)
+        if record.file == "later.csv"
+        else dataclasses.replace(record, use="fit")
         for record in answered.records
     ]
     text = declaration_toml(dataclasses.replace(answered, records=tuple(records)))
@@ -330,7 +332,7 @@ def _write_audited(folder: Path) -> None:
 
 
 def _write_contribution(folder: Path) -> None:
-    write_contribution(folder / "contribution")
+    write_contribution(folder / "contribution", "2 N")
 
 
 WRITERS: tuple[Callable[[Path], None], ...] = (

@@ -68,7 +68,10 @@ from .files import read_text as read_text
 from .fitted_entry import find_initial_law as find_initial_law
 from .fitted_entry import missing_geometry as missing_geometry
 from .fitted_entry import resting_lengths as resting_lengths
+from .force_map import GRID as GRID
+from .force_map import force_map_csv as force_map_csv
 from .grade import grade_of as grade_of
+from .json_form import muscle_json as muscle_json
 from .loading import SCENARIO_TABLES as SCENARIO_TABLES
 from .loading import kind_of as kind_of
 from .plant_reader import SIZES as SIZES

@@ -2,28 +2,22 @@
 
 import dataclasses
 import functools
-import warnings
 from typing import Any
 
 import numpy as np
 
 from ...bench.reported import Reported
 from ...core import Array, ParameterError, cite, leaves, plotting
-from ...core.errors import AirmuscleWarning
-from ...physics.muscle.characteristic.base import Characteristic
-from ...physics.muscle.characteristic.modes import values_or_nan
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.parameter_tables import ends_of_lists
 from .entry import Entry
 from .entry_display import PARTS
+from .force_map import UNSTATED_CONTRACTIONS, UNSTATED_PRESSURES, forces_on_grid
 
 PRESSURES = 5
 CONTRACTIONS = 41
 """Isobars of the comparison, and points of each (chosen)."""
-UNSTATED_PRESSURES = (0.0, 6e5)
-UNSTATED_CONTRACTIONS = (0.0, 0.25)
-"""Range of a law that states none (chosen)."""
 EQUAL = 1e-9
 """Difference of parameters, as a part of the greater one, up to which they are equal (chosen)."""
 
@@ -181,7 +175,7 @@ def compare_entries(first: Entry, second: Entry) -> EntryDifference:
     )
     isobars = np.linspace(*pressures, PRESSURES)
     points = np.linspace(*contractions, CONTRACTIONS)
-    forces = [_forces(entry.characteristic, isobars, points) for entry in (first, second)]
+    forces = [forces_on_grid(entry.characteristic, isobars, points) for entry in (first, second)]
     return EntryDifference(
         first, second, _parameter_differences(first, second), isobars, points, np.array(forces)
     )
@@ -204,15 +198,6 @@ def _common(
             f" {name} in common. Compare entries that were measured in the same range."
         )
     return low, high
-
-
-def _forces(law: Characteristic, pressures: Array, contractions: Array) -> Array:
-    """Tensions [N], shape (P, C), 0 where the muscle is slack; not a number without a solution."""
-    grid = np.meshgrid(pressures, contractions, indexing="ij")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AirmuscleWarning)  # the grid is inside both ranges
-        values = values_or_nan(law.force, grid[0].ravel(), grid[1].ravel())
-    return np.maximum(np.asarray(values), 0.0).reshape(grid[0].shape)
 
 
 def _parameter_differences(first: Entry, second: Entry) -> tuple[ParameterDifference, ...]:

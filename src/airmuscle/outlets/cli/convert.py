@@ -10,6 +10,7 @@ from ...bench.diagnosis import read
 from ...bench.readers import Decimation, find_files, write
 from ...bench.readers.writer import EXTENSIONS
 from ...core import FileError
+from ...files import library
 from ..requests import ReadingRequest, option, optional, request
 from .measurements import print_row_notes
 from .options import Json
@@ -21,6 +22,10 @@ Source = Annotated[str, Argument("FILE", "A file, folder or glob pattern, as for
 Target = Annotated[Path, Argument("TARGET", f"The file to write: {', '.join(EXTENSIONS)}.")]
 
 
+MUSCLE_FORMS = ("json", "csv-map")
+"""Forms of a muscle file besides TOML."""
+
+
 @request
 class ConvertRequest:
     """Form of the files that are written."""
@@ -30,6 +35,12 @@ class ConvertRequest:
     )
     max_rows: int | None = optional(
         "Keep every n-th row, N at most; default: all rows.", bounds=(1, math.inf)
+    )
+    to: str | None = optional(
+        "FILE is a muscle file or a library entry, and TARGET: json (all parameters with units) or"
+        " csv-map (forces: contraction down, pressure across).",
+        choices=MUSCLE_FORMS,
+        metavar="FORM",
     )
 
 
@@ -45,7 +56,7 @@ def convert(
 
     \b
     Values are in SI units, and all rows are kept. One recording becomes TARGET; several become
-    files with a number before the extension.
+    files with a number before the extension. With --to, FILE is a muscle.
 
     \b
     Examples:
@@ -53,7 +64,12 @@ def convert(
       airmuscle convert "runs/*.csv" runs.h5 --mapping rig.toml
       airmuscle convert logger.csv run.parquet --time uniform --resting-length "300 mm"
       airmuscle convert run/recording.csv plain.csv --plain
+      airmuscle convert dmsp-20-300 map.csv --to csv-map
+      airmuscle convert my/muscle.toml muscle.json --to json
     """
+    if request.to is not None:
+        _convert_muscle(source, target, request.to, json)
+        return
     if request.plain and target.suffix.lower() != ".csv":
         raise click.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
@@ -87,3 +103,18 @@ def convert(
         return
     for recording, path in zip(recordings, paths, strict=True):
         echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")
+
+
+def _convert_muscle(name: str, target: Path, form: str, json: bool) -> None:
+    """Write a muscle in another form."""
+    entry = library.load_law(name)
+    if target.exists() and Path(name).exists() and target.samefile(name):
+        raise FileError(f"{target}: is the muscle and would be lost. Choose another target.")
+    as_text = library.muscle_json if form == "json" else library.force_map_csv
+    library.write_text(target, as_text(entry))
+    if json:
+        print_json({"files": [{"file": str(target)}]})
+        return
+    echo(f"file: {target}")
+    if form == "csv-map":
+        echo(f'read it back by: --grid "{library.GRID}"')
