@@ -19,6 +19,8 @@ MAX_POINTS = 4000
 MIN_POINTS_OF_RUN = 150
 MAX_POINTS_OF_RUN = 1000
 """Number of runs and of points of all runs, least and greatest number of one (chosen)."""
+ROW_ROUNDING = 1e-6
+"""Distance from a row, in rows, that is rounding (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -118,7 +120,11 @@ class _Grid:
         if not is_increasing:
             return untimed
         even = np.linspace(time[0], time[-1], points)
-        return cls(np.interp(even, time, rows), float(even[1] - even[0]))
+        place = np.interp(even, time, rows)
+        row = np.round(place)
+        # a point at a row takes nothing of the next one, whose residual may be unknown
+        is_at_row = np.abs(place - row) < ROW_ROUNDING
+        return cls(np.where(is_at_row, row, place), float(even[1] - even[0]))
 
     def values(self, column: Array) -> Array:
         return np.interp(self.place, np.arange(column.size), column)

@@ -23,7 +23,13 @@ import numpy.typing as npt
 
 from ...core import Array
 from ...recording import Recording
-from ..inspection import estimate_noise, estimate_resolution
+from ..inspection import (
+    distinct_readings,
+    estimate_noise,
+    estimate_resolution,
+    reading_numbers,
+    rounding,
+)
 from .cause_names import (
     AVERAGE,
     CREEP,
@@ -84,6 +90,9 @@ WIDTHS = (1.15, 1.03)
 """Ratios of the times of the parabolas that refine the best one (chosen)."""
 SLIPS = np.array([0.02, 0.05, 0.1, 0.2])
 """Travels of friction from a turning point on, as fractions of the range (chosen)."""
+NEGLIGIBLE = 1e-6
+"""Size of what a combination of columns of unit length has beside others up to which it depends on
+them (chosen)."""
 ROWS_OF_RUN = 12.0
 """Number of independent rows of a run, against which the offsets and gains of all runs count
 (chosen)."""
@@ -110,8 +119,8 @@ def misfit_causes(
     total = float(rest @ rest)
     if rest.size < MIN_ROWS or not total > 0.0:
         return ()
-    surface = np.linalg.qr(traces.rows(_surface(traces)))[0]
-    unexplained = _Unexplained(surface, rest - surface @ (surface.T @ rest))
+    surface = _basis_of(traces.rows(_surface(traces)))
+    unexplained = _Unexplained(surface, _beside(surface, rest))
     causes = [MisfitCause(FORM, 1.0 - unexplained.squares / total)]
     forms = [_best(group, unexplained) for group in _groups_of_forms(traces, unexplained.rest)]
     steps = _share_of_steps(_steps(recordings, traces), forms, unexplained, total)
@@ -158,14 +167,13 @@ class _Unexplained(NamedTuple):
 
     def fitted(self, form: _Form) -> Array:
         """What a form takes up of the rest (N,)."""
-        columns = self._beside(form.columns)
         if form.limits is not None:
-            (column,) = columns.T
+            (column,) = _beside(self.basis, form.columns).T
             square = float(column @ column)
             factor = float(column @ self.rest) / square if square > 0.0 else 0.0
             return np.asarray(np.clip(factor, *form.limits) * column)
-        factors = np.linalg.lstsq(columns, self.rest, rcond=1e-9)[0]
-        return np.asarray(columns @ factors)
+        columns = _basis_of(form.columns, self.basis)
+        return np.asarray(columns @ (columns.T @ self.rest))
 
     def taken_up(self, form: _Form) -> float:
         """The squares that a form takes up, less those that it would by chance."""
@@ -180,11 +188,32 @@ class _Unexplained(NamedTuple):
 
     def without(self, form: _Form) -> "_Unexplained":
         """What the form leaves."""
-        basis = np.linalg.qr(np.hstack([self.basis, form.columns]))[0]
-        return _Unexplained(basis, self.rest - self.fitted(form))
+        further = _basis_of(form.columns, self.basis)
+        return _Unexplained(np.hstack([self.basis, further]), self.rest - self.fitted(form))
 
-    def _beside(self, columns: Array) -> Array:
-        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+def _beside(basis: Array, values: Array) -> Array:
+    """What values (N, ...) have beside an orthonormal basis (N, B)."""
+    return np.asarray(values - basis @ (basis.T @ values))
+
+
+def _basis_of(columns: Array, beside: Array | None = None) -> Array:
+    """An orthonormal basis (N, B) of what columns (N, K) have beside an orthonormal one.
+
+    What depends on the others adds nothing, such as a fourth power at four levels: its direction
+    would be that of the rounding errors.
+    """
+    lengths = np.linalg.norm(columns, axis=0)
+    units = columns / np.where(lengths > 0.0, lengths, 1.0)
+    if beside is not None:
+        units = _beside(beside, units)
+    directions, triangle = np.linalg.qr(units)
+    parts, sizes, _ = np.linalg.svd(triangle)
+    basis = directions @ parts[:, sizes > NEGLIGIBLE]
+    if beside is not None:
+        # the second time removes what rounding has left
+        basis = np.linalg.qr(_beside(beside, basis))[0]
+    return np.asarray(basis)
 
 
 def _best(forms: Iterator[_Form], unexplained: _Unexplained) -> _Form:
@@ -331,8 +360,7 @@ class _Sensor(NamedTuple):
 
 def _squares_beside(columns: Array, target: Array) -> float:
     """The squares of a target (N,) that columns (N, K) leave."""
-    basis = np.linalg.qr(columns)[0]
-    left = target - basis @ (basis.T @ target)
+    left = _beside(_basis_of(columns), target)
     return float(left @ left)
 
 
@@ -503,8 +531,10 @@ def _step(recording: Recording, quantity: str) -> float:
     readings, if a ramp goes through them while the other quantity is held. 0 of a held one.
     """
     values = recording[quantity][np.isfinite(recording[quantity])]
-    readings = np.unique(values)
-    repeated = float(np.mean(np.diff(values) == 0.0)) if values.size > 1 else 0.0
+    tolerance = rounding(quantity, values)
+    readings = distinct_readings(values, tolerance)
+    numbers = reading_numbers(values, tolerance)
+    repeated = float(np.mean(np.diff(numbers) == 0)) if values.size > 1 else 0.0
     if readings.size < MIN_READINGS or repeated < MIN_REPEATED:
         return 0.0
     step = estimate_resolution(values)
