@@ -313,6 +313,26 @@ def test_the_causes_follow_neither_the_order_of_runs_nor_last_digits_at_three_le
         assert [cause.share for cause in causes_again] == shares
 
 
+def late_and_coarse(run: Run) -> None:
+    delay(run)
+    coarse_pressure(run)
+
+
+def remark_on_loops(runs: list[Recording]) -> str:
+    notes = map(str, fit(ContractileSurface.blank(2), runs).notes)
+    (remark,) = (note for note in notes if note.startswith("The loops of the ramps"))
+    return remark
+
+
+@pytest.mark.parametrize("plant", [delay, low_pass, late_and_coarse])
+def test_the_remark_on_a_delay_follows_no_last_digits(plant: Callable[[Run], None]):
+    """The pressure reads its maximum twice or more, and other levels as well."""
+    runs = Laboratory("ramps", MUSCLES[0], 0.5, 1).runs(plant)[::2]
+    random = np.random.default_rng(3)
+    again = [last_digits_moved(run, random) for run in runs]
+    assert remark_on_loops(again) == remark_on_loops(runs)
+
+
 def test_creep_is_not_called_friction_in_the_remarks():
     runs = Laboratory("ramps", MUSCLES[0], 0.5, 1).runs(relaxation)
     text = " ".join(fit(ContractileSurface.blank(4), runs).notes)

@@ -20,7 +20,14 @@ from ...core import Array, Hint, HintedText
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from ..estimation import reading_deviations
-from ..inspection import branch_directions, branch_name, find_branches, remembered, running_median
+from ..inspection import (
+    branch_directions,
+    branch_name,
+    find_branches,
+    remembered,
+    rounding,
+    running_median,
+)
 
 MIN_LOOP_ROWS = 12
 MIN_LOOPS = 2
@@ -134,7 +141,7 @@ def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
         time = recording["time"][rows]
         pressure = recording["pressure"][rows]
         force = running_median(recording["force"][rows], 3)
-        top = int(np.argmax(pressure))
+        top = int(np.argmax(_is_greatest(pressure)))
         step = float(np.median(np.diff(time)))
         # A filter rounds one of them, a dwell both.
         dwell = min(_rows_at_top(pressure), _rows_at_top(force))
@@ -142,8 +149,14 @@ def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
             continue
         loop = _loop_delay(time, pressure, force, top)
         if loop is not None:
-            peak = float(time[int(np.argmax(force))] - time[top])
+            maxima = [np.mean(time[_is_greatest(values)]) for values in (pressure, force)]
+            peak = float(maxima[1] - maxima[0])
             yield loop[0], peak, loop[1], step, _rows_at_top(pressure), _rows_at_top(force)
+
+
+def _is_greatest(values: Array) -> npt.NDArray[np.bool_]:
+    """The rows (N,) whose reading is the maximum, which a ramp may read twice."""
+    return np.asarray(values >= np.max(values) - rounding("", values))
 
 
 def _rows_at_top(values: Array) -> int:
@@ -176,12 +189,14 @@ def _line(
     time: Array, pressure: Array, force: Array, part: slice, low: float, high: float
 ) -> Array | None:
     """The force [N] in the middle of an interval of pressure on one branch, and its rate [N/s];
-    None with few rows.
+    None with few rows, or with a single reading of the pressure.
     """
     inside = (pressure[part] >= low) & (pressure[part] <= high)
     if np.count_nonzero(inside) < 3:
         return None
     p = pressure[part][inside]
+    if np.ptp(p) <= rounding("pressure", pressure):
+        return None
     f = force[part][inside]
     t = time[part][inside]
     level = np.polyfit(p - 0.5 * (low + high), f, 1)
