@@ -190,7 +190,7 @@ def extended(tmp_path_factory: pytest.TempPathFactory) -> Path:
     field = "    bootstrap: int | None = optional(\n"
     replace(root, OUTLETS / "requests" / "fit.py", field, option + field)
     (root / OUTLETS / "cli" / "count.py").write_text(COMMAND, encoding="utf-8")
-    row = '    CommandRow("count", "count", "count", "Count the rows of files."),\n'
+    row = '    CommandRow("count", "Count the rows of files."),\n'
     commands = OUTLETS / "cli" / "commands.py"
     replace(root, commands, "COMMANDS = (\n", f"COMMANDS = (\n{row}")
     return root
