@@ -291,3 +291,6 @@ def test_the_command_names_what_is_missing():
     result = airmuscle("plan", "joint-dmsp-20-regulators", "--max-pressure", "4 bar")
     assert result.exit_code == 2
     assert "--min-angle" in result.output
+    pressure = ("--max-pressure", "4 bar")
+    result = airmuscle("plan", "vessel-smc-itv2050", *pressure, "--duration", "5 s")
+    assert "--duration is 5 s; allowed range: 10 to 3600 s." in result.output

@@ -15,7 +15,7 @@ from command_line import airmuscle
 
 from airmuscle.design import cam_csv, cam_dxf, cam_svg, design_cam, linear_curve, read_cam_curve
 from airmuscle.engine import Schedule, simulate
-from airmuscle.errors import AirmuscleError, ParameterError, SolveError
+from airmuscle.errors import AirmuscleError, FileError, ParameterError, SolveError
 from airmuscle.files import load_law, load_plant
 from airmuscle.physics import (
     ArmLink,
@@ -149,6 +149,36 @@ def test_a_curve_of_a_file_is_met(tmp_path):
     taken = np.array([profile.integral(q) for q in cam.angle - cam.middle])
     contraction = route.offset + route.radii[0] * taken / cam.length
     assert contraction == pytest.approx(cam.contraction, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "angle [deg];torque [N m]\n0;10,5\n45;9,25\n90;8\n",
+        "angle [deg]\ttorque [N m]\n0\t10.5\n45\t9,25\n90\t8\n",
+        "\nangle [deg],torque [N m]\n0,10.5\n45,9.25\n90,8\n",
+    ],
+    ids=["semicolons", "tabulators", "commas"],
+)
+def test_a_table_of_any_spreadsheet_is_the_same_curve(tmp_path, text):
+    file = tmp_path / "curve.csv"
+    file.write_text(text, encoding="utf-8")
+    curve = read_cam_curve(file)
+    assert (curve.low, curve.high) == (0.0, math.pi / 2)
+    angles = np.array([0.0, math.pi / 4, math.pi / 2])
+    np.testing.assert_allclose(curve.torque(angles), [10.5, 9.25, 8.0], rtol=1e-12)
+
+
+def test_a_comma_for_thousands_is_no_decimal_comma(tmp_path):
+    file = tmp_path / "curve.csv"
+    file.write_text('angle [deg],torque [N m]\n0,"1,000"\n45,9\n90,8\n', encoding="utf-8")
+    with pytest.raises(FileError, match="with a decimal point"):
+        read_cam_curve(file)
+
+
+def test_a_reversed_range_is_named_in_degrees():
+    with pytest.raises(ParameterError, match="range of the angle is 90 to 0 deg"):
+        linear_curve(math.pi / 2, 0.0, 10.0)
 
 
 REFUSED = {

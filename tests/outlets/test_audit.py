@@ -86,6 +86,40 @@ def test_the_laws_of_the_library_pass(name: str):
     assert audit_law(law_of_entry(load_law(name))).findings == ()
 
 
+NOT_FINITE = {
+    "no number": lambda pressure, contraction: np.full(np.shape(pressure), np.nan),
+    "infinite": lambda pressure, contraction: np.full(np.shape(pressure), np.inf),
+    "minus infinite": lambda pressure, contraction: np.full(np.shape(pressure), -np.inf),
+    "no number without pressure": lambda pressure, contraction: np.where(
+        pressure > 0.0, 1e-3 * pressure * (0.3 - contraction), np.nan
+    ),
+    "infinite where it is short": lambda pressure, contraction: np.where(
+        contraction < 0.2, 1e-3 * pressure * (0.3 - contraction), np.inf
+    ),
+}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("kind", NOT_FINITE)
+def test_a_force_that_is_no_number_is_named_as_such_and_as_no_memory(kind: str):
+    result = audit_law(AuditedLaw("law", NOT_FINITE[kind], (0.0, 6e5), (0.0, 0.25)))
+    named = [finding.rule for finding in result.findings]
+    assert "finite" in named
+    assert "no memory" not in named
+
+
+def test_every_law_counts_the_points_at_which_it_was_examined():
+    library = audit_law(law_of_entry(load_law("dmsp-20-300")))
+    assert library.evaluations > 1000
+    calls = []
+
+    def force(pressure, contraction):
+        calls.append(np.size(pressure))
+        return 2e-3 * pressure * (1.0 - contraction / 0.25)
+
+    assert audit_law(AuditedLaw("law", force, (0.0, 6e5), (0.0, 0.25))).evaluations == sum(calls)
+
+
 def test_the_replay_is_the_call_with_its_value():
     finding = audit_law(law("explodes")).findings[0]
     call, value = finding.replay[0].split(" = ")
@@ -150,6 +184,15 @@ def test_a_list_of_another_form_is_refused(tmp_path, content, message):
     file.write_text(content, encoding="utf-8")
     with pytest.raises(FileError, match=message):
         audit_constants(file)
+
+
+def test_constants_of_a_spreadsheet_with_semicolons_and_decimal_commas_are_read(tmp_path):
+    file = tmp_path / "constants.csv"
+    file.write_text("name;value;unit;printed\nbraid angle;0,4;rad;0,44\n", encoding="utf-8")
+    answer = json.loads(airmuscle("audit", str(file), "--json").stdout)
+    assert answer["audit"]["problems"] == [
+        "braid angle is 0.4 in the code and 0.44 in print (0.909 times)."
+    ]
 
 
 def test_points_of_a_file_are_a_law_where_they_are(tmp_path):

@@ -66,6 +66,7 @@ WRONG = {
     "two angles": ((*NINE, *ELASTIC, "--turn", "60 mm"), "give --angle or --turn, one of both"),
     "a wrong unit": (("--bore", "7 bar", *NINE[2:], *ELASTIC), "--bore"),
     "a turn of nothing": ((*NINE, "--shore", "50", "--turn", "0 mm"), "it must be positive"),
+    "an angle between threads": ((*NINE, "--shore", "50", "--angle", "60 deg"), "below 54.7 deg"),
     "foam": ((*NINE, "--shore", "10", "--angle", "25 deg"), "give its Young's modulus"),
 }
 

@@ -1,6 +1,6 @@
 """Audit of a list of constants: printed against coded values, and values that no muscle has."""
 
-import csv
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...core import FileError, UnitError, quantity
+from ..body.poses import separated_rows
 from .finding import AuditFinding, AuditResult
 
 ROUNDING = 0.01
@@ -62,8 +63,8 @@ def audit_constants(path: Path) -> AuditResult:
 def is_list_of_constants(path: Path) -> bool:
     """Whether the first line of a file names the columns of a list of constants."""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
-        heading = {word.strip().lower() for word in file.readline(1000).split(",")}
-    return {"name", "value"} <= heading
+        heading = next(separated_rows([file.readline(1000)]), [])
+    return {"name", "value"} <= {word.strip().lower() for word in heading}
 
 
 def _read(path: Path) -> list[dict[str, str]]:
@@ -71,9 +72,10 @@ def _read(path: Path) -> list[dict[str, str]]:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{path}: cannot be read as text ({error}).") from None
-    lines = list(csv.DictReader(text.splitlines()))
+    heading, *lines = [line for line in separated_rows(text.splitlines()) if line] or [[]]
+    names = [word.strip().lower() for word in heading]
     rows = [
-        {str(key).strip().lower(): str(value or "").strip() for key, value in line.items() if key}
+        {name: cell.strip() for name, cell in itertools.zip_longest(names, line, fillvalue="")}
         for line in lines
     ]
     if not rows or not {"name", "value"} <= rows[0].keys():

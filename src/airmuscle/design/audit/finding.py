@@ -82,4 +82,5 @@ class AuditResult(Reported):
                 " stated range and of its surroundings were examined."
             )
         noun = "finding" if count == 1 else "findings"
-        return f"{count} {noun} by {number} rules; each has lines that show it again."
+        examined = "rule" if number == 1 else "rules"
+        return f"{count} {noun} by {number} {examined}; each has lines that show it again."

@@ -327,7 +327,8 @@ def find_state(law: AuditedLaw) -> RuleOutcome:
     again = np.empty_like(first)
     again[order] = law.force(pressures[order], contractions[order])
     difference = np.nan_to_num(np.abs(first - again))
-    scale = max(float(np.nanmax(np.abs(first))), 1e-12)
+    sizes = np.abs(first[np.isfinite(first)])
+    scale = float(np.max(sizes, initial=1e-12))
     place = int(np.argmax(difference))
     if difference[place] <= STATE * scale:
         return RuleOutcome()

@@ -6,7 +6,7 @@ import csv
 import itertools
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ MOST_CORNERS = 10
 MAX_ROWS = 200_000
 """Greatest number of rows of a table of poses (chosen)."""
 TIME = "time"
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*")
 _HEADING = re.compile(r"\s*(?P<name>[^\[\]]+?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*\Z")
 
 
@@ -97,11 +98,13 @@ def read_poses(path: Path, body: Body, *, needs_time: bool = False) -> PoseTable
 
 
 def read_table_of_numbers(path: Path) -> list[list[str]]:
-    """The rows of a CSV file, the heading first, without empty ones. Raises FileError."""
+    """The rows of a CSV file, the heading first, without empty ones, read by `separated_rows`.
+    Raises FileError.
+    """
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = []
-            for row in csv.reader(file):
+            for row in separated_rows(file):
                 if any(cell.strip() for cell in row):
                     rows.append(row)
                 if len(rows) > MAX_ROWS:
@@ -112,6 +115,21 @@ def read_table_of_numbers(path: Path) -> list[list[str]]:
     if len(rows) < 2:
         raise FileError(f"{path}: needs a heading and at least one row of numbers.")
     return rows
+
+
+def separated_rows(lines: Iterable[str]) -> Iterator[list[str]]:
+    """The rows of text whose heading is separated by commas, semicolons or tabulators; with the
+    latter two a number may have a decimal comma, as spreadsheets of many countries write it.
+    """
+    lines = itertools.dropwhile(lambda line: not line.strip(), lines)
+    heading = next(lines, "")
+    separator = next((mark for mark in ";\t" if mark in heading), ",")
+    rows = csv.reader(itertools.chain([heading], lines), delimiter=separator)
+    if separator == ",":
+        yield from rows
+        return
+    for row in rows:
+        yield [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row]
 
 
 def numbers_of(path: Path, lines: list[list[str]], width: int) -> Array:

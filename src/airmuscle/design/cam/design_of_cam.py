@@ -51,7 +51,8 @@ def linear_curve(low: float, high: float, torque: float, stiffness: float = 0.0)
     """
     if not low < high:
         raise ParameterError(
-            f"the range of the angle is {low:.4g} to {high:.4g} rad; the first must be less."
+            f"the range of the angle is {math.degrees(low):.4g} to {math.degrees(high):.4g} deg;"
+            " the first must be less."
         )
     middle = 0.5 * (low + high)
     name = f"torque of {torque:.4g} N m"

@@ -11,6 +11,8 @@ from .rubber_hardness import HARDNESSES, modulus_of_hardness
 
 INACTIVE_DIAMETERS = 1.0
 """Length at both ends together that does not contract, in diameters of the braid (chosen)."""
+NEUTRAL_ANGLE = math.atan(math.sqrt(2.0))
+"""Angle [rad] at which the volume within inextensible threads is greatest, 54.7 degrees."""
 YOUNG = 6.0
 """Young's modulus over C_1 of neo-Hookean rubber: E = 3 mu, mu = 2 C_1."""
 
@@ -90,7 +92,7 @@ class MuscleRecipe:
 
     def check(self) -> None:
         """Raise ParameterError for a tube without one stated elasticity, a braid that is narrower
-        than the tube, or threads that do not fit beside each other.
+        than the tube or lengthens under pressure, or threads that do not fit beside each other.
         """
         if (self.hardness == 0.0) == (self.modulus == 0.0):
             raise ParameterError(
@@ -99,6 +101,17 @@ class MuscleRecipe:
             )
         if self.hardness:
             modulus_of_hardness(self.hardness)
+        self._check_braid()
+        self._check_threads()
+
+    def _check_braid(self) -> None:
+        if self.braid_angle >= NEUTRAL_ANGLE:
+            raise ParameterError(
+                f"MuscleRecipe: a braid of {math.degrees(self.braid_angle):.4g} deg makes the"
+                " muscle longer under pressure; allowed range: below"
+                f" {math.degrees(NEUTRAL_ANGLE):.3g} deg. Measure the angle between thread and"
+                " axis; between crossing threads it is twice as large."
+            )
         narrowest = self._braid_on_tube
         if self.braid_diameter and self.braid_diameter < narrowest * (1.0 - 1e-9):
             raise ParameterError(
@@ -106,6 +119,8 @@ class MuscleRecipe:
                 f" mm, and on a tube of {1e3 * self._tube_diameter:.4g} mm it has"
                 f" {1e3 * narrowest:.4g} mm or more. Measure the braid on the tube."
             )
+
+    def _check_threads(self) -> None:
         if self.threads < 0 or self.threads % 2:
             raise ParameterError(
                 f"MuscleRecipe: threads is {self.threads}; it must be an even number, half of them"

@@ -80,7 +80,7 @@ class AuditRequest:
             volume = FunctionProcess(self.volume)
             enclosed = EnclosedVolume(lambda at: volume(at, 0.0), self.resting_length)
         law = AuditedLaw(name, function, (0.0, self.pressure), (0.0, self.contraction), enclosed)
-        return audit_law(law, lambda: function.evaluations)
+        return audit_law(law)
 
     def _audit_of_entry(self, name: str) -> AuditResult:
         return audit_law(law_of_entry(load_law(name)))

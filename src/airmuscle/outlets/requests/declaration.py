@@ -132,16 +132,19 @@ class Option:
             if value != YES:
                 raise RequestError(f"{where} is '{value}'; give {YES}, or nothing.", self.name)
             value = True
+        self._check_bounds(value, where)
+        return value
+
+    def _check_bounds(self, value: Any, where: str) -> None:
         low, high = self.bounds
         if (
             isinstance(value, int | float)
             and not isinstance(value, bool)
             and not low <= value <= high
         ):
-            raise RequestError(
-                f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name
-            )
-        return value
+            unit = "" if self.unit in ("", "1") else f" {self.unit}"
+            allowed = f"{low:g} to {high:g}{unit}"
+            raise RequestError(f"{where} is {value:g}{unit}; allowed range: {allowed}.", self.name)
 
 
 def option(
