@@ -319,6 +319,17 @@ def test_a_text_that_is_no_move_is_named(case):
     assert str(caught.value).startswith("--move")
 
 
+def test_the_sites_that_may_be_moved_are_named_once_and_without_geoms():
+    body = read_body(Path(__file__).parents[2] / "examples" / "air_leg.xml")
+    move = read_move("nowhere within 20 mm", "--move")
+    with pytest.raises(AirmuscleError, match="no route has a site") as caught:
+        resolved_moves(body, [move])
+    sites = str(caught.value).partition("there are ")[2].rstrip(".").split(", ")
+    assert "knee_front_insertion" in sites
+    assert not any(site.startswith("around") for site in sites)
+    assert len(set(sites)) == len(sites)
+
+
 def test_a_site_of_two_routes_is_not_moved(tmp_path):
     shared = ROD.replace('<site site="back"/>', '<site site="front"/>')
     body = read_body(written(tmp_path, shared))

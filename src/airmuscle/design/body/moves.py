@@ -19,7 +19,7 @@ from ...core import (
     quotable,
 )
 from ...files.library import read_toml
-from .body import Body, BodyRoute
+from .body import WRAPS, Body, BodyRoute
 from .simulator import load_simulator
 
 MOVE_KEYS = ("route", "site", "box", "within", "on", "clearance", "from")
@@ -249,7 +249,8 @@ def resolved_moves(body: Body, requests: Sequence[MoveRequest]) -> tuple[PointMo
 def _resolved(body: Body, request: MoveRequest) -> PointMove:
     where = request.where
     using = [route for route in body.routes if request.site in route.points]
-    known = [point for route in body.routes for point in route.points]
+    points = dict.fromkeys(point for route in body.routes for point in route.points)
+    known = [point for point in points if not point.startswith(WRAPS)]
     check_known(f"{where}: no route has a site", [request.site], known)
     if len(using) > 1:
         names = ", ".join(route.name for route in using)
