@@ -208,7 +208,7 @@ def test_scipy_and_python_control_see_the_same_system():
 def test_without_python_control_the_error_says_what_to_do(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "control", None)
     with pytest.raises(
-        AirmuscleError, match=r"pip install airmuscle.control., or use to_scipy\(\)"
+        AirmuscleError, match=r"pip install .airmuscle.control.., or use to_scipy\(\)"
     ):
         linearise(HANGING, moving(HANGING)).to_control()
 

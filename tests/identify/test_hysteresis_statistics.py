@@ -265,7 +265,7 @@ def hold(
 def test_evidence_of_creep_counts_two_parameters_of_each_element():
     recording = hold(Creep(100.0, (-1.0,), (10.0,)), 0.8, rows=40)
     fit = fit_creep(recording, "force")
-    larger = _fit_elements(recording["time"], recording["force"], 2)
+    larger = _fit_elements(recording["time"], recording["force"], 2).creep
     n = independent_rows(larger.value_at(recording["time"]) - recording["force"])
     squares = np.square(fit.rmse_by_order)
     for count in (1, 2):
@@ -276,7 +276,7 @@ def test_evidence_of_creep_counts_two_parameters_of_each_element():
 
 def test_close_time_constants_are_not_separated():
     recording = hold(Creep(100.0, (-5.0, -5.0), (6.0, 12.0)), 1e-4)
-    first, second = _fit_elements(recording["time"], recording["force"], 2).time_constants
+    first, second = _fit_elements(recording["time"], recording["force"], 2).creep.time_constants
     assert second >= 2.999 * first
 
 

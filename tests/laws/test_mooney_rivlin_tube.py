@@ -57,7 +57,7 @@ def test_the_tension_is_the_slope_of_energy_of_the_wall_less_that_of_the_air(
     angle: float, bore: float, wall: float, pressure: float, part: float, second: float
 ):
     thickness = wall * bore
-    tube = BraidedTube(bore + thickness + 1e-4, angle, 0.2, bore, thickness, 1e-4, 0.02)
+    tube = BraidedTube(bore, thickness, angle, 0.2, 1e-4, 1e-4, 0.02)
     law = MooneyRivlinTube(tube, 4e5, second * 1e5)
     contraction = part * law.contraction_range[1]
     force = law.unclamped_force(pressure, contraction)
@@ -67,7 +67,7 @@ def test_the_tension_is_the_slope_of_energy_of_the_wall_less_that_of_the_air(
 
 def test_without_wall_it_is_the_braid_of_chou_and_hannaford():
     ideal = ChouHannaford1996(Braid(0.01, 0.42, 0.3))
-    law = MooneyRivlinTube(BraidedTube(0.01, 0.42, 0.3, 0.0099, 1e-4), 0.0)
+    law = MooneyRivlinTube(BraidedTube(0.0099, 1e-4, 0.42, 0.3), 0.0)
     contractions = np.linspace(0.0, 0.3, 13)
     assert law.unclamped_force(5e5, contractions) == pytest.approx(
         ideal.force(5e5, contractions), rel=1e-12
@@ -188,11 +188,9 @@ def test_an_impossible_recipe_is_refused_and_its_remedy_works(case: str):
     assert replace(RECIPE, **remedy).law().force(5e5, 0.0) > 0.0
 
 
-def test_a_tube_wider_than_its_braid_and_ends_without_a_middle_are_refused():
-    with pytest.raises(ParameterError, match=r"outer radius of 11 mm, and the braid leaves 10 mm"):
-        BraidedTube(0.01, 0.4, 0.2, 0.01, 0.001)
+def test_ends_without_a_middle_are_refused():
     with pytest.raises(ParameterError, match=r"inactive_length is 190 mm of a muscle of 200 mm"):
-        BraidedTube(0.01, 0.4, 0.2, 0.008, 0.001, 0.0, 0.19)
+        BraidedTube(0.008, 0.001, 0.4, 0.2, 0.0, 0.0, 0.19)
 
 
 @pytest.mark.parametrize("pressure", [0.0, -1e5, float("nan"), 1e8])

@@ -513,7 +513,7 @@ def test_what_cannot_be_an_actuator_is_refused(plant, options, message, tmp_path
 def test_onnx_needs_its_package(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "onnx", None)
     with pytest.raises(
-        AirmuscleError, match=r"needs the package 'onnx'; pip install airmuscle\[learning\]"
+        AirmuscleError, match=r"needs the package 'onnx'; pip install .airmuscle\[learning\]"
     ):
         write_actuator(LIFT, tmp_path, OnnxStack())
 

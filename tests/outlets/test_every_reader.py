@@ -390,7 +390,7 @@ GOOD_JSON = {name: values.tolist() for name, values in COLUMNS.items()}
             json.dumps(GOOD_JSON | {"angle": [*GOOD_JSON["angle"][:-1], None]}),
             "not a finite number",
         ),
-        (json.dumps(GOOD_JSON).replace("0.0,", "1e999,", 1), "have gaps or do not rise"),
+        (json.dumps(GOOD_JSON).replace("0.0,", "1e999,", 1), "do not rise from row to row"),
         (json.dumps(GOOD_JSON).replace("0.0,", "1" * 5000 + ",", 1), "cannot be read as JSON"),
         (json.dumps(GOOD_JSON | {"angle": [10**400] * ROWS}), "is no array of numbers"),
     ],

@@ -68,7 +68,7 @@ def test_what_is_no_frame_of_measurements_is_refused(frame, error, message):
 def test_without_pandas_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(
-        AirmuscleError, match=r"needs the package pandas. Install it: pip install airmuscle\[lab\]"
+        AirmuscleError, match=r"needs the package pandas. Install it: pip install .airmuscle\[lab\]"
     ):
         RUN.to_pandas()
 

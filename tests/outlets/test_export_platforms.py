@@ -101,7 +101,7 @@ def test_without_the_cross_compiler_the_package_is_named_and_nothing_is_written(
     monkeypatch.setattr("airmuscle.outlets.export.compiler.PACKAGE", "package_that_is_missing")
     with pytest.raises(
         ParameterError,
-        match=r"need the package package_that_is_missing.*pip install airmuscle\[fmu\]",
+        match=r"need the package package_that_is_missing.*pip install .airmuscle\[fmu\]",
     ):
         write_fmu(problem(), tmp_path / "plant.fmu", platforms=[PLATFORMS["win64"]])
     assert list(tmp_path.iterdir()) == []

@@ -58,6 +58,7 @@ ROWS = (
 SHORTENING = {"Weg": "shortening [mm]"}
 READING = (
     "check",
+    "watch",
     "inspect",
     "fit",
     "hysteresis",

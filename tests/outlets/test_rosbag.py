@@ -202,6 +202,6 @@ def test_without_rosbags_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rosbags", None)
     (tmp_path / "run.bag").write_bytes(b"#ROSBAG V2.0")
     with pytest.raises(
-        FileError, match=r"needs the package rosbags.highlevel.*pip install airmuscle\[ros\]"
+        FileError, match=r"needs the package rosbags.highlevel.*pip install .airmuscle\[ros\]"
     ):
         read(tmp_path / "run.bag")

@@ -917,7 +917,7 @@ def test_a_cluster_that_does_not_respond_is_rejected(monkeypatch: pytest.MonkeyP
 def test_without_dask_a_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with (
-        pytest.raises(InputError, match=r"pip install airmuscle\[cluster\]"),
+        pytest.raises(InputError, match=r"pip install .airmuscle\[cluster\]"),
         dask_cluster("tcp://127.0.0.1:8786"),
     ):
         pass

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, counted, listed, plotting, quantity_text
+from ...core import Array, ParameterError, ShortRepr, counted, listed, plotting, quantity_text
 from ...physics import Plant
 from ...recording import Recording
 from ...report import Chapter, NamedValue, Plot, Table, TableColumn
@@ -40,8 +40,8 @@ BEGIN = 1.0
 """Time from the minimum pressure to the first level, and back at the end [s] (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PlannedSignal:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PlannedSignal(ShortRepr):
     """One signal of a plan.
 
     description  shape, amplitude, level and muscles

@@ -5,22 +5,22 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core import Array, ParameterError
+from ...core import Array, ParameterError, ShortRepr
 
 Force = Callable[[Array, Array], Array]
 """Tension [N] at gauge pressures [Pa] and contractions [1]."""
 
 
-@dataclasses.dataclass(frozen=True)
-class EnclosedVolume:
+@dataclasses.dataclass(frozen=True, repr=False)
+class EnclosedVolume(ShortRepr):
     """Volume [m3] at contractions [1] and the resting length [m] of a muscle."""
 
     volume: Callable[[Array], Array]
     resting_length: float
 
 
-@dataclasses.dataclass(frozen=True)
-class AuditedLaw:
+@dataclasses.dataclass(frozen=True, repr=False)
+class AuditedLaw(ShortRepr):
     """A law and the range in which it is meant to hold.
 
     force         tension [N] at gauge pressure [Pa] and contraction [1], arrays of one shape

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...bench.reported import Reported
-from ...core import Array, plotting
+from ...core import Array, ShortRepr, plotting
 from ...physics.mechanism import MuscleRoute, PolynomialProfile
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ..sizing import StaticMuscle
@@ -25,8 +25,8 @@ CABLE = 2.0
 """Length of the cable in the picture, over the greatest moment arm (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CamCurve:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CamCurve(ShortRepr):
     """Torque over the angle of a joint that a muscle must give.
 
     name        what states it

@@ -210,16 +210,15 @@ class MuscleRecipe:
         """The law of a tube, with shifts of the other dimensions."""
         outer = self.outer_diameter + shifts.get("braid_diameter", 0.0)
         on_tube = bore + 2.0 * wall + 4.0 * self.thread_diameter
-        lies_on_tube = not self.braid_diameter
-        radius = 0.5 * (on_tube if lies_on_tube else max(outer, on_tube)) - self.thread_diameter
+        gap = 0.5 * (outer - on_tube) if self.braid_diameter else 0.0
         ends = self.ends + shifts.get("inactive_length", 0.0) * self.outer_diameter
         geometry = BraidedTube(
-            radius=radius,
             braid_angle=self.braid_angle + shifts.get("braid_angle", 0.0),
             resting_length=self.resting_length,
             bore_radius=0.5 * bore,
             wall_thickness=wall,
             thread_distance=self.thread_diameter,
+            clearance=max(gap, 0.0),
             inactive_length=min(max(ends, 0.0), 0.5 * self.resting_length),
         )
         return MooneyRivlinTube(geometry, modulus / YOUNG)

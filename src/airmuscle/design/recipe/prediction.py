@@ -241,7 +241,7 @@ class RecipePrediction(Reported):
         }
         note = (
             "Hold the length, raise the pressure from zero, read the force; then lower it again."
-            " `airmuscle fit points.csv --characteristic muscle.toml --fix geometry.radius --fix"
+            " `airmuscle fit points.csv --characteristic muscle.toml --fix"
             " geometry.braid_angle` then fits the rubber and the ends."
         )
         return Table("points", "Twelve points to measure", columns, note)

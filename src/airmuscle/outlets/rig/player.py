@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...bench import SignalLimits
-from ...core import AirmuscleError, ParameterError, counted, listed, plotting
+from ...core import AirmuscleError, ParameterError, ShortRepr, counted, listed, plotting
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot
 from .protocol import Rig
@@ -32,8 +32,8 @@ SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 """Signals of the operating system that vent, as far as it has them."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PlayedRecord:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PlayedRecord(ShortRepr):
     """What was played and measured until the end.
 
     recording   time, commands and readings of the rows [SI]

@@ -53,9 +53,7 @@ class MooneyRivlinTube(ForceLaw):
         """Least gauge pressure [Pa] at which the muscle pulls at rest: the dead zone of a braid
         that is wider than the tube; 0 if the tube fills it.
         """
-        geometry = self.geometry
-        gap = geometry.radius - geometry.thread_distance - geometry.outer_radius
-        if gap <= 1e-9 * geometry.radius:
+        if self.geometry.clearance == 0.0:
             return 0.0
         without = float(self.unclamped_force(0.0, 0.0))
         by_pressure = float(self.unclamped_force(1.0, 0.0)) - without

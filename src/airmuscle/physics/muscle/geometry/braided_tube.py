@@ -14,24 +14,20 @@ class BraidedTube(Geometry):
     """Incompressible rubber tube that fills a braid of inextensible threads.
 
         lambda = (L - l_e)/(L_0 - l_e),   cos(theta) = lambda cos(theta_0)
-        r = r_0 sin(theta)/sin(theta_0),  r_o = r - d
+        r = r_0 sin(theta)/sin(theta_0),  r_o = r - d,   r_0 = R_i + h + g + d
         V = pi r_o^2 (L - l_e) - V_w + pi R_i^2 l_e
         V_w = pi ((R_i + h)^2 - R_i^2) (L_0 - l_e)
 
     lambda: length of the part between the ends, relative to rest; theta, r: angle and radius of the
     threads; r_o: outer radius of the tube, on which the braid lies; V_w: volume of its wall, which
-    is constant; d: distance of the threads from the tube; l_e: length at the ends, which does not
-    contract. Without wall, distance and ends it is `Braid`. Reference: the braid is that of Chou
-    and Hannaford (1996), the wall of constant volume that of Klute and Hannaford (2000).
+    is constant; d: distance of the threads from the tube; g: gap between tube and braid at rest;
+    l_e: length at the ends, which does not contract. Without wall, distance and ends it is `Braid`.
+    Reference: the braid is that of Chou and Hannaford (1996), the wall of constant volume that of
+    Klute and Hannaford (2000).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996, KLUTE_HANNAFORD_2000)
 
-    radius: float = parameter("m", "r_0", "radius of the threads at rest", bounds=(1e-4, 0.2))
-    braid_angle: float = parameter(
-        "rad", "theta_0", "angle between the threads and the axis at rest", bounds=(0.05, 1.5)
-    )
-    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     bore_radius: float = parameter(
         "m", "R_i", "inner radius of the tube, free of load", bounds=(1e-4, 0.2), fitted=False
     )
@@ -42,11 +38,23 @@ class BraidedTube(Geometry):
         bounds=(1e-5, 0.05),
         fitted=False,
     )
+    braid_angle: float = parameter(
+        "rad", "theta_0", "angle between the threads and the axis at rest", bounds=(0.05, 1.5)
+    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     thread_distance: float = parameter(
         "m",
         "d",
         "distance between the tube and the middle of the braid: one diameter of a thread",
         bounds=(0.0, 0.01),
+        default=0.0,
+        fitted=False,
+    )
+    clearance: float = parameter(
+        "m",
+        "g",
+        "gap between tube and braid at rest, at each side",
+        bounds=(0.0, 0.1),
         default=0.0,
         fitted=False,
     )
@@ -59,22 +67,17 @@ class BraidedTube(Geometry):
     )
 
     def check(self) -> None:
-        """Raise ParameterError for a tube that does not fit into the braid, or ends without a
-        middle.
-        """
+        """Raise ParameterError for ends without a middle."""
         if self.inactive_length >= 0.9 * self.resting_length:
             raise ParameterError(
                 f"BraidedTube: inactive_length is {1e3 * self.inactive_length:.4g} mm of a muscle"
                 f" of {1e3 * self.resting_length:.4g} mm; it must be less than nine tenths."
             )
-        space = self.radius - self.thread_distance
-        outer = self.outer_radius
-        if outer > space * (1.0 + 1e-9):
-            raise ParameterError(
-                f"BraidedTube: the tube has an outer radius of {1e3 * outer:.4g} mm, and the braid"
-                f" leaves {1e3 * space:.4g} mm (radius less thread_distance). Give the radius of"
-                " the braid on the tube."
-            )
+
+    @property
+    def radius(self) -> Value:
+        """Radius [m] of the threads at rest, r_0 = R_i + h + g + d."""
+        return self.outer_radius + self.clearance + self.thread_distance
 
     @property
     def contraction_range(self) -> tuple[float, float]:
