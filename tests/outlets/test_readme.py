@@ -39,7 +39,7 @@ def commands():
     lines = [
         line.partition("#")[0].strip()
         for block in blocks("sh", COMMANDS)
-        for line in block.splitlines()
+        for line in block.replace("\\\n", " ").splitlines()
     ]
     served = "./run airmuscle studio"  # a server, which the tests of the studio start
     return [line for line in lines if line.startswith("./run airmuscle") and line != served]

@@ -152,6 +152,9 @@ WITHOUT_JUDGEMENT = {
     "fit-regulator": "the same",
     "plan": "the same, of a study",
     "study": "its file is a study of a scenario, without records",
+    "submit": "it judges records by predict and by its own rules: test_submit.py",
+    "watch": "it checks each record and names what is wrong: test_watch.py",
+    "site": "its files are muscles and scenarios, without records",
 }
 """Commands that take records, and why they are not in the table."""
 UNREADABLE = {"no force"}

@@ -36,9 +36,10 @@ LIBRARY = sorted((ROOT / "src" / "airmuscle" / "files" / "library").glob("*.toml
 EXAMPLES = [
     p
     for p in sorted((ROOT / "examples").glob("*.toml"))
-    if "[vary]" not in p.read_text(encoding="utf-8") and not p.stem.startswith("cluster")
+    if "[vary]" not in p.read_text(encoding="utf-8")
+    and not p.stem.startswith(("cluster", "air_leg"))
 ]
-"""The scenarios; studies and clusters have other tables."""
+"""The scenarios; studies, clusters and moves of routes have other tables."""
 """Scenarios; a study of many runs has a grammar of its own."""
 SCENARIO = scenario_schema()
 MUSCLE = muscle_schema()

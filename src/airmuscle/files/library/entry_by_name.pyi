@@ -14,6 +14,7 @@ def load(
         "borzikova-direct-repaired",
         "borzikova-exponential",
         "borzikova-monotone",
+        "braided-silicone-9mm",
         "chou-hannaford",
         "dmsp-10-250",
         "dmsp-20-300",
