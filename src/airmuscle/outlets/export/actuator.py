@@ -18,6 +18,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -98,7 +99,7 @@ class ActuatorModel:
         z = nodes.symbols("z", 3)
         h = nodes.symbol("h")
         rows, weights = RungeKutta4(self.step).tableau()
-        usable = _all_finite([z[0], z[1] + h * z[2], z[2]])
+        usable = all_finite([z[0], z[1] + h * z[2], z[2]])
         command, length, speed = self._replaced(z, usable, t.p)
 
         def inputs(node: float) -> list[Node]:
@@ -115,7 +116,7 @@ class ActuatorModel:
         """Arguments and result of `observe`."""
         t = self._traced
         z = nodes.symbols("z", 3)
-        usable = _all_finite(z)
+        usable = all_finite(z)
         motion = self._replaced(z, usable, t.p)
         inputs = self._inputs(motion, t.p)
         outputs = nodes.replaced(t.o, t.u, inputs)
@@ -123,7 +124,7 @@ class ActuatorModel:
         known = dict(zip(state_names, t.x, strict=True))
         known |= dict(zip(t.output_names, outputs, strict=True))
         results = [known["force"], known["pressure"]]
-        valid = nodes.logical_and(usable, _all_finite(results))
+        valid = nodes.logical_and(usable, all_finite(results))
         for limit in self.part.column_limits:
             if limit.column not in known:
                 continue
@@ -132,7 +133,7 @@ class ActuatorModel:
             valid = nodes.logical_and(valid, value >= low) if np.isfinite(low) else valid
             valid = nodes.logical_and(valid, value <= high) if np.isfinite(high) else valid
         # a comparison with a pressure that is NaN, after a start without a number, would be slack
-        known_pressure = nodes.logical_and(usable, _all_finite([known["pressure"]]))
+        known_pressure = nodes.logical_and(usable, all_finite([known["pressure"]]))
         shown = [nodes.where(known_pressure, result, np.nan) for result in results]
         return {"x": t.x, "z": z, "p": t.p}, [*shown, valid]
 
@@ -250,7 +251,7 @@ def control_range(controls: Sequence[Input]) -> tuple[float, float]:
     return (controls[0].minimum, controls[0].maximum) if controls else (0.0, 0.0)
 
 
-def _all_finite(values: Sequence[Node]) -> Node:
+def all_finite(values: Sequence[Node]) -> Node:
     """Whether all values are finite numbers, and with them their sum, as a condition."""
     total = functools.reduce(nodes.add, values)
     return nodes.less_equal(abs(total), nodes.constant(LARGEST))
@@ -262,7 +263,6 @@ def _stable_step(part: Plant) -> float:
     """
     compiled = compile_system(part)
     fastest = 1.0
-    sizes = compiled.nominal
     for pressure, contraction, opening in itertools.product(
         (2e4, 2e5, 5e5), (0.0, 0.1, 0.2), (0.0, 0.5, 1.0)
     ):
@@ -276,10 +276,24 @@ def _stable_step(part: Plant) -> float:
             motion.get(i.name, i.minimum + opening * (min(i.maximum, 1e6) - i.minimum))
             for i in part.input_variables
         ]
-        slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
-        if np.isfinite(slopes).all():
-            rates = np.linalg.eigvals(slopes * sizes / sizes[:, None])
-            fastest = max(fastest, float(np.abs(rates).max(initial=0.0)))
+        fastest = max(fastest, fastest_rate(compiled, list(state.values()), inputs))
+    return longest_step(fastest)
+
+
+def fastest_rate(compiled: Any, state: list[float], inputs: list[float]) -> float:
+    """The greatest magnitude [1/s] of the eigenvalues of the rates by the states, in their nominal
+    sizes; 0 where a slope is not finite.
+    """
+    sizes = compiled.nominal
+    slopes = derivatives(compiled, state, inputs).rates_by_state
+    if not np.isfinite(slopes).all():
+        return 0.0
+    eigenvalues = np.linalg.eigvals(slopes * sizes / sizes[:, None])
+    return float(np.abs(eigenvalues).max(initial=0.0))
+
+
+def longest_step(fastest: float) -> float:
+    """The longest step [s] of 1 ms / 2^k that resolves a rate [1/s]."""
     step = MAX_STEP
     while step * fastest > SAFETY:
         step /= 2.0

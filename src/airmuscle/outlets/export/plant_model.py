@@ -19,11 +19,11 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...core import Input, Leaf, Node, ParameterError, TraceError, autodiff, leaves, nodes
-from ...engine.compile import compile_system, derivatives
+from ...engine.compile import compile_system
 from ...engine.compile.functions import Printer, TracedSystem
 from ...engine.compile.ir.emission import TargetLanguage
 from ...physics.plant import Plant
-from .actuator import LARGEST, MAX_STEP, SAFETY, Expressions
+from .actuator import Expressions, all_finite, fastest_rate, longest_step
 from .printed_system import make_labels
 
 PRESSURE = 2.5e5
@@ -76,8 +76,7 @@ class PrintedPlant:
     @property
     def _usable(self) -> Node:
         """Whether all inputs are finite numbers, and with them their sum."""
-        total = functools.reduce(nodes.add, self._traced.u)
-        return nodes.less_equal(abs(total), nodes.constant(LARGEST))
+        return all_finite(self._traced.u)
 
     def _driven(self, results: list[Node]) -> list[Node]:
         """Expressions of the plant under inputs that are limited to their ranges."""
@@ -104,7 +103,7 @@ class PrintedPlant:
         usable = self._usable
         known = self._known
         results = [known[name] for name in self.observed]
-        valid = nodes.logical_and(usable, _is_finite(results))
+        valid = nodes.logical_and(usable, all_finite(results))
         for within in self._within_limits(known):
             valid = nodes.logical_and(valid, within)
         shown = [nodes.where(usable, result, np.nan) for result in results]
@@ -199,18 +198,11 @@ def plant_model(
     return PrintedPlant(plant, step)
 
 
-def _is_finite(values: list[Node]) -> Node:
-    """Whether all values are finite numbers, and with them their sum, as a condition."""
-    total = functools.reduce(nodes.add, values)
-    return nodes.less_equal(abs(total), nodes.constant(LARGEST))
-
-
 def _stable_step(plant: Plant, usual: float) -> float:
     """The longest step of 1 ms / 2^k that resolves the fastest rate at a few states, with commands
     at both ends, at rest and in motion.
     """
     compiled = compile_system(plant)
-    sizes = compiled.nominal
     speeds = [coordinate.speed for coordinate in plant.mechanism.coordinates]
     fastest = 1.0
     for pressure, opening, speed in itertools.product(
@@ -223,11 +215,5 @@ def _stable_step(plant: Plant, usual: float) -> float:
             known.minimum + opening * (min(known.maximum, 2.0 * usual) - known.minimum)
             for known in plant.input_variables
         ]
-        slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
-        if np.isfinite(slopes).all():
-            eigenvalues = np.linalg.eigvals(slopes * sizes / sizes[:, None])
-            fastest = max(fastest, float(np.abs(eigenvalues).max(initial=0.0)))
-    step = MAX_STEP
-    while step * fastest > SAFETY:
-        step /= 2.0
-    return step
+        fastest = max(fastest, fastest_rate(compiled, list(state.values()), inputs))
+    return longest_step(fastest)
